@@ -1,0 +1,101 @@
+"""What is looked at and asked for: responses, objectives, constraints, and the settings of the methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import field
+
+from mdstopo.case.arrays import FloatArray, FrozenDict, read_only
+from mdstopo.case.parts import Pair
+from mdstopo.case.value import Value, frozen
+
+
+@frozen
+class Response(Value):
+    """A scalar seen over time.
+
+    kind: energy | displacement | velocity | acceleration | angle | angular_velocity | angular_acceleration |
+    member_force | joint_force | joint_moment. Fields that a kind does not use are None.
+    at_local is in body coordinates of `body`; component: x | y | norm.
+    """
+
+    kind: str
+    body: str | None = None
+    at_local: Pair | None = None
+    relative_to: str | None = None
+    component: str | None = None
+    group: str | None = None
+    joint: str | None = None
+
+
+@frozen
+class Objective(Value):
+    """over_time: max | min | max_abs | mean | rms | integral | final; sense: minimize | maximize."""
+
+    name: str
+    response: Response
+    over_time: str = "max"
+    load_case: str = "default"
+    sense: str = "minimize"
+
+
+@frozen
+class VolumeRow(Value):
+    """coefficients (N,) . alpha <= bound (``limit``), = bound (``equals``), >= bound (``at_least``) (Eq. 14).
+
+    A fraction of the total has become its limit.
+    """
+
+    groups: tuple[str, ...]
+    coefficients: FloatArray
+    bound: float
+    sense: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "coefficients", read_only(self.coefficients))
+
+
+@frozen
+class ResponseRow(Value):
+    """A response over time that is bounded: ``limit``, ``equals`` or ``at_least``."""
+
+    response: Response
+    over_time: str
+    load_case: str
+    bound: float
+    sense: str
+
+
+@frozen
+class Combine(Value):
+    """How several objectives become one; weights of every objective, in their order, of sum 1."""
+
+    method: str
+    weights: Mapping[str, float]
+    exponent: float = 2.0
+    normalize: bool = True
+
+
+@frozen
+class OptimizerSettings(Value):
+    """The `optimizer` section; options: the optimiser's single settings that the file overrides."""
+
+    name: str = "gsao"
+    preset: str = "default"
+    max_iterations: int = 50
+    tolerance: float = 1e-6
+    starts: int = 1
+    seed: int = 0
+    options: Mapping[str, float | bool | int] = field(default_factory=FrozenDict)
+
+
+@frozen
+class SolverSettings(Value):
+    """The `solver` section; step in s or None where the file leaves it out."""
+
+    integrator: str = "auto"
+    tolerance: float = 1e-8
+    sensitivity: str = "auto"
+    assemble: bool = False
+    step: float | None = None
+    spectral_radius: float | None = None

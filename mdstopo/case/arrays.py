@@ -1,0 +1,86 @@
+"""Immutable building blocks of a case: read-only arrays, frozen mappings, tables of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.value import Value, frozen
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+_K = TypeVar("_K")
+_V = TypeVar("_V")
+
+
+def read_only(array: FloatArray) -> FloatArray:
+    """The same numbers as a contiguous float64 array that refuses assignment."""
+    frozen = np.ascontiguousarray(array, dtype=np.float64)
+    if frozen.flags.writeable:
+        frozen = frozen.view()
+        frozen.flags.writeable = False
+    return frozen
+
+
+def read_only_index(array: IndexArray) -> IndexArray:
+    """As `read_only`, for indices."""
+    frozen = np.ascontiguousarray(array, dtype=np.intp)
+    if frozen.flags.writeable:
+        frozen = frozen.view()
+        frozen.flags.writeable = False
+    return frozen
+
+
+class FrozenDict(Mapping[_K, _V]):
+    """A mapping that cannot be changed and can be pickled."""
+
+    __slots__ = ("_data",)
+    _data: dict[_K, _V]
+
+    def __init__(self, data: Mapping[_K, _V] | None = None) -> None:
+        object.__setattr__(self, "_data", dict(data) if data is not None else {})
+
+    def __setattr__(self, name: str, value: object) -> None:
+        raise AttributeError(f"a FrozenDict cannot be changed ({name})")
+
+    def __getitem__(self, key: _K) -> _V:
+        return self._data[key]
+
+    def __iter__(self) -> Iterator[_K]:
+        return iter(self._data)
+
+    def __len__(self) -> int:
+        return len(self._data)
+
+    def __repr__(self) -> str:
+        return repr(self._data)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return FrozenDict, (self._data,)
+
+
+@frozen
+class Table(Value):
+    """A table of time: linear between rows, constant outside them.
+
+    times (n,): not falling, in s; a time that two rows share is a jump, right-continuous there.
+    values (n, m): one row of values for each time.
+    """
+
+    times: FloatArray
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "times", read_only(self.times))
+        object.__setattr__(self, "values", read_only(self.values))
+
+
+Signal = float | Table
+"""A scalar quantity over time: a constant, or a Table with m = 1."""
+
+VectorSignal = tuple[Signal, Signal]
+"""Two components over time. A table of [t, x, y] becomes two Tables with the same times."""

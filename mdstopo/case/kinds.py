@@ -1,0 +1,261 @@
+"""Kinds of single values: each reads a node, with located mistakes, and states itself as JSON Schema.
+
+Reader and JSON Schema cannot disagree on a type, a limit, a word or a default: both come from one object.
+A kind that finds a mistake notes it and returns BAD; it never raises.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any, Protocol
+
+from mdstopo.case.nodes import SCALAR, Node
+from mdstopo.case.reading import BAD, Reading, Reference, found
+from mdstopo.case.scalars import to_float
+from mdstopo.case.value import Value, frozen
+from mdstopo.case.words import did_you_mean, listed, number_text, shown
+
+Schema = dict[str, Any]
+
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+TAKEN = ("ground", "all", "default")
+
+
+class Kind(Protocol):
+    """What a value may be."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """The value at `node`, or BAD."""
+
+    def schema(self) -> Schema:
+        """The same as JSON Schema (draft 2020-12)."""
+
+
+@frozen
+class Number(Value):
+    """A finite number with limits; `above` and `below` are exclusive. whole: integers only (20.0 is one)."""
+
+    minimum: float | None = None
+    above: float | None = None
+    maximum: float | None = None
+    below: float | None = None
+    whole: bool = False
+
+    def allowed(self) -> str:
+        """The limits in words."""
+        noun = "a whole number" if self.whole else "a number"
+        limits = [
+            f"{sign} {number_text(limit)}"
+            for sign, limit in (
+                (">", self.above), (">=", self.minimum), ("<", self.below), ("<=", self.maximum),
+            )
+            if limit is not None
+        ]  # fmt: skip
+        return f"{noun} {' and '.join(limits)}" if limits else noun
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """float (int where whole) or BAD."""
+        raw = node.scalar() if node.kind == SCALAR else None
+        if isinstance(raw, bool) or not isinstance(raw, (int, float)):
+            reading.mistake(path, f"found {found(node)}{self._hint(node)}, allowed is {self.allowed()}", node)
+            return BAD
+        value = to_float(raw)
+        if not math.isfinite(value):
+            reading.mistake(path, f"found {found(node)}, allowed is {self.allowed()} that is finite", node)
+            return BAD
+        fits = (
+            (self.above is None or value > self.above)
+            and (self.minimum is None or value >= self.minimum)
+            and (self.below is None or value < self.below)
+            and (self.maximum is None or value <= self.maximum)
+            and (not self.whole or value == math.floor(value))
+        )
+        if not fits:
+            reading.mistake(path, f"found {found(node)}, allowed is {self.allowed()}", node)
+            return BAD
+        return int(raw) if self.whole else value
+
+    @staticmethod
+    def _hint(node: Node) -> str:
+        if node.kind != SCALAR or not node.text:
+            return ""
+        if not node.plain and re.fullmatch(r"[-+.0-9eExX]+", node.text):
+            return " (a quoted number is text)"
+        if node.plain and re.match(r"[-+.]?[0-9].*[a-zA-Z]", node.text):
+            return " (units are SI and not written)"
+        if node.plain and re.fullmatch(r"[-+]?[0-9]+,[0-9]+", node.text):
+            return " (the decimal sign is a point)"
+        return ""
+
+    def schema(self) -> Schema:
+        """type and limits."""
+        limits = {
+            "minimum": self.minimum,
+            "exclusiveMinimum": self.above,
+            "maximum": self.maximum,
+            "exclusiveMaximum": self.below,
+        }
+        kind = "integer" if self.whole else "number"
+        return {"type": kind, **{word: limit for word, limit in limits.items() if limit is not None}}
+
+
+@frozen
+class Flag(Value):
+    """true or false."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """bool or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if isinstance(value, bool):
+            return value
+        reading.mistake(path, f"found {found(node)}, allowed is true or false", node)
+        return BAD
+
+    def schema(self) -> Schema:
+        """boolean."""
+        return {"type": "boolean"}
+
+
+@frozen
+class Text(Value):
+    """Any text."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if isinstance(value, str):
+            return value
+        hint = " (quote it to make it text)" if node.kind == SCALAR and value is not None else ""
+        reading.mistake(path, f"found {found(node)}{hint}, allowed is text", node)
+        return BAD
+
+    def schema(self) -> Schema:
+        """string."""
+        return {"type": "string"}
+
+
+@frozen
+class Word(Value):
+    """One of a few words. instead: what is allowed besides, for the message."""
+
+    words: tuple[str, ...]
+    instead: str = ""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if isinstance(value, str) and value in self.words:
+            return value
+        hint = did_you_mean(value, self.words) if isinstance(value, str) else ""
+        allowed = " | ".join(self.words) + self.instead
+        reading.mistake(path, f"found {found(node)}{hint or ','} allowed is {allowed}", node)
+        return BAD
+
+    def schema(self) -> Schema:
+        """enum."""
+        return {"type": "string", "enum": list(self.words)}
+
+
+@frozen
+class NumberOrWord(Value):
+    """A number, or one of a few words."""
+
+    number: Number
+    word: Word
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """float, str or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            return self.number.read(node, path, reading)
+        return self.word.read(node, path, reading)
+
+    def schema(self) -> Schema:
+        """Either."""
+        return {"anyOf": [self.number.schema(), self.word.schema()]}
+
+
+@frozen
+class Version(Value):
+    """The number of the format."""
+
+    number: int
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """int or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if not isinstance(value, bool) and value == self.number:
+            return self.number
+        message = f"found {found(node)}, allowed is {self.number}: this program reads no other"
+        reading.mistake(path, message, node)
+        return BAD
+
+    def schema(self) -> Schema:
+        """const."""
+        return {"const": self.number}
+
+
+@frozen
+class Ref(Value):
+    """A name declared elsewhere (see `Reading.declare`). also: words with a meaning of their own.
+
+    index: an index may stand for the name.
+    """
+
+    kind: str
+    also: tuple[str, ...] = ()
+    index: bool = False
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD; whether the name is declared is checked once all are known."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if self.index and isinstance(value, int) and not isinstance(value, bool):
+            value = str(value)
+        if not isinstance(value, str):
+            reading.mistake(path, f"found {found(node)}, allowed is the name of a {self.kind}", node)
+            return BAD
+        if value not in self.also:
+            reading.mark(path, node)
+            reading.references.append(Reference(path, self.kind, value))
+        return value
+
+    def schema(self) -> Schema:
+        """string, or an index."""
+        text = {"type": "string", "description": f"name of a {self.kind}"}
+        return {"anyOf": [text, {"type": "integer", "minimum": 0}]} if self.index else text
+
+
+@frozen
+class Name(Value):
+    """A new name."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD."""
+        if node.kind != SCALAR:
+            reading.mistake(path, f"found {found(node)}, allowed is a name", node)
+            return BAD
+        return node.text if check_name(node, path, reading) else BAD
+
+    def schema(self) -> Schema:
+        """A string of the right characters that is not taken."""
+        return {"type": "string", "pattern": f"^{NAME.pattern}$", "not": {"enum": list(TAKEN)}}
+
+
+def check_name(node: Node, path: str, reading: Reading) -> bool:
+    """Whether the scalar `node` may name something; notes the mistake where not."""
+    if not isinstance(node.scalar(), str):
+        reading.mistake(path, f"found {found(node)} as a name; quote it or choose another", node)
+    elif node.text in TAKEN:
+        why = f"the name {node.text!r} is taken: {listed(TAKEN)} have meanings of their own"
+        reading.mistake(path, why, node)
+    elif not NAME.fullmatch(node.text):
+        reading.mistake(
+            path,
+            f"found the name {shown(node.text)}, allowed is a letter (a to z, A to Z) or _, "
+            "then letters, digits, _ or -",
+            node,
+        )
+    else:
+        return True
+    return False

@@ -1,0 +1,151 @@
+"""Load cases: common part and own part merged; loads and motions in their normal form."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.arrays import Signal, Table
+from mdstopo.case.geometry import Frames
+from mdstopo.case.model import GROUND, Body, Load, LoadCase, Motion, Pair
+from mdstopo.case.motions import Start
+from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.words import inside, number_text
+
+DEFAULT = "default"
+
+
+class Window:
+    """When a load case runs, and where the file says so. good: whether both times could be read."""
+
+    def __init__(self, start: Any, end: Any, path: str) -> None:
+        self.good = start is not BAD and end is not BAD and start is not None and end is not None
+        self.start: float = start if self.good else 0.0
+        self.end: float = end if self.good else 0.0
+        self.path = path
+
+
+def windows(top: Fields, reading: Reading) -> dict[str, Window]:
+    """Start and end of every load case (`default` where there are none), own times before common ones."""
+    time = top["time"]
+    common_start, common_end = (BAD, BAD) if time is BAD else (time["start"], time["end"])
+    found: dict[str, Window] = {}
+    common = Window(common_start, common_end, "time")
+    cases = top["load_cases"]
+    if cases is BAD:
+        return {}
+    for name, fields in (cases or {}).items():
+        own = None if fields is BAD else fields["time"]
+        if own is None or own is BAD:
+            found[name] = Window(common_start, common_end, "time") if own is None else Window(BAD, BAD, "")
+            continue
+        start = own["start"] if "start" in own.stated else common_start
+        end = own["end"] if "end" in own.stated else common_end
+        found[name] = Window(start, end, own.path)
+    for window in [common, *found.values()]:
+        if window.good and not (window.end > window.start and math.isfinite(window.end - window.start)):
+            path = inside(window.path, "end")
+            now, start_text = number_text(window.end), number_text(window.start)
+            message = f"found {now}, allowed is a time after start {start_text}"
+            reading.mistake(path, message)
+            window.good = False
+    return found or {DEFAULT: common}
+
+
+def build_load_cases(
+    top: Fields,
+    times: dict[str, Window],
+    motions: dict[str, tuple[Motion, ...]],
+    starts: dict[tuple[str, str], Start],
+    frames: Frames,
+    reading: Reading,
+) -> tuple[LoadCase, ...]:
+    """The load cases that can be made. motions, starts: as `mdstopo.case.motions` resolves them."""
+    common = build_loads(top["loads"], frames, reading)
+    cases = top["load_cases"] or {DEFAULT: None}
+    built = []
+    for name, window in times.items():
+        fields = cases.get(name)
+        own = build_loads(fields["loads"], frames, reading) if isinstance(fields, Fields) else ()
+        gravity, path = top["gravity"], "gravity"
+        if isinstance(fields, Fields) and "gravity" in fields.stated:
+            gravity, path = fields["gravity"], inside(fields.path, "gravity")
+        if gravity is BAD or not window.good or fields is BAD:
+            continue
+        _check_weights(gravity, frames, path, reading)
+        moving = [body for body in frames.bodies.values() if body.name != GROUND]
+        bodies = tuple(_started(body, starts.get((name, body.name))) for body in moving)
+        built.append(
+            LoadCase(name, gravity, window.start, window.end, common + own, motions.get(name, ()), bodies)
+        )
+    return tuple(built)
+
+
+def _started(body: Body, start: Start | None) -> Body:
+    """The body with the start velocities that a motion prescribes and the body does not state."""
+    if start is None:
+        return body
+    vx, vy = body.velocity
+    velocity = (vx if start.vx is None else start.vx, vy if start.vy is None else start.vy)
+    rate = body.angular_velocity if start.angular_velocity is None else start.angular_velocity
+    return replace(body, velocity=velocity, angular_velocity=rate)
+
+
+def _check_weights(gravity: Pair, frames: Frames, path: str, reading: Reading) -> None:
+    for body in frames.bodies.values():
+        if body.name != GROUND and not all(math.isfinite(body.mass * g) for g in gravity):
+            reading.mistake(path, f"the weight of {body.name!r} is too large for a number")
+
+
+def build_loads(entries: Any, frames: Frames, reading: Reading) -> tuple[Load, ...]:
+    """The loads that can be made."""
+    built = []
+    for fields in entries if isinstance(entries, list) else ():
+        load = None if fields is BAD else _build_load(fields, frames, reading)
+        if load is not None:
+            built.append(load)
+    return tuple(built)
+
+
+def _build_load(fields: Fields, frames: Frames, reading: Reading) -> Load | None:
+    name = fields["body"]
+    if name == GROUND:
+        reading.mistake(inside(fields.path, "body"), "ground does not move: a load on it does nothing")
+        return None
+    if name not in frames.bodies or not fields.good():
+        return None
+    body = frames.bodies[name]
+    at = frames.local_point(name, fields["at"], fields["frame"], inside(fields.path, "at"), reading)
+    force: Any = fields["force"] or (0.0, 0.0)
+    moment: Any = fields["moment"] or (0.0,)
+    if fields["acceleration"] is not None:
+        force = _scaled(fields["acceleration"], body.mass, inside(fields.path, "acceleration"), reading)
+    if fields["angular_acceleration"] is not None:
+        path = inside(fields.path, "angular_acceleration")
+        moment = _scaled(fields["angular_acceleration"], body.inertia, path, reading)
+    if at is BAD or force is BAD or moment is BAD:
+        return None
+    arm = max(1.0, abs(at[0]), abs(at[1]))
+    share = arm / min(1.0, body.mass, body.inertia)
+    if not all(math.isfinite(_largest(part) * share) for part in (*force, *moment)):
+        reading.mistake(fields.path, "the load is too large to compute with")
+        return None
+    return Load(name, force, at, moment[0], fields["frame"])
+
+
+def _scaled(signals: tuple[Signal, ...], factor: float, path: str, reading: Reading) -> Any:
+    """Accelerations as forces or moments, BAD where they overflow."""
+    if not all(math.isfinite(_largest(signal) * factor) for signal in signals):
+        reading.mistake(path, f"times {number_text(factor)} it is too large for a number")
+        return BAD
+    return tuple(
+        Table(signal.times, signal.values * factor) if isinstance(signal, Table) else signal * factor
+        for signal in signals
+    )
+
+
+def _largest(signal: Signal) -> float:
+    return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)

@@ -1,0 +1,26 @@
+"""How many points and members memory holds, so that too many are refused before they are made."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+BYTES_PER_MEMBER = 200
+"""What a member costs from reading to result: indices, length, cost, and the optimiser's vectors."""
+BYTES_PER_POINT = 100
+_UNKNOWN = 8 * 2**30
+_LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
+
+
+def total_memory() -> int:
+    """Bytes that this process may use at most: the machine's, or the container's where that is less."""
+    try:
+        total = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # not on Windows
+        total = _UNKNOWN
+    for name in _LIMITS:
+        try:
+            total = min(total, int(Path(name).read_text()))
+        except (OSError, ValueError):
+            continue
+    return total

@@ -1,0 +1,247 @@
+"""The case: what the user wrote, typed, immutable, defaults filled in, everything in SI units.
+
+Body coordinates are relative to the centre of mass, along axes that turn with the body. World coordinates are
+the global frame's, in the configuration at the start. Pairs are tuples (x, y); what is longer is a read-only
+array. The fixed body is called ``ground``: it is not among `Case.bodies`, its frame is the global one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import field
+from pathlib import Path
+
+import numpy as np
+
+from mdstopo.case.aims import (
+    Combine,
+    Objective,
+    OptimizerSettings,
+    Response,
+    ResponseRow,
+    SolverSettings,
+    VolumeRow,
+)
+from mdstopo.case.arrays import FloatArray, FrozenDict, IndexArray, Signal, Table, VectorSignal, read_only
+from mdstopo.case.errors import Mistake
+from mdstopo.case.laws import (
+    LAWS,
+    ActuatorLaw,
+    CubicLaw,
+    CurveLaw,
+    GapLaw,
+    InerterLaw,
+    Law,
+    PulseLaw,
+    SpringLaw,
+    TableLaw,
+)
+from mdstopo.case.parts import (
+    GROUND,
+    Body,
+    Bushing,
+    DistanceJoint,
+    FixedJoint,
+    Joint,
+    Load,
+    LoadCase,
+    MemberGroup,
+    Motion,
+    Pair,
+    PointGrid,
+    Prescribed,
+    PrismaticJoint,
+    RevoluteJoint,
+    Triple,
+)
+from mdstopo.case.value import Value, frozen
+
+__all__ = [
+    "GROUND",
+    "LAWS",
+    "ActuatorLaw",
+    "Body",
+    "Bushing",
+    "Case",
+    "Combine",
+    "CubicLaw",
+    "CurveLaw",
+    "DistanceJoint",
+    "FixedJoint",
+    "FloatArray",
+    "FrozenDict",
+    "GapLaw",
+    "IndexArray",
+    "InerterLaw",
+    "Joint",
+    "Law",
+    "Load",
+    "LoadCase",
+    "Marks",
+    "MemberGroup",
+    "Motion",
+    "Objective",
+    "OptimizerSettings",
+    "Pair",
+    "PointGrid",
+    "Prescribed",
+    "PrismaticJoint",
+    "PulseLaw",
+    "Response",
+    "ResponseRow",
+    "RevoluteJoint",
+    "Signal",
+    "SolverSettings",
+    "SpringLaw",
+    "Table",
+    "TableLaw",
+    "Triple",
+    "VectorSignal",
+    "VolumeRow",
+]
+
+
+@frozen
+class Marks(Value):
+    """Where each key of the file stands: key path -> (line, column), both from 1.
+
+    origins: key path -> ``--set KEY`` for values that came from outside the file.
+    """
+
+    places: Mapping[str, tuple[int, int]]
+    origins: Mapping[str, str] = field(default_factory=FrozenDict)
+
+    def __getitem__(self, path: str) -> tuple[int, int]:
+        """Line and column of `path`, or of the nearest key that encloses it; (1, 1) where nothing does."""
+        while path:
+            place = self.places.get(path)
+            if place is not None:
+                return place
+            path = enclosing(path)
+        return self.places.get("", (1, 1))
+
+    def mistake(self, path: str, message: str) -> Mistake:
+        """A mistake at the place of `path`, for later stages that refuse what the reader accepted."""
+        line, column = self[path]
+        origin, around = self.origins.get(path, ""), path
+        while not origin and around and around not in self.places:
+            around = enclosing(around)
+            origin = self.origins.get(around, "")
+        return Mistake(path, message, line, column, origin)
+
+    def __contains__(self, path: object) -> bool:
+        return path in self.places
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.places)
+
+
+def enclosing(path: str) -> str:
+    """The key path around a key path: ``joints[0].axis`` -> ``joints[0]`` -> ``joints`` -> empty."""
+    return path[: max(path.rfind("."), path.rfind("["), 0)]
+
+
+@frozen
+class Case(Value):
+    """One design problem.
+
+    text, sha256: the YAML as read and its hash; overrides: keys set from outside, key path -> value in YAML;
+    files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
+    the user should know.
+    """
+
+    title: str
+    path: Path | None
+    name: str
+    text: str
+    sha256: str
+    overrides: Mapping[str, str]
+    files: Mapping[str, str]
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    bushings: tuple[Bushing, ...]
+    points: Mapping[str, PointGrid]
+    members: tuple[MemberGroup, ...]
+    load_cases: tuple[LoadCase, ...]
+    objectives: tuple[Objective, ...]
+    combine: Combine | None
+    constraints: tuple[VolumeRow | ResponseRow, ...]
+    optimizer: OptimizerSettings
+    solver: SolverSettings
+    marks: Marks
+    warnings: tuple[Mistake, ...] = ()
+
+    @property
+    def design_groups(self) -> tuple[MemberGroup, ...]:
+        """The groups whose members are design variables, in the order of the design vector."""
+        return tuple(group for group in self.members if group.design)
+
+    @property
+    def n_design(self) -> int:
+        """N, the number of design variables."""
+        return sum(len(group) for group in self.design_groups)
+
+    @property
+    def n_members(self) -> int:
+        """Members of all groups."""
+        return sum(len(group) for group in self.members)
+
+    @property
+    def group_slices(self) -> dict[str, slice]:
+        """Design group -> its slice of the design vector."""
+        slices: dict[str, slice] = {}
+        first = 0
+        for group in self.design_groups:
+            slices[group.name] = slice(first, first + len(group))
+            first += len(group)
+        return slices
+
+    @property
+    def is_optimizable(self) -> bool:
+        """Whether there is something to vary and something to improve."""
+        return bool(self.objectives) and self.n_design > 0
+
+    @property
+    def initial(self) -> FloatArray:
+        """(N,) initial design; 1 where the case states neither design nor objectives nor constraints."""
+        return self._per_member("initial")
+
+    @property
+    def lower(self) -> FloatArray:
+        """(N,) lower bounds."""
+        return self._per_member("lower")
+
+    @property
+    def upper(self) -> FloatArray:
+        """(N,) upper bounds."""
+        return self._per_member("upper")
+
+    @property
+    def power(self) -> FloatArray:
+        """(N,) mu of Eq. 12."""
+        return self._per_member("power")
+
+    @property
+    def cost(self) -> FloatArray:
+        """(N,) V_i of Eq. 14."""
+        groups = self.design_groups
+        return read_only(np.concatenate([g.cost for g in groups]) if groups else np.zeros(0))
+
+    def body(self, name: str) -> Body:
+        """The body of that name; KeyError where there is none (``ground`` is none)."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise KeyError(name)
+
+    def load_case(self, name: str) -> LoadCase:
+        """The load case of that name; KeyError where there is none."""
+        for load_case in self.load_cases:
+            if load_case.name == name:
+                return load_case
+        raise KeyError(name)
+
+    def _per_member(self, field: str) -> FloatArray:
+        groups = self.design_groups
+        values = np.array([getattr(g, field) for g in groups], dtype=np.float64)
+        return read_only(np.repeat(values, [len(g) for g in groups]))

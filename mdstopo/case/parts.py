@@ -1,0 +1,228 @@
+"""What moves and what acts: bodies, points, members, loads, motions, joints."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mdstopo.case.arrays import FloatArray, IndexArray, Signal, VectorSignal, read_only, read_only_index
+from mdstopo.case.laws import Law
+from mdstopo.case.value import Value, frozen
+
+GROUND = "ground"
+
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+
+
+@frozen
+class Body(Value):
+    """A rigid body at the start.
+
+    mass in kg, inertia about the centre of mass in kg m^2, position of the centre of mass in m, angle in rad.
+    stated: those of ``angle``, ``velocity``, ``angular_velocity`` that the file gives (others are defaults).
+    """
+
+    name: str
+    mass: float
+    inertia: float
+    position: Pair
+    angle: float = 0.0
+    velocity: Pair = (0.0, 0.0)
+    angular_velocity: float = 0.0
+    stated: frozenset[str] = frozenset()
+
+
+@frozen
+class PointGrid(Value):
+    """Named points on one body: local (n, 2) in body coordinates, world (n, 2) global at the start."""
+
+    name: str
+    body: str
+    local: FloatArray
+    world: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "local", read_only(self.local))
+        object.__setattr__(self, "world", read_only(self.world))
+
+
+@frozen
+class MemberGroup(Value):
+    """A group of M candidate members between two bodies, filters applied, P slow and Q fast.
+
+    from_local (nP, 2), to_local (nQ, 2): the end points in body coordinates, each stored once;
+    from_world, to_world: the same in the global frame at the start.
+    from_index, to_index (M,): which of them each member joins. length (M,): initial lengths in m, > 0.
+    laws: forces that add. cost (M,): V_i. design: whether members are design variables; where not, alpha = 1.
+    initial, lower, upper, power: the design's numbers for this group (power is mu of Eq. 12).
+    """
+
+    name: str
+    body_from: str
+    body_to: str
+    from_local: FloatArray
+    to_local: FloatArray
+    from_world: FloatArray
+    to_world: FloatArray
+    from_index: IndexArray
+    to_index: IndexArray
+    length: FloatArray
+    laws: tuple[Law, ...]
+    cost: FloatArray
+    design: bool = True
+    initial: float = 0.1
+    lower: float = 0.001
+    upper: float = 1.0
+    power: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("from_local", "to_local", "from_world", "to_world", "length", "cost"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+        for name in ("from_index", "to_index"):
+            object.__setattr__(self, name, read_only_index(getattr(self, name)))
+
+    def __len__(self) -> int:
+        return int(self.length.shape[0])
+
+    @property
+    def is_product(self) -> bool:
+        """Whether every P is joined with every Q: member i is (i // nQ, i % nQ)."""
+        n_p, n_q = self.from_local.shape[0], self.to_local.shape[0]
+        if len(self) != n_p * n_q:
+            return False
+        # As many as the product has, and no pair twice, leaves pairs only where one side has a single point.
+        return min(n_p, n_q) <= 1 or int(self.from_index[1]) == 0
+
+    @property
+    def p_local(self) -> FloatArray:
+        """(M, 2) first ends in body coordinates of ``body_from``; made anew at each access."""
+        return self.from_local[self.from_index]
+
+    @property
+    def q_local(self) -> FloatArray:
+        """(M, 2) second ends in body coordinates of ``body_to``; made anew at each access."""
+        return self.to_local[self.to_index]
+
+    @property
+    def p_world(self) -> FloatArray:
+        """(M, 2) first ends in the global frame at the start; made anew at each access."""
+        return self.from_world[self.from_index]
+
+    @property
+    def q_world(self) -> FloatArray:
+        """(M, 2) second ends in the global frame at the start; made anew at each access."""
+        return self.to_world[self.to_index]
+
+
+@frozen
+class Load(Value):
+    """A force in N at a point that rides on the body, and a couple in N m.
+
+    at_local: the point in body coordinates. frame: ``global``, or ``body`` for a force that turns with it.
+    A load stated as accelerations has become force = m a and moment = J times the angular acceleration.
+    """
+
+    body: str
+    force: VectorSignal = (0.0, 0.0)
+    at_local: Pair = (0.0, 0.0)
+    moment: Signal = 0.0
+    frame: str = "global"
+
+
+@frozen
+class Prescribed(Value):
+    """One prescribed coordinate. kind: acceleration | velocity | position (its signal is always a Table)."""
+
+    kind: str
+    signal: Signal
+
+
+@frozen
+class Motion(Value):
+    """Prescribed motion of a body; None leaves that coordinate free."""
+
+    body: str
+    x: Prescribed | None = None
+    y: Prescribed | None = None
+    angle: Prescribed | None = None
+
+
+@frozen(kw_only=True)
+class Joint(Value):
+    """What all joints have in common.
+
+    index: its place in the file, from 0; name: as stated, else the index as text.
+    bodies: first and second; at_first, at_second: the joint's point on each, in body coordinates.
+    """
+
+    type: ClassVar[str]
+
+    name: str
+    index: int
+    bodies: tuple[str, str]
+    at_first: Pair
+    at_second: Pair
+
+
+@frozen(kw_only=True)
+class RevoluteJoint(Joint):
+    """The two points coincide."""
+
+    type: ClassVar[str] = "revolute"
+
+
+@frozen(kw_only=True)
+class PrismaticJoint(Joint):
+    """The second body slides along `axis`, a unit vector in the first body's coordinates, without turning."""
+
+    type: ClassVar[str] = "prismatic"
+
+    axis: Pair
+
+
+@frozen(kw_only=True)
+class FixedJoint(Joint):
+    """The two points coincide and neither body turns against the other."""
+
+    type: ClassVar[str] = "fixed"
+
+
+@frozen(kw_only=True)
+class DistanceJoint(Joint):
+    """A rigid massless link of `length` in m between the two points."""
+
+    type: ClassVar[str] = "distance"
+
+    length: float
+
+
+@frozen
+class Bushing(Value):
+    """An elastic joint: forces along the first body's axes and a couple.
+
+    stiffness (N/m, N/m, N m/rad), damping (N s/m, N s/m, N m s/rad); points in body coordinates.
+    """
+
+    index: int
+    bodies: tuple[str, str]
+    at_first: Pair
+    at_second: Pair
+    stiffness: Triple
+    damping: Triple = (0.0, 0.0, 0.0)
+
+
+@frozen
+class LoadCase(Value):
+    """One loading, common part and own part merged.
+
+    gravity in m/s^2; start, end in s. bodies: `Case.bodies` as this loading starts them: a start value that a
+    body does not state and a motion prescribes is taken from the motion (else equal to `Case.bodies`).
+    """
+
+    name: str
+    gravity: Pair
+    start: float
+    end: float
+    loads: tuple[Load, ...]
+    motions: tuple[Motion, ...]
+    bodies: tuple[Body, ...]

@@ -1,0 +1,175 @@
+"""From a case file to a `Case`: parse, check every value, check names, build.
+
+Mistakes are gathered through all of it and raised together; nothing here raises anything else for a bad file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.geometry import Frames, build_body, build_points
+from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
+from mdstopo.case.groups import build_groups
+from mdstopo.case.links import build_bushings, build_joints, declare_joints
+from mdstopo.case.loading import build_load_cases, windows
+from mdstopo.case.model import GROUND, Body, Case
+from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
+from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
+from mdstopo.case.overrides import apply_overrides
+from mdstopo.case.reading import BAD, Fields, Reading, found
+from mdstopo.case.schema import FORMAT
+from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
+from mdstopo.case.words import inside
+
+_SECTIONS = {
+    "body": "bodies",
+    "joint": "joints",
+    "point grid": "points",
+    "member group": "members",
+    "load case": "load_cases",
+    "objective": "objectives",
+}
+
+
+def load_case(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Case:
+    """The case in a file, every value in SI units, defaults filled in.
+
+    overrides: key path -> value, as the command line's ``--set KEY=VALUE``; text is read as YAML. Raises
+    CaseError with every mistake that one reading finds.
+    """
+    place = Path(path)
+    try:
+        if place.exists() and not place.is_file():
+            raise CaseError([Mistake("", "this is not a file", 1, 1)], str(path))
+        data = place.read_bytes()
+    except FileNotFoundError:
+        raise CaseError([Mistake("", "there is no such file", 1, 1)], str(path)) from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise CaseError([Mistake("", f"the file cannot be read: {reason}", 1, 1)], str(path)) from None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        before = data[: error.start]
+        line = before.count(b"\n") + 1
+        start = before.rfind(b"\n") + 1
+        column = len(before[start:].decode("utf-8-sig", "replace")) + 1
+        message = f"the byte 0x{data[error.start]:02X} is not UTF-8; save the file as UTF-8"
+        raise CaseError([Mistake("", message, line, column)], str(path)) from None
+    return read_case(text, path=place, overrides=overrides, sha256=hashlib.sha256(data).hexdigest())
+
+
+def read_case(
+    text: str,
+    *,
+    path: str | os.PathLike[str] | None = None,
+    overrides: Mapping[str, Any] | None = None,
+    sha256: str | None = None,
+) -> Case:
+    """The case in `text`; raises CaseError as `load_case`.
+
+    path: where the text comes from; included files are relative to it, else to the current folder.
+    sha256: of the file's bytes, where they are not the text in UTF-8.
+    """
+    place = None if path is None else Path(path)
+    file = "<text>" if path is None else str(path)
+    reading = Reading(Path() if place is None else place.parent)
+    root = _parsed(text, reading, file)
+    root, texts = apply_overrides(root, overrides or {}, reading.mistakes.append)
+    reading.mark("", root)
+    top = FORMAT.read(root, "", reading)
+    assert isinstance(top, Fields)
+    parts = _build(top, reading)
+    if reading.mistakes:
+        raise CaseError(reading.mistakes, file)
+    return Case(
+        title=top["title"],
+        path=place,
+        name="case" if place is None else place.stem,
+        text=text,
+        sha256=sha256 or hashlib.sha256(text.encode()).hexdigest(),
+        overrides=FrozenDict(texts),
+        files=FrozenDict(reading.files),
+        marks=reading.marks(),
+        warnings=tuple(reading.warnings),
+        **parts,
+    )
+
+
+def _parsed(text: str, reading: Reading, file: str) -> Node:
+    """The document's tree; raises where there is none."""
+    try:
+        text.encode("utf-8")
+        root = parse(text.removeprefix("\ufeff"), reading.mistakes.append)
+    except UnicodeEncodeError:
+        mistake = Mistake("", "the text has characters that UTF-8 cannot hold", 1, 1)
+        raise CaseError([mistake], file) from None
+    except YamlSyntaxError as error:
+        raise CaseError([*reading.mistakes, error.mistake], file) from None
+    if root is None or root.kind != MAPPING:
+        what = "nothing" if root is None else found(root)
+        line, column = (1, 1) if root is None else (root.line, root.column)
+        mistake = Mistake(
+            "", f"found {what}, allowed is a mapping that starts with `format: 1`", line, column
+        )
+        raise CaseError([*reading.mistakes, mistake], file)
+    return root
+
+
+def _build(top: Fields, reading: Reading) -> dict[str, Any]:
+    """The parts of the case, as far as they can be made; notes every mistake on the way."""
+    declare_joints(top["joints"], reading)
+    _check_references(top, reading)
+    times = windows(top, reading)
+    by_case = merged(top, reading)
+    starts = resolve_starts(top, times, by_case, reading)
+    frames = _frames(top, starts, reading)
+    points = build_points(_section(top, "points"), frames, reading)
+    made = build_groups(_section(top, "members"), points, frames, reading)
+    designed = apply_design(top, made, reading)
+    complete = isinstance(top["members"], dict) and len(made) == len(top["members"])
+    groups = designed if complete or top["members"] is None else None
+    motions = {case: build_motions(by_body) for case, by_body in by_case.items()}
+    warn_assemble(top, reading)
+    load_cases = build_load_cases(top, times, motions, starts, frames, reading)
+    return {
+        "bodies": tuple(body for body in frames.bodies.values() if body.name != GROUND),
+        "joints": build_joints(top["joints"], frames, reading),
+        "bushings": build_bushings(top["bushings"], frames, reading),
+        "points": FrozenDict(points),
+        "members": tuple((designed or {}).values()),
+        "load_cases": load_cases,
+        "objectives": build_objectives(top, frames, reading),
+        "combine": build_combine(top, reading),
+        "constraints": build_constraints(top, groups, frames, reading),
+        "optimizer": build_optimizer(top["optimizer"]),
+        "solver": build_solver(top["solver"], times, reading),
+    }
+
+
+def _section(top: Fields, key: str) -> dict[str, Any]:
+    return top[key] if isinstance(top[key], dict) else {}
+
+
+def _check_references(top: Fields, reading: Reading) -> None:
+    """References into a section that could not be read at all say nothing about themselves."""
+    unreadable = {kind for kind, key in _SECTIONS.items() if top[key] is BAD}
+    if isinstance(top["joints"], list) and BAD in top["joints"]:
+        unreadable.add("joint")
+    reading.references = [r for r in reading.references if r.kind not in unreadable]
+    reading.check_references()
+
+
+def _frames(top: Fields, starts: dict[Any, Any], reading: Reading) -> Frames:
+    bodies = {GROUND: Body(GROUND, 1.0, 1.0, (0.0, 0.0))}
+    for name, fields in _section(top, "bodies").items():
+        body = build_body(name, fields, inside("bodies", name), start_angle(name, starts), reading)
+        if body is not None:
+            bodies[name] = body
+    return Frames(bodies)

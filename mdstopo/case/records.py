@@ -1,0 +1,322 @@
+"""Kinds of lists and mappings, made of other kinds. See `mdstopo.case.kinds`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mdstopo.case.kinds import Kind, Name, Schema, Word, check_name
+from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.reading import BAD, Fields, Reading, Reference, found
+from mdstopo.case.value import Value, frozen
+from mdstopo.case.words import inside, listed, nearest, shown
+
+
+@frozen
+class Vector(Value):
+    """A list of a fixed number of values of one kind."""
+
+    length: int
+    item: Kind
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """tuple or BAD."""
+        if node.kind != SEQUENCE or len(node.items) != self.length:
+            reading.mistake(path, f"found {found(node)}, allowed is a list of {self.length}", node)
+            return BAD
+        values = tuple(
+            self.item.read(child, f"{path}[{index}]", reading) for index, child in enumerate(node.items)
+        )
+        return BAD if any(value is BAD for value in values) else values
+
+    def schema(self) -> Schema:
+        """array of fixed length."""
+        return {
+            "type": "array", "items": self.item.schema(), "minItems": self.length, "maxItems": self.length,
+        }  # fmt: skip
+
+
+@frozen
+class ListOf(Value):
+    """A list of values of one kind."""
+
+    item: Kind
+    at_least: int = 0
+    what: str = "entries"
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """list (entries may be BAD) or BAD."""
+        if node.kind != SEQUENCE:
+            reading.mistake(path, f"found {found(node)}, allowed is a list of {self.what}", node)
+            return BAD
+        if len(node.items) < self.at_least:
+            message = f"found {found(node)}, needed are at least {self.at_least} {self.what}"
+            reading.mistake(path, message, node)
+            return BAD
+        values = []
+        for index, child in enumerate(node.items):
+            here = f"{path}[{index}]"
+            reading.mark(here, child)
+            values.append(self.item.read(child, here, reading))
+        return values
+
+    def schema(self) -> Schema:
+        """array."""
+        schema: Schema = {"type": "array", "items": self.item.schema()}
+        return {**schema, "minItems": self.at_least} if self.at_least else schema
+
+
+@frozen
+class Named(Value):
+    """A mapping from new names to values of one kind. declares: what they name (see `Reading.declared`)."""
+
+    item: Kind
+    declares: str
+    at_least: int = 0
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """dict of good names (values may be BAD) or BAD."""
+        if node.kind != MAPPING:
+            reading.mistake(path, f"found {found(node)}, allowed is a mapping from names to values", node)
+            return BAD
+        if len(node.entries) < self.at_least:
+            reading.mistake(path, f"found {found(node)}, needed is at least one {self.declares}", node)
+            return BAD
+        values = {}
+        for text, (key, value) in node.entries.items():
+            here = inside(path, text)
+            reading.mark(here, value, key)
+            read = self.item.read(value, here, reading)
+            good = check_name(key, here, reading)
+            if isinstance(key.scalar(), str):
+                reading.declare(self.declares, text)
+            if good:
+                values[text] = read
+        return values
+
+    def schema(self) -> Schema:
+        """object whose keys are names."""
+        schema: Schema = {
+            "type": "object", "propertyNames": Name().schema(), "additionalProperties": self.item.schema(),
+        }  # fmt: skip
+        return {**schema, "minProperties": self.at_least} if self.at_least else schema
+
+
+@frozen
+class ByName(Value):
+    """A mapping from names that are declared elsewhere to values of one kind."""
+
+    kind: str
+    item: Kind
+    what: str
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """dict (values may be BAD) or BAD."""
+        if node.kind != MAPPING:
+            allowed = f"{{{self.kind}: {self.what}, ...}}"
+            reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
+            return BAD
+        values = {}
+        for text, (key, value) in node.entries.items():
+            here = inside(path, text)
+            reading.mark(here, value, key)
+            if not isinstance(key.scalar(), str):
+                reading.mistake(here, f"found {found(key)}, allowed is the name of a {self.kind}", key)
+                continue
+            reading.references.append(Reference(here, self.kind, text))
+            values[text] = self.item.read(value, here, reading)
+        return values
+
+    def schema(self) -> Schema:
+        """object of values."""
+        return {"type": "object", "additionalProperties": self.item.schema()}
+
+
+@frozen
+class ByShape(Value):
+    """Different kinds for a scalar, a sequence, a mapping. what: all of them in words."""
+
+    what: str
+    scalar: Kind | None = None
+    sequence: Kind | None = None
+    mapping: Kind | None = None
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """What the kind for the node's shape reads, or BAD."""
+        kind = {SCALAR: self.scalar, SEQUENCE: self.sequence, MAPPING: self.mapping}[node.kind]
+        if kind is None:
+            reading.mistake(path, f"found {found(node)}, allowed is {self.what}", node)
+            return BAD
+        return kind.read(node, path, reading)
+
+    def schema(self) -> Schema:
+        """Any of them."""
+        kinds = [kind for kind in (self.scalar, self.sequence, self.mapping) if kind is not None]
+        return {"anyOf": [kind.schema() for kind in kinds]}
+
+
+@frozen
+class Tagged(Value):
+    """A mapping whose key `tag` says which keys it has besides."""
+
+    what: str
+    tag: str
+    variants: Mapping[str, Record]
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """Fields (values may be BAD) or BAD."""
+        if node.kind != MAPPING:
+            words = " | ".join(self.variants)
+            message = f"found {found(node)}, allowed is {self.what}: a mapping with `{self.tag}: {words}`"
+            reading.mistake(path, message, node)
+            return BAD
+        entry = node.entries.get(self.tag)
+        if entry is None:
+            best = nearest(self.tag, node.entries)
+            known = {key.name for record in self.variants.values() for key in record.keys}
+            if best is not None and best not in known:
+                message = f"unknown key {shown(best)}, did you mean {self.tag!r}?"
+                reading.mistake(inside(path, best), message, node.entries[best][0])
+            else:
+                words = " | ".join(self.variants)
+                reading.mistake(path, f"the key {self.tag!r} is missing, allowed is {words}")
+            return BAD
+        word = Word(tuple(self.variants)).read(entry[1], inside(path, self.tag), reading)
+        return BAD if word is BAD else self.variants[word].read(node, path, reading)
+
+    def schema(self) -> Schema:
+        """object whose further keys depend on the tag."""
+        return {
+            "type": "object",
+            "required": [self.tag],
+            "properties": {self.tag: {"type": "string", "enum": list(self.variants)}},
+            "allOf": [
+                {
+                    "if": {"properties": {self.tag: {"const": word}}, "required": [self.tag]},
+                    "then": record.schema(),
+                }
+                for word, record in self.variants.items()
+            ],
+        }
+
+
+@frozen
+class Key(Value):
+    """One key of a mapping. default: the value where the key is left out (None: nothing)."""
+
+    name: str
+    kind: Kind
+    doc: str = ""
+    required: bool = False
+    default: Any = None
+
+    def schema(self) -> Schema:
+        """The value's schema with the key's description and default."""
+        schema = dict(self.kind.schema())
+        if self.doc:
+            schema["description"] = self.doc
+        if self.default is not None:
+            schema["default"] = list(self.default) if isinstance(self.default, tuple) else self.default
+        return schema
+
+
+@frozen
+class Record(Value):
+    """A mapping with known keys.
+
+    one_of: of each of these sets exactly one key is needed; any_of: at least one of these; never_both: pairs;
+    needs: a key -> the one that must stand beside it.
+    """
+
+    what: str
+    keys: tuple[Key, ...]
+    one_of: tuple[tuple[str, ...], ...] = ()
+    any_of: tuple[str, ...] = ()
+    never_both: tuple[tuple[str, str], ...] = ()
+    needs: tuple[tuple[str, str], ...] = ()
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """Fields (values may be BAD) or BAD."""
+        if node.kind != MAPPING:
+            words = listed(key.name for key in self.keys)
+            message = f"found {found(node)}, allowed is {self.what}, a mapping with the keys {words}"
+            reading.mistake(path, message, node)
+            return BAD
+        known = {key.name: key for key in self.keys}
+        fields = Fields(path, (name for name in node.entries if name in known))
+        meant = self._unknown(node, path, reading, known)
+        for name, key in known.items():
+            entry = node.entries.get(name)
+            if entry is not None:
+                here = inside(path, name)
+                reading.mark(here, entry[1], entry[0])
+                fields[name] = key.kind.read(entry[1], here, reading)
+            elif key.required:
+                fields[name] = BAD
+                if name not in meant:
+                    explained = f" ({key.doc})" if key.doc else ""
+                    reading.mistake(path, f"the key {name!r} is missing{explained}")
+            else:
+                fields[name] = key.default
+        self._together(fields, meant, path, reading)
+        return fields
+
+    @staticmethod
+    def _unknown(node: Node, path: str, reading: Reading, known: Mapping[str, Key]) -> set[str]:
+        """Notes unknown keys; returns the right words they were probably meant to be."""
+        meant: set[str] = set()
+        for text, (key, _) in node.entries.items():
+            if text in known:
+                continue
+            best = nearest(text, [name for name in known if name not in node.entries])
+            hint = ""
+            if best is not None:
+                meant.add(best)
+                hint = f", did you mean {best!r}?"
+            message = f"unknown key {shown(text)}{hint or ','} allowed are {listed(known)}"
+            reading.mistake(inside(path, text), message, key)
+        return meant
+
+    def _together(self, fields: Fields, meant: set[str], path: str, reading: Reading) -> None:
+        """Which keys go with which."""
+        given = fields.stated
+        for names in self.one_of:
+            here = [name for name in names if name in given]
+            if len(here) == 1:
+                continue
+            if here or not meant & set(names):
+                what = f"found {' and '.join(here)}" if here else "found none"
+                reading.mistake(path, f"{what}, needed is exactly one of {listed(names)}")
+            fields.update(dict.fromkeys(names, BAD))
+        if self.any_of and not given & set(self.any_of):
+            if not meant & set(self.any_of):
+                reading.mistake(path, f"needed is at least one of {listed(self.any_of)}")
+            fields.update(dict.fromkeys(self.any_of, BAD))
+        for first, second in self.never_both:
+            if first in given and second in given:
+                reading.mistake(path, f"found {first} and {second}, allowed is one of them")
+                fields[second] = BAD
+        for name, other in self.needs:
+            if name in given and other not in given and other not in meant:
+                message = f"the key {name!r} goes with {other!r}, which is not given"
+                reading.mistake(inside(path, name), message)
+
+    def schema(self) -> Schema:
+        """object without further keys."""
+        schema: Schema = {
+            "type": "object",
+            "properties": {key.name: key.schema() for key in self.keys},
+            "additionalProperties": False,
+        }
+        required = [key.name for key in self.keys if key.required]
+        if required:
+            schema["required"] = required
+        rules: list[Schema] = [{"oneOf": [{"required": [name]} for name in names]} for names in self.one_of]
+        if self.any_of:
+            rules.append({"anyOf": [{"required": [name]} for name in self.any_of]})
+        rules += [{"not": {"required": list(pair)}} for pair in self.never_both]
+        if rules:
+            schema["allOf"] = rules
+        if self.needs:
+            schema["dependentRequired"] = {name: [other] for name, other in self.needs}
+        return schema

@@ -1,0 +1,64 @@
+"""Whether volume rows can be met within the bounds (Eq. 14)."""
+
+from __future__ import annotations
+
+import math
+
+from mdstopo.case.model import MemberGroup, VolumeRow
+from mdstopo.case.reading import Reading
+from mdstopo.case.words import listed, number_text
+
+ROUNDING = 1e-12
+"""Sums are compared up to this share of them: 1020 x 0.001 may be spent exactly."""
+
+
+def check_feasible(rows: list[tuple[str, VolumeRow]], design: list[MemberGroup], reading: Reading) -> None:
+    """Notes rows (with the path of their bound) that bounds, alone or with one other row, make infeasible.
+
+    The sum over a group can be anything between those at its bounds, whatever other groups do: so a row, and
+    a pair of rows, can be judged from the groups' sums alone.
+    """
+    low = {g.name: _sum(g, g.lower) for g in design}
+    high = {g.name: _sum(g, g.upper) for g in design}
+    alone: set[str] = set()
+    for path, row in rows:
+        least, most = _total(low, row.groups), _total(high, row.groups)
+        slack = ROUNDING * max(abs(least), abs(most), abs(row.bound))
+        if row.sense != "at_least" and row.bound < least - slack:
+            why = f"at the lower bounds the sum is {number_text(least)} already"
+            reading.mistake(path, f"found the bound {number_text(row.bound)}; {why}")
+            alone.add(path)
+        elif row.sense != "limit" and row.bound > most + slack:
+            why = f"at the upper bounds the sum is only {number_text(most)}"
+            reading.mistake(path, f"found the bound {number_text(row.bound)}; {why}")
+            alone.add(path)
+    for path, row in rows:
+        for other_path, other in rows:
+            if row is other or row.sense == "at_least" or other.sense == "limit":
+                continue
+            if path in alone or other_path in alone:
+                continue
+            most = _most_beside(row, other, low, high)
+            if other.bound > most + ROUNDING * max(abs(most), abs(other.bound), abs(row.bound)):
+                reading.mistake(
+                    other_path,
+                    f"found the bound {number_text(other.bound)}; with the row at {path} the sum over "
+                    f"{listed(other.groups)} reaches only {number_text(most)}",
+                )
+                alone.add(other_path)
+
+
+def _sum(group: MemberGroup, value: float) -> float:
+    return value * math.fsum(group.cost.tolist()) if len(group) <= 10**5 else value * float(group.cost.sum())
+
+
+def _total(sums: dict[str, float], names: tuple[str, ...]) -> float:
+    return math.fsum(sums[name] for name in names)
+
+
+def _most_beside(row: VolumeRow, other: VolumeRow, low: dict[str, float], high: dict[str, float]) -> float:
+    """The largest sum over `other`'s groups while `row` is at most its bound."""
+    shared = tuple(name for name in other.groups if name in row.groups)
+    rest = tuple(name for name in other.groups if name not in row.groups)
+    beside = tuple(name for name in row.groups if name not in other.groups)
+    return min(_total(high, shared), row.bound - _total(low, beside)) + _total(high, rest)
