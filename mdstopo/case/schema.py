@@ -27,8 +27,8 @@ from mdstopo.case.schema_scene import (
     POINTS,
     POSITIVE,
 )
-from mdstopo.optimize.options import OPTIONS
-from mdstopo.optimize.presets import PRESETS
+from mdstopo.optimizer.options import OPTIONS
+from mdstopo.optimizer.presets import PRESETS
 
 # Design, objectives, constraints.
 

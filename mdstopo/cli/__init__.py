@@ -1,0 +1,74 @@
+"""The command line. `main` is the program; importing it costs nothing."""
+
+import sys
+
+
+def main() -> None:
+    """Run `mdstopo` with the process's arguments and end the process with its exit status.
+
+    0 done, 1 failed, 2 bad input, 3 interrupted.
+    """
+    import os
+    import signal
+
+    # From the first moment on a polite request to end is treated like Ctrl-C.
+    signal.signal(signal.SIGTERM, _interrupt)
+    sys.unraisablehook = _say_nothing_of_interrupts
+    try:
+        status = _dispatch(sys.argv[1:])
+    except KeyboardInterrupt:
+        _complain("interrupted")
+        # Not sys.exit: where the interrupt passed through an `exec`, Python would end itself by the signal.
+        os._exit(_flushed(3))
+    except BrokenPipeError:
+        status = 0  # the reader has seen enough
+    sys.exit(_flushed(status))
+
+
+def _dispatch(arguments: list[str]) -> int:
+    # Help and version come from a table: click alone would double the time they take.
+    if not arguments or arguments in (["--help"], ["-h"], ["help"]):
+        from mdstopo.cli.commands import help_text
+
+        print(help_text())
+        return 0
+    if arguments == ["--version"]:
+        from mdstopo._version import __version__
+
+        print(f"mdstopo {__version__}")
+        return 0
+    from mdstopo.cli.group import run_group
+
+    return run_group(arguments)
+
+
+def _interrupt(_number: int, _frame: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _say_nothing_of_interrupts(unraisable: "sys.UnraisableHookArgs") -> None:
+    """An interrupt that arrives in a finaliser is lost there: no reason for a traceback."""
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
+
+
+def _complain(sentence: str) -> None:
+    import contextlib
+
+    with contextlib.suppress(OSError):
+        print(sentence, file=sys.stderr, flush=True)
+
+
+def _flushed(status: int) -> int:
+    """Flush while it can still be said quietly that nobody listens any more."""
+    import os
+
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        except OSError as error:
+            _complain(f"the output could not be written: {error.strerror}")
+            status = status or 1
+    return status

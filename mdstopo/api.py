@@ -1,0 +1,128 @@
+"""The Python interface: four calls, the same engine as the command line.
+
+    case = mdstopo.load_case("cases/fig6.yaml")
+    trajectory = mdstopo.simulate(case)
+    evaluation = mdstopo.evaluate(case)
+    result = mdstopo.optimize(case)
+
+A case is compiled at its first use and kept, so that `evaluate` in a loop costs what the kernels cost.
+"""
+
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import load_case
+from mdstopo.engine import Evaluator
+from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.integrators.trajectory import States, Trajectory
+from mdstopo.session.outcome import Outcome as Result
+from mdstopo.session.outcome import Progress
+
+__all__ = [
+    "Case",
+    "CaseError",
+    "Evaluation",
+    "Peak",
+    "Progress",
+    "Result",
+    "States",
+    "Trajectory",
+    "evaluate",
+    "load_case",
+    "optimize",
+    "simulate",
+]
+
+METHODS = ("auto", "adjoint", "direct", "iterative", "constant_load")
+
+#: compiled cases kept, the most recently used last; each evaluator holds its case, so an id is never taken twice
+_KEPT = 8
+_compiled: OrderedDict[int, Evaluator] = OrderedDict()
+
+
+def _evaluator(case: Case) -> Evaluator:
+    """The case's evaluator, made at its first use. Raises CaseError where the engine cannot compute the case."""
+    key = id(case)
+    found = _compiled.get(key)
+    if found is None:
+        found = _compiled[key] = Evaluator(case)
+        if len(_compiled) > _KEPT:
+            _compiled.popitem(last=False)
+    else:
+        _compiled.move_to_end(key)
+    return found
+
+
+def _design(case: Case, alpha: ArrayLike | None) -> FloatArray:
+    return case.initial if alpha is None else np.asarray(alpha, dtype=np.float64)
+
+
+def simulate(case: Case, alpha: ArrayLike | None = None, load_case: str | None = None) -> Trajectory:
+    """Compute the motion of one design in one load case.
+
+    alpha (N,): default the case's initial design. load_case: may be left out where there is only one; otherwise a
+    ValueError lists them. A motion that cannot go on ends early, and says so in `Trajectory.status`.
+    Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha.
+    """
+    names = [each.name for each in case.load_cases]
+    if load_case is None:
+        if len(names) > 1:
+            raise ValueError(f"the case has several load cases, name one of them: {', '.join(names)}")
+        load_case = names[0]
+    elif load_case not in names:
+        raise ValueError(f"no load case {load_case!r}; there are: {', '.join(names)}")
+    return _evaluator(case).trajectory(_design(case, alpha), load_case)
+
+
+def evaluate(
+    case: Case, alpha: ArrayLike | None = None, *, method: str = "auto", gradient: bool = True
+) -> Evaluation:
+    """Compute objectives and constraints of one design, and their gradients with respect to alpha.
+
+    alpha (N,): default the case's initial design; any finite alpha >= 0 is evaluated, bounds and rows do not matter.
+    method: adjoint, direct, iterative or constant_load; auto takes the case's `solver.sensitivity`.
+    Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha or method.
+    """
+    if method not in METHODS:
+        raise ValueError(f"no sensitivity method {method!r}; there are: {', '.join(METHODS)}")
+    return _evaluator(case).evaluate(_design(case, alpha), gradient, None if method == "auto" else method)
+
+
+def optimize(
+    case: Case,
+    *,
+    path: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    starts: int | None = None,
+    workers: int | None = None,
+    initial: ArrayLike | None = None,
+    on_iteration: Callable[[Progress], None] | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+) -> Result:
+    """Optimise a case, and keep a result file up to date where `path` is given.
+
+    starts, workers: how many starts (default: the case's) on how many processes (default 1); no result depends on
+    the latter. initial (N,): the design to begin with. on_iteration, stop_requested: called after each iteration.
+    resume: go on where the unfinished run in the file stopped; overwrite: replace it.
+    Raises CaseError where the case is no optimisation that the engine can do, StoreError for an unusable file.
+    """
+    from mdstopo.session import run_session
+
+    return run_session(
+        case,
+        path=path,
+        resume=resume,
+        overwrite=overwrite,
+        starts=starts,
+        workers=workers,
+        initial=None if initial is None else np.asarray(initial, dtype=np.float64),
+        on_iteration=on_iteration,
+        stop_requested=stop_requested,
+    )

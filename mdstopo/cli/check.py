@@ -1,0 +1,134 @@
+"""`mdstopo check`: what is in a case."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
+from mdstopo.cli.output import Output, number
+
+if TYPE_CHECKING:
+    from mdstopo.case.model import Case
+
+_SOFT_BRANCH = (
+    "A volume limit that need not be spent has a soft branch here: stored energy also falls when members",
+    "are removed. Spend the volume (`equals`), or bound a displacement.",
+)
+
+
+@click.command("check")
+@case_argument
+@set_option
+@output_options
+def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bool) -> int:
+    """Read a case and say what is in it: bodies, members, totals, natural frequencies.
+
+    Nothing is run. What cannot be computed yet is listed with its place (exit status 2).
+    """
+    from mdstopo.case.errors import CaseError
+    from mdstopo.case.reader import load_case
+    from mdstopo.cli.check_numbers import frequencies, material, totals
+    from mdstopo.scene.refusals import refusals
+
+    output = Output(json=as_json, quiet=quiet)
+    case = load_case(case_path, overrides)
+    refused = refusals(case, optimizing=case.is_optimizable)
+    for remark in case.warnings:
+        output.notice(f"warning: {remark.located(str(case_path))}")
+    output.say(f"{case.title or case.name} ({case_path})")
+    _say_bodies(output, case)
+    _say_members(output, case)
+    sums = totals(case)
+    output.say("totals")
+    output.table([[name, f"{number(value)} {unit}".rstrip()] for name, value, unit in sums])
+    rows = material(case)
+    if rows:
+        output.say("material (Eq. 14)")
+        output.table([["groups", "sense", "bound", "at start", "all at lower", "all at upper"], *rows])
+    document: dict[str, Any] = {
+        "command": "check",
+        "case": case.name,
+        "title": case.title,
+        "degrees_of_freedom": 3 * len(case.bodies),
+        "members": case.n_members,
+        "design_variables": case.n_design,
+        "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
+        "objectives": [objective.name for objective in case.objectives],
+        "optimizable": case.is_optimizable and not refused,
+        "refused": [mistake.located(str(case_path)) for mistake in refused],
+    }
+    if not refused:
+        announce_compilation(output)
+        from mdstopo.engine import Evaluator
+
+        engine = Evaluator(case)
+        found = frequencies(case, engine)
+        _say_frequencies(output, found)
+        output.say("left out, because nothing asks for it")
+        for sentence in engine.skipped or ("nothing",):
+            output.say(f"  {sentence}")
+        output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"]], indent="")
+        document |= {"frequencies": found, "skipped": engine.skipped, "integrator": engine.integrator}
+    output.document(document)
+    if refused:
+        raise CaseError(refused, str(case_path))
+    return 0
+
+
+def _say_bodies(output: Output, case: "Case") -> None:
+    output.say(f"{len(case.bodies)} bodies, {3 * len(case.bodies)} degrees of freedom")
+    rows = [["body", "mass, kg", "inertia, kg m2", "x, m", "y, m", "angle, rad"]]
+    for body in case.bodies:
+        values = (body.mass, body.inertia, *body.position, body.angle)
+        rows.append([body.name, *(number(value) for value in values)])
+    output.table(rows)
+
+
+def _say_members(output: Output, case: "Case") -> None:
+    output.say(f"{case.n_members} members, {case.n_design} of them design variables")
+    if not case.members:
+        return
+    rows = [["group", "members", "between", "laws", "length, m", "cost", "alpha"]]
+    for group in case.members:
+        lengths = f"{number(group.length.min(), 4)} to {number(group.length.max(), 4)}" if len(group) else "-"
+        design = f"{number(group.initial)} in {number(group.lower)} to {number(group.upper)}"
+        rows.append(
+            [
+                group.name,
+                str(len(group)),
+                f"{group.body_from}, {group.body_to}",
+                " + ".join(law.type for law in group.laws),
+                lengths,
+                number(float(group.cost.sum())),
+                design if group.design else "1 (no variable)",
+            ]
+        )
+    output.table(rows)
+
+
+def _say_frequencies(output: Output, found: list[dict[str, Any]]) -> None:
+    for entry in found:
+        output.say(
+            f"natural frequencies at the start, load case {entry['load_case']}, "
+            f"times the duration {number(entry['duration'])} s"
+        )
+        rows = [["design", "omega, rad/s", "omega t1"]]
+        for design in ("initial", "lower"):
+            values = entry[design]
+            rows.append(
+                [
+                    design,
+                    ", ".join(number(value, 4) for value in values) or "none",
+                    ", ".join(number(value * entry["duration"], 4) for value in values) or "-",
+                ]
+            )
+        output.table(rows)
+        if entry["criterion"] is not None:
+            verdict = "> 4: stiffer is better" if entry["criterion"] > 4.0 else "<= 4"
+            output.say(
+                f"  omega(initial) omega(lower bounds) t1^2 = {number(entry['criterion'], 4)} {verdict}"
+            )
+            if entry["criterion"] <= 4.0:
+                for sentence in _SOFT_BRANCH:
+                    output.say(f"  {sentence}")

@@ -1,0 +1,113 @@
+"""Derived quantities that `check` shows."""
+
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import GROUND, Case, SpringLaw, Table, VolumeRow
+from mdstopo.cli.output import number
+
+Floats = NDArray[np.float64]
+
+_RIGID = 1e-6  # share of the highest frequency below which a mode counts as free motion
+
+
+class Vibrates(Protocol):
+    """What has natural frequencies at the start, in rad/s."""
+
+    def natural_frequencies(self, alpha: Floats, load_case: str) -> Floats: ...
+
+
+def totals(case: Case) -> list[tuple[str, float, str]]:
+    """Name, value, unit of what sums up the case."""
+    masses = np.array([body.mass for body in case.bodies])
+    positions = np.array([body.position for body in case.bodies]).reshape(-1, 2)
+    rows = [("mass", float(masses.sum()), "kg")]
+    if len(masses):
+        center = masses @ positions / masses.sum()
+        rows += [("centre of mass, x", float(center[0]), "m"), ("centre of mass, y", float(center[1]), "m")]
+    if case.n_design:
+        rows += [
+            ("volume at alpha = 1", float(case.cost.sum()), ""),
+            ("volume of the initial design", float(case.cost @ case.initial), ""),
+        ]
+    stiffness = sum(
+        len(group) * law.stiffness
+        for group in case.members
+        for law in group.laws
+        if isinstance(law, SpringLaw)
+    )
+    if stiffness:
+        rows.append(("stiffness of all springs at alpha = 1", float(stiffness), "N/m"))
+    for load_case in case.load_cases:
+        label = "" if len(case.load_cases) == 1 else f", {load_case.name}"
+        rows.append((f"duration{label}", load_case.end - load_case.start, "s"))
+        force = masses.sum() * np.array(load_case.gravity)
+        for load in load_case.loads:
+            if load.body != GROUND:
+                force += [_at(component, load_case.start) for component in load.force]
+        rows += [
+            (f"external force at the start{label}, x", float(force[0]), "N"),
+            (f"external force at the start{label}, y", float(force[1]), "N"),
+        ]
+    return rows
+
+
+def material(case: Case) -> list[list[str]]:
+    """The volume rows, and what designs make of them."""
+    words = {"limit": "at most", "equals": "equal to", "at_least": "at least"}
+    rows = []
+    for row in case.constraints:
+        if isinstance(row, VolumeRow):
+            values = (
+                row.bound,
+                *(float(row.coefficients @ x) for x in (case.initial, case.lower, case.upper)),
+            )
+            rows.append([", ".join(row.groups), words[row.sense], *(number(value) for value in values)])
+    return rows
+
+
+def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
+    """For each load case the natural frequencies of the initial design and of the lower bounds, in rad/s.
+
+    `criterion` is omega(initial) omega(lower bounds) t1^2 of the lowest elastic mode, None where there is
+    none: only above 4 is stored energy lowest on the stiff branch.
+    """
+    found = []
+    for load_case in case.load_cases:
+        duration = load_case.end - load_case.start
+        initial, lower = (
+            _elastic(engine.natural_frequencies(alpha, load_case.name))
+            for alpha in (case.initial, case.lower)
+        )
+        both = min(len(initial), len(lower)) > 0
+        found.append(
+            {
+                "load_case": load_case.name,
+                "duration": duration,
+                "initial": initial.tolist(),
+                "lower": lower.tolist(),
+                "criterion": float(initial[0] * lower[0] * duration**2) if both else None,
+            }
+        )
+    return found
+
+
+def _elastic(values: Floats) -> Floats:
+    """Rising, without free motion."""
+    rising: Floats = np.sort(np.asarray(values, dtype=np.float64))
+    elastic: Floats = rising[rising > _RIGID * rising.max(initial=0.0)]
+    return elastic
+
+
+def _at(signal: float | Table, time: float) -> float:
+    """A signal's value at a time, right-continuous."""
+    if not isinstance(signal, Table):
+        return float(signal)
+    after = int(np.searchsorted(signal.times, time, side="right"))
+    if after == 0 or after == len(signal.times):
+        return float(signal.values[min(after, len(signal.times) - 1), 0])
+    t0, t1 = signal.times[after - 1 : after + 1]
+    v0, v1 = signal.values[after - 1 : after + 1, 0]
+    return float(v0 + (v1 - v0) * (time - t0) / (t1 - t0))

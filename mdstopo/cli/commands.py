@@ -1,0 +1,31 @@
+"""The commands there are. A new one is a line here and a file of its name beside this one."""
+
+COMMANDS: dict[str, str] = {
+    "run": "Optimise a case and keep its result file up to date.",
+    "check": "Read a case and say what is in it, without running it.",
+    "simulate": "Compute the motion of one design.",
+    "gradient": "Compare sensitivity methods on one design.",
+    "show": "Say in words what a result file holds.",
+    "schema": "Print the JSON Schema of the case format, for editors.",
+}
+
+_INTRODUCTION = """\
+Usage: mdstopo COMMAND [OPTIONS] ...
+
+  Topology optimisation of the members that tie multibody systems together.
+
+Commands:
+{commands}
+
+Options:
+  --version   Show the version.
+  -h, --help  Show this, or a command's options: mdstopo run --help
+
+Exit status: 0 done, 1 failed, 2 bad input, 3 interrupted."""
+
+
+def help_text() -> str:
+    """What `mdstopo --help` prints."""
+    width = max(len(name) for name in COMMANDS)
+    lines = [f"  {name:{width}}  {sentence}" for name, sentence in COMMANDS.items()]
+    return _INTRODUCTION.format(commands="\n".join(lines))

@@ -1,0 +1,238 @@
+"""`mdstopo gradient`: sensitivity methods side by side."""
+
+import shlex
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.options import (
+    alpha_option,
+    announce_compilation,
+    case_argument,
+    check_design,
+    open_case,
+    open_design,
+    out_option,
+    output_options,
+    overwrite_option,
+    result_path,
+    set_option,
+)
+from mdstopo.cli.output import Output, duration, number
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from mdstopo.case.model import Case
+    from mdstopo.engine import Evaluator
+
+    Gradients = dict[str, NDArray[np.float64]]
+
+METHODS = ("adjoint", "direct", "iterative", "constant_load")
+_TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves of noise is divided by the step
+
+
+@click.command("gradient")
+@case_argument
+@click.option(
+    "--method",
+    "methods",
+    type=click.Choice(METHODS),
+    multiple=True,
+    help="A method; may be repeated (default: adjoint and direct).",
+)
+@click.option(
+    "--differences", "differencing", is_flag=True, help="Compare with extrapolated differences too."
+)
+@click.option(
+    "--members",
+    "count",
+    type=click.IntRange(1),
+    default=10,
+    show_default=True,
+    metavar="N",
+    help="How many members, chosen at random, the differences are taken for.",
+)
+@click.option("--history", is_flag=True, help="Store the time histories dg(t)/dalpha of the direct method.")
+@alpha_option
+@out_option
+@overwrite_option
+@set_option
+@output_options
+def command(
+    case_path: Path,
+    methods: tuple[str, ...],
+    differencing: bool,
+    count: int,
+    history: bool,
+    alpha_path: Path | None,
+    out: Path | None,
+    overwrite: bool,
+    overrides: dict[str, str],
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compute the gradient of one design by several methods and compare them.
+
+    The first method is the reference; differences are relative to its largest entry.
+    """
+    from mdstopo.store.output import output_file
+
+    output = Output(json=as_json, quiet=quiet)
+    methods = tuple(dict.fromkeys(methods or ("adjoint", "direct")))
+    case = _prepared(output, open_case(case_path, overrides), case_path, methods, history)
+    alpha = open_design(alpha_path, case)
+    path = result_path(out, case, "gradient")
+    line = shlex.join(["mdstopo", *sys.argv[1:]])
+    with output_file(path, case, "gradient", overwrite=overwrite, notify=output.notice, command=line) as file:
+        announce_compilation(output)
+        from mdstopo.engine import Evaluator
+        from mdstopo.status import RunStatus
+        from mdstopo.store.contents import sensitivity_part
+
+        engine = Evaluator(case)
+        check_design(engine, alpha, alpha_path)
+        datasets: dict[str, Any] = {"design/alpha": alpha}
+        results, failure = _all_methods(engine, alpha, methods)
+        for method, result in results.items():
+            datasets |= sensitivity_part(result["gradients"], method)
+        if differencing and not failure:
+            _difference(case, alpha, count, results, datasets)
+        if history and not failure:
+            for objective in case.objectives:
+                t, rows = results["direct"]["histories"][objective.name]
+                datasets[f"trajectories/{objective.load_case}/t"] = t
+                datasets |= sensitivity_part({objective.name: rows}, "direct/history")
+        status = RunStatus.FAILED if failure else RunStatus.CONVERGED
+        file.write(
+            status.value,
+            failure or "done",
+            datasets,
+            {"integrator": engine.integrator, "integrator_reason": engine.integrator_reason},
+        )
+    _say(output, case, engine, results, failure, path)
+    output.document(_document(case, engine, results, failure, path))
+    return 1 if failure else 0
+
+
+def _prepared(
+    output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool
+) -> "Case":
+    """The case as the methods need it; raises CaseError where they cannot be applied."""
+    from mdstopo.case.errors import CaseError
+
+    if not case.objectives or not case.n_design:
+        key = "members" if case.objectives else "objectives"
+        words = "a gradient needs at least one objective and one design variable"
+        raise CaseError([case.marks.mistake(key, words)], str(case_path))
+    if history and "direct" not in methods:
+        raise click.UsageError("--history needs --method direct")
+    if "iterative" in methods and case.solver.integrator == "auto":
+        output.notice(
+            "iterative belongs to generalized_alpha: all methods use that integrator, to be comparable"
+        )
+        return replace(case, solver=replace(case.solver, integrator="generalized_alpha"))
+    return case
+
+
+def _all_methods(
+    engine: "Evaluator", alpha: "NDArray[np.float64]", methods: tuple[str, ...]
+) -> tuple[dict[str, dict[str, Any]], str]:
+    """Gradients, time and disagreement by method, and why it failed where it did."""
+    from mdstopo.cli.gradient_numbers import disagreement, timed
+
+    results: dict[str, dict[str, Any]] = {}
+    for method in methods:
+        evaluation = engine.evaluate(alpha, sensitivity=method)
+        if not evaluation.status.ok:
+            words = f" ({evaluation.message})" if evaluation.message else ""
+            return results, f"{method}: {evaluation.status.value}{words}"
+        gradients = dict(evaluation.gradients)
+        reference = results[methods[0]]["gradients"] if results else gradients
+        results[method] = {
+            "objectives": dict(evaluation.objectives),
+            "gradients": gradients,
+            "histories": evaluation.histories,
+            "seconds": timed(partial(engine.evaluate, alpha, sensitivity=method)),
+            "disagreement": {name: disagreement(gradients[name], reference[name]) for name in gradients},
+        }
+    return results, ""
+
+
+def _difference(
+    case: "Case",
+    alpha: "NDArray[np.float64]",
+    count: int,
+    results: dict[str, dict[str, Any]],
+    datasets: dict[str, Any],
+) -> None:
+    """Add differences of some members to the results."""
+    import numpy as np
+
+    from mdstopo.cli.gradient_numbers import chosen_members, differences
+    from mdstopo.engine import Evaluator
+
+    members = chosen_members(case.n_design, count, case.optimizer.seed)
+    tight = replace(case, solver=replace(case.solver, tolerance=min(case.solver.tolerance, _TIGHT)))
+    exact = Evaluator(tight)
+    found = differences(lambda x: exact.evaluate(x, gradient=False).objectives, alpha, members)
+    for result in results.values():
+        result["differences"] = {
+            name: float(np.abs(gradient[members] - found[name]).max() / (np.abs(gradient).max() or 1.0))
+            for name, gradient in result["gradients"].items()
+        }
+    datasets["differences/members"] = members.astype(np.int64)
+    datasets |= {f"differences/{name}": values for name, values in found.items()}
+
+
+def _say(
+    output: Output,
+    case: "Case",
+    engine: "Evaluator",
+    results: dict[str, dict[str, Any]],
+    failure: str,
+    path: Path,
+) -> None:
+    output.say(f"{case.title or case.name}: {failure or 'done'}")
+    rows = [
+        ["method", "objective", "value", "largest |dG/dalpha|", "differs by", "from differences by", "time"]
+    ]
+    for method, result in results.items():
+        for name, gradient in result["gradients"].items():
+            rows.append(
+                [
+                    method,
+                    name,
+                    number(result["objectives"][name], 9),
+                    number(float(abs(gradient).max()), 9),
+                    number(result["disagreement"][name], 3),
+                    number(result["differences"][name], 3) if "differences" in result else "",
+                    duration(result["seconds"]),
+                ]
+            )
+    output.table(rows)
+    output.table(
+        [["integrator", f"{engine.integrator}: {engine.integrator_reason}"], ["result", str(path)]], indent=""
+    )
+
+
+def _document(
+    case: "Case", engine: "Evaluator", results: dict[str, dict[str, Any]], failure: str, path: Path
+) -> dict[str, Any]:
+    return {
+        "command": "gradient",
+        "case": case.name,
+        "status": "failed" if failure else "converged",
+        "reason": failure or "done",
+        "methods": {
+            method: {key: value for key, value in result.items() if key not in ("gradients", "histories")}
+            for method, result in results.items()
+        },
+        "integrator": engine.integrator,
+        "path": str(path),
+    }

@@ -1,0 +1,83 @@
+"""Comparing gradients: with one another, and with differences."""
+
+import time
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Objectives = Callable[[Floats], Mapping[str, float]]
+
+_BUDGET = 0.3  # seconds for timing one method
+_STEP = 2e-3  # of the largest alpha, for differences
+_LEVELS = 4  # steps halved from one to the next, extrapolated
+
+
+def timed(compute: Callable[[], object]) -> float:
+    """Seconds of the fastest of a few runs; `compute` has run before, so that all is compiled."""
+    best, spent = np.inf, 0.0
+    while spent < _BUDGET:
+        began = time.perf_counter()
+        compute()
+        taken = time.perf_counter() - began
+        best, spent = min(best, taken), spent + taken
+    return float(best)
+
+
+def disagreement(gradient: Floats, reference: Floats) -> float:
+    """Largest difference, relative to the reference's largest entry; 0 where both vanish."""
+    largest = float(np.abs(reference).max(initial=0.0))
+    difference = float(np.abs(gradient - reference).max(initial=0.0))
+    return difference / largest if largest > 0.0 else difference
+
+
+def chosen_members(count: int, wanted: int, seed: int) -> NDArray[np.intp]:
+    """`wanted` of `count` design variables at random, in rising order."""
+    rng = np.random.default_rng(seed)
+    return np.sort(rng.choice(count, size=min(wanted, count), replace=False)).astype(np.intp)
+
+
+def differences(objectives: Objectives, alpha: Floats, members: NDArray[np.intp]) -> dict[str, Floats]:
+    """dG/dalpha of some members by central differences, extrapolated to step zero (Richardson), by objective.
+
+    Steps never leave alpha >= 0: where a member is closer to zero than the step, its step is shorter; at
+    zero itself differences are one-sided.
+    """
+    found: dict[str, Floats] = {}
+    for place, member in enumerate(members):
+        for name, value in _one(objectives, alpha, int(member)).items():
+            found.setdefault(name, np.zeros(len(members)))[place] = value
+    return found
+
+
+def _one(objectives: Objectives, alpha: Floats, member: int) -> dict[str, float]:
+    here = float(alpha[member])
+    central = here > 0.0
+    step = _STEP * float(alpha.max(initial=0.0)) or _STEP
+    if central:
+        step = min(step, 0.5 * here)
+    # The error of a central difference has even powers of the step only.
+    powers = [2.0 * (level + 1) if central else level + 1.0 for level in range(_LEVELS)]
+    base = None if central else objectives(alpha)
+    table: list[dict[str, float]] = []
+    for level in range(_LEVELS):
+        h = step / 2.0**level
+        above = objectives(_moved(alpha, member, here + h))
+        below = base if base is not None else objectives(_moved(alpha, member, here - h))
+        width = 2.0 * h if central else h
+        table.append({name: (above[name] - below[name]) / width for name in above})
+    for power in powers[: _LEVELS - 1]:
+        factor = 2.0**power
+        table = [
+            {name: (factor * finer[name] - coarser[name]) / (factor - 1.0) for name in finer}
+            for coarser, finer in pairwise(table)
+        ]
+    return table[0]
+
+
+def _moved(alpha: Floats, member: int, value: float) -> Floats:
+    moved = alpha.copy()
+    moved[member] = value
+    return moved

@@ -1,0 +1,123 @@
+"""Arguments and options that several commands share."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from mdstopo.cli.output import Output
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from mdstopo.case.model import Case
+    from mdstopo.engine import Evaluator
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+FILE = click.Path(path_type=Path)
+
+
+def case_argument(function: F) -> F:
+    """CASE, a YAML file."""
+    return click.argument("case_path", metavar="CASE", type=FILE)(function)
+
+
+def set_option(function: F) -> F:
+    """--set KEY=VALUE."""
+    return click.option(
+        "--set",
+        "overrides",
+        metavar="KEY=VALUE",
+        multiple=True,
+        callback=_pairs,
+        help="Override a key of the case, e.g. solver.tolerance=1e-10; may be repeated.",
+    )(function)
+
+
+def out_option(function: F) -> F:
+    """--out FILE."""
+    return click.option("--out", type=FILE, metavar="FILE", help="Where to write the result.")(function)
+
+
+def overwrite_option(function: F) -> F:
+    """--overwrite."""
+    return click.option("--overwrite", is_flag=True, help="Replace whatever the result file holds.")(function)
+
+
+def alpha_option(function: F) -> F:
+    """--alpha FILE."""
+    return click.option(
+        "--alpha",
+        "alpha_path",
+        type=FILE,
+        metavar="FILE",
+        help="Take the design from a .npy, .txt or result file.",
+    )(function)
+
+
+def output_options(function: F) -> F:
+    """--json and --quiet."""
+    function = click.option("--quiet", "-q", is_flag=True, help="Say nothing but mistakes.")(function)
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")(
+        function
+    )
+
+
+def _pairs(_context: click.Context, _parameter: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:
+    pairs = {}
+    for text in values:
+        key, sign, value = text.partition("=")
+        if not sign or not key.strip():
+            raise click.BadParameter(f"{text!r} is not KEY=VALUE")
+        pairs[key.strip()] = value
+    return pairs
+
+
+def open_case(path: Path, overrides: dict[str, str], *, optimizing: bool = False) -> "Case":
+    """Read a case and refuse what the engine cannot compute. Raises CaseError with every mistake."""
+    from mdstopo.case.errors import CaseError
+    from mdstopo.case.reader import load_case
+    from mdstopo.scene.refusals import refusals
+
+    case = load_case(path, overrides)
+    refused = refusals(case, optimizing=optimizing)
+    if refused:
+        raise CaseError(refused, str(path))
+    return case
+
+
+def open_design(path: Path | None, case: "Case") -> "NDArray[np.float64]":
+    """The design of --alpha, else the case's own. Raises StoreError for a file that holds none."""
+    if path is None:
+        return case.initial
+    from mdstopo.store.design import read_design
+
+    return read_design(path, case.n_design)
+
+
+def check_design(engine: "Evaluator", alpha: "NDArray[np.float64]", path: Path | None) -> None:
+    """Refuse a design that the engine cannot take. Raises StoreError."""
+    from mdstopo.store.errors import StoreError
+
+    try:
+        engine.design(alpha)
+    except ValueError as error:
+        raise StoreError(f"{path or 'the initial design'}: {error}") from error
+
+
+def result_path(out: Path | None, case: "Case", kind: str = "") -> Path:
+    """--out, else results/<case>[.<kind>].h5."""
+    if out is not None:
+        return out
+    return Path("results") / (f"{case.name}.{kind}.h5" if kind else f"{case.name}.h5")
+
+
+def announce_compilation(output: Output) -> None:
+    """Say that the first run takes longer, before it does."""
+    from mdstopo.session.engine import COMPILING, compilation_due
+
+    if compilation_due():
+        output.notice(COMPILING)

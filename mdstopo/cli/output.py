@@ -1,0 +1,99 @@
+"""Where things are said: results on standard output, notices and progress on standard error."""
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TextIO
+
+
+class Output:
+    """How much a command says, and in which form.
+
+    json: one JSON object is the only thing on standard output. quiet: nothing is said but mistakes (and the
+    JSON object, where it was asked for).
+    """
+
+    def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
+        self.json = json
+        self.quiet = quiet
+
+    def say(self, text: str = "") -> None:
+        """A line of the result, for people."""
+        if not self.quiet and not self.json:
+            write(sys.stdout, text)
+
+    def table(self, rows: Iterable[Sequence[str]], indent: str = "  ") -> None:
+        """Aligned columns of the result."""
+        for line in aligned(rows, indent):
+            self.say(line)
+
+    def notice(self, sentence: str) -> None:
+        """Something worth knowing that is no result."""
+        if not self.quiet:
+            write(sys.stderr, sentence)
+
+    def document(self, content: Mapping[str, Any]) -> None:
+        """The result, for machines."""
+        if self.json:
+            write(sys.stdout, json.dumps(plain(content), ensure_ascii=False, allow_nan=False))
+
+
+def write(stream: TextIO, text: str) -> None:
+    """A line; quietly nowhere once the reader has gone."""
+    try:
+        print(text, file=stream, flush=True)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def aligned(rows: Iterable[Sequence[str]], indent: str = "  ") -> list[str]:
+    """Rows of text as lines with aligned columns; numbers to the right, words to the left."""
+    rows = [list(row) for row in rows]
+    count = max((len(row) for row in rows), default=0)
+    widths = [max((len(row[i]) for row in rows if i < len(row)), default=0) for i in range(count)]
+    right = [_is_numeric([row[i] for row in rows[1:] if i < len(row)]) for i in range(count)]
+    lines = []
+    for row in rows:
+        cells = [c.rjust(widths[i]) if right[i] else c.ljust(widths[i]) for i, c in enumerate(row)]
+        lines.append((indent + "  ".join(cells)).rstrip())
+    return lines
+
+
+def _is_numeric(cells: list[str]) -> bool:
+    return bool(cells) and all(cell == "" or cell[0] in "0123456789-+." or cell == "nan" for cell in cells)
+
+
+def plain(value: Any) -> Any:
+    """The same in what JSON has: arrays as lists, NaN and infinities as null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, str) or value is None or isinstance(value, (bool, int)):
+        return value
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, (list, tuple)):
+        return [plain(item) for item in value]
+    return str(value)
+
+
+def number(value: float, digits: int = 6) -> str:
+    """A number for people."""
+    return f"{value:.{digits}g}"
+
+
+def duration(seconds: float) -> str:
+    """A time for people: 0.12 s, 3 min 20 s, 2 h 5 min."""
+    if not math.isfinite(seconds):
+        return "?"
+    if seconds < 1.0:
+        return f"{seconds * 1e3:.3g} ms"
+    if seconds < 60.0:
+        return f"{seconds:.3g} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"

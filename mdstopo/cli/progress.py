@@ -1,0 +1,158 @@
+"""How a run shows that it is going: a live line on a terminal, now and then a plain one elsewhere."""
+
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING, Protocol
+
+from mdstopo.cli.output import duration, number, write
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from mdstopo.session.outcome import Progress
+
+_EVERY = 3.0  # seconds between plain lines
+_REFRESH = 0.1  # seconds between changes of the live line
+
+
+class Display(Protocol):
+    """A context manager that is told of every iteration."""
+
+    def __enter__(self) -> "Display": ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+    def __call__(self, progress: "Progress") -> None: ...
+
+
+def display(quiet: bool) -> Display:
+    """The one that suits where standard error goes."""
+    if quiet:
+        return Silent()
+    return Live() if sys.stderr.isatty() else Plain()
+
+
+class Rate:
+    """Iterations a second and the time left, of the start that is going."""
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
+        self._began: float | None = None
+        self._count = 0
+
+    def add(self) -> None:
+        """One more iteration; the clock runs from the first, so that getting ready does not count."""
+        if self._began is None:
+            self._began = self._clock()
+        else:
+            self._count += 1
+
+    def words(self, progress: "Progress") -> str:
+        """Rate and the time that all iterations would take which may still come."""
+        elapsed = 0.0 if self._began is None else self._clock() - self._began
+        if not self._count or elapsed <= 0.0:
+            return "rate not known yet"
+        rate = self._count / elapsed
+        left = progress.max_iterations - progress.iteration
+        left += (progress.starts - 1 - progress.start) * progress.max_iterations
+        return f"{number(rate, 3)}/s, at most {duration(max(left, 0) / rate)} left"
+
+
+def line(progress: "Progress") -> str:
+    """One iteration in words."""
+    start = f"start {progress.start + 1}/{progress.starts}, " if progress.starts > 1 else ""
+    return (
+        f"{start}iteration {progress.iteration}/{progress.max_iterations}: "
+        f"objective {number(progress.objective, 7)}, best {number(progress.best, 7)}, "
+        f"constraint {number(progress.violation, 3)}, change {number(progress.change, 3)}"
+    )
+
+
+class Silent:
+    """Says nothing."""
+
+    def __enter__(self) -> "Silent":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+    def __call__(self, progress: "Progress") -> None:
+        """Nothing."""
+
+
+class Plain(Silent):
+    """A line every few seconds: for logs. A run that is over before says nothing."""
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
+        self._said_at = clock()
+        self._rate = Rate(clock)
+
+    def __call__(self, progress: "Progress") -> None:
+        """Say it if it is time."""
+        self._rate.add()
+        now = self._clock()
+        if now - self._said_at >= _EVERY:
+            self._said_at = now
+            write(sys.stderr, f"{line(progress)}, {self._rate.words(progress)}")
+
+
+class Live(Silent):
+    """A line that changes in place, drawn with rich, which is imported only here."""
+
+    def __init__(self) -> None:
+        self._rate = Rate()
+        self._drawn_at = 0.0
+        self._latest: Progress | None = None
+
+    def __enter__(self) -> "Live":
+        from rich.console import Console
+        from rich.live import Live as RichLive
+
+        self._live = RichLive(console=Console(stderr=True), auto_refresh=False, transient=True)
+        self._live.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.__exit__(kind, error, trace)
+
+    def __call__(self, progress: "Progress") -> None:
+        """Draw it, but not faster than an eye can follow."""
+        self._rate.add()
+        now = time.perf_counter()
+        if now - self._drawn_at >= _REFRESH:
+            self._drawn_at = now
+            self._live.update(self._picture(progress), refresh=True)
+
+    def _picture(self, progress: "Progress") -> "Table":
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+
+        total = progress.starts * progress.max_iterations
+        done = progress.start * progress.max_iterations + progress.iteration
+        grid = Table.grid(padding=(0, 2))
+        names = ["iteration", "objective", "best", "constraint", "change", ""]
+        values = [
+            f"{progress.iteration}/{progress.max_iterations}",
+            number(progress.objective, 7),
+            number(progress.best, 7),
+            number(progress.violation, 3),
+            number(progress.change, 3),
+            self._rate.words(progress),
+        ]
+        if progress.starts > 1:
+            names.insert(0, "start")
+            values.insert(0, f"{progress.start + 1}/{progress.starts}")
+        grid.add_row(*(f"[dim]{name}[/dim]" for name in names))
+        grid.add_row(*values)
+        whole = Table.grid()
+        whole.add_row(ProgressBar(total=max(total, 1), completed=done, width=60))
+        whole.add_row(grid)
+        return whole

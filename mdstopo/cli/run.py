@@ -1,0 +1,196 @@
+"""`mdstopo run`: optimise a case."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.interrupt import Interrupts
+from mdstopo.cli.options import (
+    alpha_option,
+    case_argument,
+    open_case,
+    open_design,
+    out_option,
+    output_options,
+    overwrite_option,
+    result_path,
+    set_option,
+)
+from mdstopo.cli.output import Output, duration, number
+from mdstopo.cli.progress import display
+
+if TYPE_CHECKING:
+    from mdstopo.session import Outcome
+
+_EXIT = {"converged": 0, "max_iterations": 0, "failed": 1, "interrupted": 3}
+_GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
+
+
+@click.command("run")
+@case_argument
+@out_option
+@click.option("--resume", is_flag=True, help="Continue the run in the result file.")
+@overwrite_option
+@set_option
+@alpha_option
+@click.option("--starts", type=click.IntRange(1), metavar="N", help="How many starts (default: the case's).")
+@click.option(
+    "--workers", type=click.IntRange(1), metavar="N", help="How many processes work on them (default 1)."
+)
+@output_options
+def command(
+    case_path: Path,
+    out: Path | None,
+    resume: bool,
+    overwrite: bool,
+    overrides: dict[str, str],
+    alpha_path: Path | None,
+    starts: int | None,
+    workers: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Optimise a case and keep its result file up to date.
+
+    Ctrl-C finishes the iteration, saves, and tells how to resume.
+    """
+    if resume and overwrite:
+        raise click.UsageError("--resume and --overwrite exclude each other")
+    output = Output(json=as_json, quiet=quiet)
+    interrupts = Interrupts(quiet)
+    case = open_case(case_path, overrides, optimizing=True)
+    initial = open_design(alpha_path, case) if alpha_path is not None else None
+    path = result_path(out, case)
+    from mdstopo.session import run_session
+
+    with display(quiet) as show:
+        outcome = run_session(
+            case,
+            path=path,
+            resume=resume,
+            overwrite=overwrite,
+            starts=starts,
+            workers=workers,
+            initial=initial,
+            on_iteration=show,
+            stop_requested=interrupts.stop_requested,
+            notify=output.notice,
+            command=shlex.join(["mdstopo", *sys.argv[1:]]),
+        )
+    again = resume_command(case_path, out, overrides, alpha_path, starts, workers)
+    _summarise(output, outcome, path)
+    output.document(_document(outcome, path, again))
+    for warning in outcome.warnings:
+        output.notice(f"warning: {warning}")
+    if outcome.status == "interrupted":
+        output.notice(f"interrupted; to go on: {again}")
+    return _EXIT[outcome.status]
+
+
+def resume_command(
+    case_path: Path,
+    out: Path | None,
+    overrides: dict[str, str],
+    alpha_path: Path | None,
+    starts: int | None,
+    workers: int | None,
+) -> str:
+    """The exact command that continues this run."""
+    words = ["mdstopo", "run", str(case_path), "--resume"]
+    if out is not None:
+        words += ["--out", str(out)]
+    for key, value in overrides.items():
+        words += ["--set", f"{key}={value}"]
+    if alpha_path is not None:
+        words += ["--alpha", str(alpha_path)]
+    if starts is not None:
+        words += ["--starts", str(starts)]
+    if workers is not None:
+        words += ["--workers", str(workers)]
+    return shlex.join(words)
+
+
+def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
+    case = outcome.case
+    state = outcome.states[outcome.best_start]
+    assert state is not None
+    output.say(f"{case.title or case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
+    rows = []
+    for name, value in outcome.objectives.items():
+        rows.append([name, f"{number(outcome.initial_objectives[name], 9)} -> {number(value, 9)}"])
+        rows += [
+            ["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in outcome.peaks.get(name, ())
+        ]
+    rows.append(["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"])
+    if len(outcome.states) > 1:
+        begun = [each for each in outcome.states if each is not None]
+        values = ", ".join(number(each.best_objective, 6) for each in begun)
+        rows.append(
+            ["starts", f"{len(begun)} of {len(outcome.states)}; best is {outcome.best_start + 1}: {values}"]
+        )
+    rows += [[name, sentence] for name, sentence in _material(outcome)]
+    rows.append(["integrator", f"{outcome.integrator}: {outcome.integrator_reason}"])
+    rows.append(
+        [
+            "time",
+            f"{duration(outcome.seconds)} of iterations, {duration(outcome.compile_seconds)} to get ready",
+        ]
+    )
+    rows.append(["result", str(path)])
+    output.table(rows)
+
+
+def _material(outcome: "Outcome") -> list[tuple[str, str]]:
+    """What the design is made of: volume rows, members that are neither there nor gone."""
+    import numpy as np
+
+    from mdstopo.case.model import VolumeRow
+
+    case, lines = outcome.case, []
+    for row in case.constraints:
+        if isinstance(row, VolumeRow):
+            used = float(row.coefficients @ outcome.alpha)
+            word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
+            lines.append(
+                (f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}")
+            )
+    width = case.upper - case.lower
+    share = np.divide(outcome.alpha - case.lower, width, out=np.zeros(case.n_design), where=width > 0.0)
+    grey = int(np.count_nonzero((share > _GREY[0]) & (share < _GREY[1])))
+    full = int(np.count_nonzero(share >= _GREY[1]))
+    lines.append(
+        ("members", f"{full} present, {grey} grey, {case.n_design - full - grey} absent of {case.n_design}")
+    )
+    return lines
+
+
+def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
+    return {
+        "command": "run",
+        "case": outcome.case.name,
+        "status": str(outcome.status),
+        "reason": outcome.reason,
+        "objectives": outcome.objectives,
+        "initial_objectives": outcome.initial_objectives,
+        "peaks": {
+            name: [{"time": t, "value": value} for t, value in found] for name, found in outcome.peaks.items()
+        },
+        "evaluations": outcome.evaluations,
+        "iterations": outcome.iterations,
+        "starts": [
+            None if each is None else {"status": str(each.status), "objective": each.best_objective}
+            for each in outcome.states
+        ],
+        "best_start": outcome.best_start,
+        "constraints": outcome.history["constraints"][-1],
+        "integrator": outcome.integrator,
+        "integrator_reason": outcome.integrator_reason,
+        "seconds": outcome.seconds,
+        "compile_seconds": outcome.compile_seconds,
+        "warnings": outcome.warnings,
+        "path": str(path),
+        "resume": again if outcome.status == "interrupted" else None,
+    }

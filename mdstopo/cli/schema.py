@@ -1,0 +1,31 @@
+"""`mdstopo schema`: the JSON Schema of the case format."""
+
+import json
+from pathlib import Path
+
+import click
+
+from mdstopo.cli.options import FILE
+from mdstopo.cli.output import Output
+
+
+@click.command("schema")
+@click.option("--out", type=FILE, metavar="FILE", help="Write it to a file.")
+def command(out: Path | None) -> int:
+    """Print the JSON Schema of the case format.
+
+    An editor that knows it completes and checks a case while it is typed.
+    """
+    from mdstopo.case.schema import json_schema
+
+    text = json.dumps(json_schema(), indent=2, ensure_ascii=False)
+    if out is None:
+        Output().say(text)
+        return 0
+    from mdstopo.store.errors import StoreError
+
+    try:
+        out.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{out}: cannot be written: {error.strerror}") from error
+    return 0

@@ -1,0 +1,158 @@
+"""`mdstopo show`: a result file in words."""
+
+import shlex
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.options import FILE, output_options
+from mdstopo.cli.output import Output, duration, number
+
+if TYPE_CHECKING:
+    from mdstopo.store.reader import ResultView
+
+_ROWS = 12  # iterates that a condensed history shows
+
+
+@click.command("show")
+@click.argument("result_path", metavar="RESULT", type=FILE)
+@click.option(
+    "--members", "count", type=click.IntRange(0), default=10, show_default=True, help="How many members."
+)
+@output_options
+def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
+    """Say in words what a result file holds."""
+    from mdstopo.store.reader import read_result
+
+    output = Output(json=as_json, quiet=quiet)
+    view = read_result(result_path, leave_out=("optimizer",))
+    output.say(f"{view.title or view.name}: {view.status.replace('_', ' ')} - {view.reason}")
+    output.say(
+        f"made by `{view.provenance.get('command') or view.kind}` on {view.provenance.get('created', '?')}"
+    )
+    if view.kind == "run":
+        _say_iterations(output, view)
+        _say_starts(output, view)
+    _say_trajectories(output, view)
+    _say_sensitivities(output, view)
+    _say_members(output, view, count)
+    for title, pairs in (("settings", view.settings), ("made with", view.provenance)):
+        output.say(title)
+        output.table([[key, str(value)] for key, value in pairs.items()])
+    for warning in view.warnings:
+        output.say(f"warning: {warning}")
+    if not view.finished:
+        output.say(f"to go on: {resume_command(view)}")
+    output.document(_document(view))
+    return 0
+
+
+def objective_names(view: "ResultView") -> list[str]:
+    """The objectives' names, in the order of the columns."""
+    return list(view.lines("objectives"))
+
+
+def resume_command(view: "ResultView") -> str:
+    """The command that continues an unfinished run."""
+    words = shlex.split(view.provenance.get("command", ""))
+    if words[:2] != ["mdstopo", "run"]:
+        words = ["mdstopo", "run", view.case_path or "CASE", "--out", str(view.path)]
+    words = [word for word in words if word not in ("--overwrite", "--resume")]
+    return shlex.join([*words[:3], "--resume", *words[3:]])
+
+
+def condensed(count: int, rows: int = _ROWS) -> list[int]:
+    """Indices of about `rows` out of `count` rows: the first, the last, and closer together at the start."""
+    if count <= rows:
+        return list(range(count))
+    picked = {round((count - 1) * (i / (rows - 1)) ** 1.5) for i in range(rows)}
+    return sorted(picked)
+
+
+def _say_iterations(output: Output, view: "ResultView") -> None:
+    columns = view.under("iterations")
+    names = objective_names(view)
+    total = len(columns["combined"])
+    output.say(f"{total - 1} iterations, {int(columns['evaluations'][-1])} evaluations")
+    rows = [["iterate", *names, "constraint", "change", "evaluations", "time"]]
+    for k in condensed(total):
+        worst = (
+            columns["constraints"][k].max(initial=float("-inf"))
+            if columns["constraints"].size
+            else float("nan")
+        )
+        rows.append(
+            [
+                str(k),
+                *(number(value) for value in columns["objectives"][k]),
+                number(worst, 3),
+                number(columns["change"][k], 3),
+                str(int(columns["evaluations"][k])),
+                duration(float(columns["seconds"][k])),
+            ]
+        )
+    output.table(rows)
+
+
+def _say_starts(output: Output, view: "ResultView") -> None:
+    starts = view.under("starts")
+    if not starts:
+        return
+    output.say("starts")
+    rows = [["start", *objective_names(view), "status"]]
+    for index, word in enumerate(view.lines("starts/status")):
+        rows.append([str(index + 1), *(number(value) for value in starts["objectives"][index]), word])
+    output.table(rows)
+
+
+def _say_trajectories(output: Output, view: "ResultView") -> None:
+    for path, t in view.under("trajectories").items():
+        if path.endswith("/t") and len(t):
+            output.say(f"motion {path[:-2]}: {len(t) - 1} steps from {number(t[0])} to {number(t[-1])} s")
+
+
+def _say_sensitivities(output: Output, view: "ResultView") -> None:
+    for path, gradient in view.under("sensitivities").items():
+        if gradient.ndim == 1 and len(gradient):
+            output.say(f"sensitivities {path}: from {number(gradient.min())} to {number(gradient.max())}")
+
+
+def _say_members(output: Output, view: "ResultView", count: int) -> None:
+    import numpy as np
+
+    if "design/alpha" not in view.arrays or count == 0:
+        return
+    alpha, design = view.alpha, np.asarray(view.array("members/design"), dtype=np.bool_)
+    p, q = view.array("members/p")[design], view.array("members/q")[design]
+    groups = np.array(view.lines("members/group"))[design]
+    order = np.argsort(-alpha, kind="stable")[:count]
+    output.say(f"the {len(order)} largest of {len(alpha)} design variables")
+    rows = [["number", "group", "alpha", "from x", "y", "to x", "y"]]
+    rows += [[str(i), str(groups[i]), *(number(v) for v in (alpha[i], *p[i], *q[i]))] for i in order]
+    output.table(rows)
+
+
+def _document(view: "ResultView") -> dict[str, Any]:
+    content: dict[str, Any] = {
+        "command": "show",
+        "kind": view.kind,
+        "case": view.name,
+        "title": view.title,
+        "status": view.status,
+        "reason": view.reason,
+        "case_sha256": view.case_sha256,
+        "settings": view.settings,
+        "provenance": view.provenance,
+        "warnings": view.warnings,
+        "datasets": {path: list(array.shape) for path, array in view.arrays.items()},
+        "resume": None if view.finished else resume_command(view),
+    }
+    if view.kind == "run":
+        columns = view.under("iterations")
+        content["iterations"] = len(columns["combined"]) - 1
+        content["evaluations"] = int(columns["evaluations"][-1])
+        content["objectives"] = {
+            name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))
+        }
+    return content

@@ -1,0 +1,136 @@
+"""`mdstopo simulate`: the motion of one design."""
+
+import shlex
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.options import (
+    alpha_option,
+    announce_compilation,
+    case_argument,
+    check_design,
+    open_case,
+    open_design,
+    out_option,
+    output_options,
+    overwrite_option,
+    result_path,
+    set_option,
+)
+from mdstopo.cli.output import Output, duration, number
+
+if TYPE_CHECKING:
+    from mdstopo.case.model import Case
+    from mdstopo.store.contents import Motion
+
+
+@click.command("simulate")
+@case_argument
+@alpha_option
+@click.option("--load-case", "names", multiple=True, metavar="NAME", help="Only this one; may be repeated.")
+@out_option
+@overwrite_option
+@set_option
+@output_options
+def command(
+    case_path: Path,
+    alpha_path: Path | None,
+    names: tuple[str, ...],
+    out: Path | None,
+    overwrite: bool,
+    overrides: dict[str, str],
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Compute the motion of one design in every load case and write it to a file."""
+    output = Output(json=as_json, quiet=quiet)
+    case = open_case(case_path, overrides)
+    alpha = open_design(alpha_path, case)
+    chosen = _load_cases(case, names)
+    path = result_path(out, case, "simulate")
+    command_line = shlex.join(["mdstopo", *sys.argv[1:]])
+    from mdstopo.store.output import output_file
+
+    with output_file(
+        path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line
+    ) as file:
+        announce_compilation(output)
+        from mdstopo.engine import Evaluator
+        from mdstopo.status import RunStatus, Status
+        from mdstopo.store.contents import trajectory_part
+
+        began = time.perf_counter()
+        engine = Evaluator(case)
+        check_design(engine, alpha, alpha_path)
+        ready = time.perf_counter()
+        motions = {name: engine.trajectory(alpha, name) for name in chosen}
+        ended = time.perf_counter()
+        failed = [motion.status for motion in motions.values() if motion.status is not Status.OK]
+        status = RunStatus.FAILED if failed else RunStatus.CONVERGED
+        reason = failed[0].value if failed else "done"
+        file.write(
+            status.value,
+            reason,
+            {"design/alpha": alpha} | trajectory_part(motions),
+            {"integrator": engine.integrator, "integrator_reason": engine.integrator_reason},
+        )
+    output.say(f"{case.title or case.name}: {reason}")
+    for name, motion in motions.items():
+        _say_motion(output, case, name, motion)
+    output.table(
+        [
+            ["integrator", f"{engine.integrator}: {engine.integrator_reason}"],
+            ["time", f"{duration(ended - ready)}, {duration(ready - began)} to get ready"],
+            ["result", str(path)],
+        ]
+    )
+    output.document(
+        {
+            "command": "simulate",
+            "case": case.name,
+            "status": status.value,
+            "reason": reason,
+            "load_cases": {name: _motion_document(case, motion) for name, motion in motions.items()},
+            "integrator": engine.integrator,
+            "seconds": ended - ready,
+            "compile_seconds": ready - began,
+            "path": str(path),
+        }
+    )
+    return 1 if failed else 0
+
+
+def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
+    known = [load_case.name for load_case in case.load_cases]
+    for name in names:
+        if name not in known:
+            raise click.BadParameter(
+                f"no load case {name!r}; there are {', '.join(known)}", param_hint="--load-case"
+            )
+    return list(names) or known
+
+
+def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> None:
+    output.say(
+        f"load case {name}: {len(motion.t) - 1} steps from {number(motion.t[0])} to {number(motion.t[-1])} s"
+    )
+    rows = [["body", "x, m", "y, m", "angle, rad", "vx, m/s", "vy, m/s", "rate, rad/s"]]
+    for index, body in enumerate(case.bodies):
+        part = slice(3 * index, 3 * index + 3)
+        rows.append([body.name, *(number(value) for value in (*motion.q[-1, part], *motion.v[-1, part]))])
+    output.table(rows)
+
+
+def _motion_document(case: "Case", motion: "Motion") -> dict[str, Any]:
+    return {
+        "steps": len(motion.t) - 1,
+        "end": motion.t[-1],
+        "bodies": {
+            body.name: {"q": motion.q[-1, 3 * i : 3 * i + 3], "v": motion.v[-1, 3 * i : 3 * i + 3]}
+            for i, body in enumerate(case.bodies)
+        },
+    }

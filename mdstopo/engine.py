@@ -1,0 +1,242 @@
+"""A case, compiled once: evaluate designs, simulate, hand the optimiser its problem.
+
+`Evaluator` reads like the paper's Section III.C: simulate the load cases that somebody looks at, look at the
+objectives, differentiate, look at the constraints. Each load case is one scene; objectives of one load case share its
+simulation.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case, VolumeRow
+from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.integrators.choice import choose, method_of
+from mdstopo.integrators.driver import Driver, Looked
+from mdstopo.integrators.steps import WORK_NAMES
+from mdstopo.integrators.trajectory import Trajectory
+from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
+from mdstopo.scene.culprit import Culprits
+from mdstopo.scene.refusals import refusals
+from mdstopo.sensitivity.reductions import REDUCTIONS
+from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.optimizer.problem import Problem
+
+#: tolerance of the motion that the integrators get for a tolerance of the objective and its gradient
+MOTION = 1.0
+
+
+class Evaluator:
+    """A case, ready to be evaluated again and again.
+
+    Raises CaseError where the case asks for what the engine cannot do yet.
+    """
+
+    def __init__(self, case: Case) -> None:
+        refused = refusals(case)
+        if refused:
+            raise CaseError(refused, str(case.path or case.name))
+        self.case = case
+        self.integrator, self.integrator_reason = choose(case.solver)
+        self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
+        self._method = method_of(self.integrator, case.solver)
+        order = state_order(case)
+        shared = compile_members(case, {name: i for i, name in enumerate(order)})
+        self.scenes: dict[str, Scene] = {
+            load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases
+        }
+        self._drivers: dict[str, Driver] = {}
+        self._culprits: dict[str, Culprits] = {}
+        self._n = case.n_design
+        self._volumes = tuple(row for row in case.constraints if isinstance(row, VolumeRow))
+        self._rows = np.array([row.coefficients for row in self._volumes]).reshape(len(self._volumes), self._n)
+        self._rows.flags.writeable = False
+        self._bounds = np.array([row.bound for row in self._volumes])
+        self._by_load_case = {
+            name: tuple(objective for objective in case.objectives if objective.load_case == name)
+            for name in self.scenes
+        }
+        self.work: dict[str, int] = dict.fromkeys(WORK_NAMES, 0)
+
+    # -- what a run asks
+
+    @property
+    def skipped(self) -> list[str]:
+        """What the scenes leave out, and why; one sentence each."""
+        notes: list[str] = []
+        for scene in self.scenes.values():
+            notes += [note for note in scene.skipped if note not in notes]
+        unused = [name for name, looked in self._by_load_case.items() if not looked and self.case.objectives]
+        return notes + [f"load case {name}: no objective looks at it" for name in unused]
+
+    def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
+        """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
+
+        sensitivity: one of the four methods; default the case's.
+        """
+        design = self.design(alpha)
+        method = sensitivity or self.sensitivity
+        exact = gradient and method == "adjoint"
+        status, message = Status.OK, ""
+        looked: dict[str, tuple[Peak, ...]] = {}
+        work = dict.fromkeys(WORK_NAMES, 0)
+        for name, objectives in self._by_load_case.items():
+            if not objectives:
+                continue
+            driver = self._driver(name)
+            result = driver.evaluate(design, exact)
+            _count(work, driver)
+            status, message = self._verdict(name, design, result)
+            if not status.ok:
+                break
+            for j, objective in enumerate(objectives):
+                looked[objective.name] = _peaks(result, j, exact)
+            if gradient and not exact:
+                from mdstopo.sensitivity.methods import differentiate
+
+                found = differentiate(method, driver, design, result)
+                status, message = found.status, found.message
+                for j, objective in enumerate(objectives):
+                    looked[objective.name] = tuple(
+                        Peak(peak.time, peak.value, found.gradients[j][r])
+                        for r, peak in enumerate(looked[objective.name])
+                    )
+        for key, value in work.items():
+            self.work[key] += value
+        return self._evaluation(design, looked, gradient, work, status, message)
+
+    def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
+        """The motion of one load case with the design alpha (N,)."""
+        design = self.design(alpha)
+        driver = self._driver(load_case)
+        status, steps = driver.simulate(design)
+        message = ""
+        if not status.ok:
+            status, message = self._culprit(load_case).explain(design, status, float(steps.t[-1]), steps.state[-1])
+        work = dict.fromkeys(WORK_NAMES, 0)
+        _count(work, driver)
+        return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
+
+    def problem(self) -> "Problem":
+        """The case as the optimiser sees it."""
+        from mdstopo.optimizer.structure import StructureProblem
+
+        return StructureProblem(self)
+
+    def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
+        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
+        return self._culprit(load_case).natural_frequencies(self.design(alpha))
+
+    # -- how
+
+    def design(self, alpha: FloatArray) -> FloatArray:
+        """alpha as (N,) float64; ValueError where it is not finite or negative, or of another length."""
+        design = np.ascontiguousarray(alpha, dtype=np.float64)
+        if design.shape != (self._n,):
+            raise ValueError(f"alpha must have shape ({self._n},), one value a design member, not {design.shape}")
+        if self._n and not (design.min() >= 0.0 and design.max() < np.inf):
+            worst = int(np.flatnonzero(~((design >= 0.0) & (design < np.inf)))[0])
+            raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
+        if self._n and design.min() == 0.0:
+            self._refuse_zero(design)
+        return design
+
+    def _refuse_zero(self, design: FloatArray) -> None:
+        for name, part in self.case.group_slices.items():
+            power = next(group.power for group in self.case.design_groups if group.name == name)
+            if power < 1.0 and np.any(design[part] == 0.0):
+                raise ValueError(f"alpha = 0 in group {name} has no derivative: its power {power:g} is below 1")
+
+    def _driver(self, name: str) -> Driver:
+        if name not in self._drivers:
+            looked = self._by_load_case[name]
+            solver = self.case.solver
+            driver = Driver(
+                self.scenes[name],
+                self._method,
+                MOTION * solver.tolerance,
+                solver.step or 0.0,
+                np.array([REDUCTIONS[objective.over_time] for objective in looked], dtype=np.int64),
+                self._n,
+            )
+            if self.integrator == "generalized_alpha" and solver.step is None:
+                from mdstopo.integrators.default_step import default_step
+
+                driver.settings[2] = default_step(driver, self.case.initial)
+            self._drivers[name] = driver
+        return self._drivers[name]
+
+    def _culprit(self, name: str) -> Culprits:
+        if name not in self._culprits:
+            self._culprits[name] = Culprits(self.case, self.scenes[name])
+        return self._culprits[name]
+
+    def _verdict(self, name: str, design: FloatArray, result: Looked) -> tuple[Status, str]:
+        """Whether the motion of a load case can be trusted, and who is to blame where not."""
+        if result.status.ok and result.meeting < 0:
+            return Status.OK, ""
+        culprit = self._culprit(name)
+        if result.status.ok:
+            return Status.ZERO_LENGTH, culprit.member(result.meeting)
+        status, steps = self._driver(name).simulate(design)
+        return culprit.explain(design, status, float(steps.t[-1]), steps.state[-1])
+
+    def _evaluation(
+        self,
+        design: FloatArray,
+        looked: Mapping[str, tuple[Peak, ...]],
+        gradient: bool,
+        work: dict[str, int],
+        status: Status,
+        message: str,
+    ) -> Evaluation:
+        names = [objective.name for objective in self.case.objectives]
+        if not status.ok:
+            lost = tuple([Peak(np.nan, np.nan, None)])
+            looked = {name: looked.get(name, lost) if status is Status.NO_GRADIENT else lost for name in names}
+        gradients = {}
+        for name in names:
+            first = looked[name][0].gradient
+            if gradient and first is not None:
+                gradients[name] = first
+        return Evaluation(
+            objectives={name: looked[name][0].value for name in names},
+            gradients=gradients,
+            peak_times={name: looked[name][0].time for name in names},
+            constraints=np.einsum("ij,j->i", self._rows, design) - self._bounds,
+            constraint_gradients=self._rows,
+            peaks={name: looked[name] for name in names},
+            work=work,
+            status=status,
+            message=message,
+        )
+
+    @cached_property
+    def objective_names(self) -> tuple[str, ...]:
+        """Names of the objectives, in the case's order."""
+        return tuple(objective.name for objective in self.case.objectives)
+
+
+def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:
+    count = int(result.found[j])
+    gradients = result.gradients[j, :count].copy() if gradient else None
+    if gradients is not None:
+        gradients.flags.writeable = False
+    return tuple(
+        Peak(
+            float(result.rows[j, r, 0]),
+            float(result.rows[j, r, 1]),
+            None if gradients is None else gradients[r],
+        )
+        for r in range(count)
+    )
+
+
+def _count(work: dict[str, int], driver: Driver) -> None:
+    for key, value in zip(WORK_NAMES, driver.work.tolist(), strict=True):
+        work[key] += value

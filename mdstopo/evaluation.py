@@ -1,0 +1,46 @@
+"""What an evaluation gives back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.status import Status
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Peak:
+    """One of the competing peaks of an objective.
+
+    time in s (NaN where the objective is no value at one time); value: raw; gradient (N,): d value / d alpha with
+    the time held fixed, None where no gradient was asked for.
+    """
+
+    time: float
+    value: float
+    gradient: FloatArray | None
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """One design, evaluated; mappings by objective name.
+
+    objectives: raw G; gradients: dG/dalpha (N,), at tied peaks the highest's, the earliest if equal; peak_times: t_n in
+    s (NaN for mean and integral); peaks: all that compete, highest first; constraints (n_con,): h_j - h_0j in the
+    case's order; constraint_gradients (n_con, N); work: counts of what was done; status: anything but OK leaves values
+    NaN, and message names the culprit.
+    """
+
+    objectives: Mapping[str, float]
+    gradients: Mapping[str, FloatArray]
+    peak_times: Mapping[str, float]
+    constraints: FloatArray
+    constraint_gradients: FloatArray
+    peaks: Mapping[str, tuple[Peak, ...]]
+    work: Mapping[str, int]
+    status: Status
+    message: str = ""
+    histories: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)

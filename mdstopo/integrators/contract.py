@@ -1,0 +1,146 @@
+"""The duties of an integrator, resolved by the type of its steps when a kernel is compiled.
+
+An integrator is a NamedTuple of steps and these compiled functions; `implement` enters them in the table below.
+
+1. `integrate(model, tables, strength, damped, ...)` fills the steps and returns (code, count). It lands on every entry of
+   `model.times`, leaves the equations of each step solved to rounding, and keeps at each stage what the force balance
+   saw (see `steps`).
+2. `point_of(model, tables, strength, steps, count, k, c, damped, q, v, work) -> (w, c_w)`: the state at fraction c of
+   step k, to the order of the method, and where the reverse sweep has to start for it: step w at its fraction c_w (-1:
+   at its end). `reach`, with the same arguments, also leaves what the reverse sweep needs: a method whose interpolation
+   is a partial step keeps that step behind the others. May be left out where `point_of` does it all.
+3. `parent_of(steps, w)`: the step before step w, -1 where w begins at the start.
+4. `stage_weights(tables, steps, w, out)`: weights (s,) of the stages in the integral over step w.
+5. `reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work)`: pulls
+   cotangents back through step w, from its end (lam) and from its point (mu, zero where c_point < 0), explicit ones
+   of the stage positions added (no rows: none); leaves z (s, n), the virtual displacement of each stage's force balance. lam_x (n_carried, n)
+   belongs to whatever else the method carries from step to step (zero rows for one-step methods).
+6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: pushes changes forward
+   through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
+7. `carried(steps) -> int`: rows of lam_x and dx.
+8. `sample(steps, count, damped, t, g, d) -> m`: times, energies and their rates (NaN where unknown) by rising time,
+   without the first and the last state. May be left out where the stages are ordered and exact.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba import types
+from numba.extending import overload
+
+from mdstopo.jit import kernel
+
+Implementation = Callable[..., Any]
+
+_DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}}
+
+
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+    """Duty 2."""
+    raise NotImplementedError
+
+
+def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+    """Duty 2, for a reverse sweep."""
+    raise NotImplementedError
+
+
+def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+    """Duty 8."""
+    raise NotImplementedError
+
+
+def parent_of(steps, w):  # type: ignore[no-untyped-def]
+    """Duty 3."""
+    raise NotImplementedError
+
+
+def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+    """Duty 4."""
+    raise NotImplementedError
+
+
+def reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work):  # type: ignore[no-untyped-def]
+    """Duty 5."""
+    raise NotImplementedError
+
+
+def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+    """Duty 6."""
+    raise NotImplementedError
+
+
+def carried(steps):  # type: ignore[no-untyped-def]
+    """Duty 7."""
+    raise NotImplementedError
+
+
+def implement(steps_type: type, **duties: Implementation) -> None:
+    """Enter an integrator's compiled functions for its type of steps."""
+    for name, function in duties.items():
+        _DUTIES.setdefault(name, {})[steps_type] = function
+
+
+def _implementation(name: str, steps: Any) -> Implementation | None:
+    """The Python function to be compiled for this type of steps; its parameters are named as the duty's."""
+    if not isinstance(steps, types.NamedTuple):
+        return None
+    chosen = _DUTIES[name].get(steps.instance_class)
+    if chosen is None and name == "reach":
+        chosen = _DUTIES["point_of"].get(steps.instance_class)
+    if chosen is None and name == "sample":
+        chosen = sample_stages
+    return getattr(chosen, "py_func", chosen)
+
+
+@kernel
+def sample_stages(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+    """Every stage."""
+    m = steps.index[count, 0]
+    for i in range(m):
+        t[i] = steps.scalar[i, 0]
+        g[i] = steps.scalar[i, 1]
+        d[i] = steps.scalar[i, 2]
+    return m
+
+
+@overload(point_of)
+def _point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+    return _implementation("point_of", steps)
+
+
+@overload(parent_of)
+def _parent_of(steps, w):  # type: ignore[no-untyped-def]
+    return _implementation("parent_of", steps)
+
+
+@overload(stage_weights)
+def _stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+    return _implementation("stage_weights", steps)
+
+
+@overload(reverse_step)
+def _reverse_step(
+    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work
+):  # type: ignore[no-untyped-def]
+    return _implementation("reverse_step", steps)
+
+
+@overload(tangent_step)
+def _tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+    return _implementation("tangent_step", steps)
+
+
+@overload(carried)
+def _carried(steps):  # type: ignore[no-untyped-def]
+    return _implementation("carried", steps)
+
+
+@overload(reach)
+def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+    return _implementation("reach", steps)
+
+
+@overload(sample)
+def _sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+    return _implementation("sample", steps)

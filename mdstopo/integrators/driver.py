@@ -1,0 +1,160 @@
+"""From Python to the compiled entries of an integrator: buffers, room, results.
+
+A `Driver` belongs to one scene and one method. It keeps every buffer between calls, so that an evaluation allocates
+nothing, and gives the steps more room when the kernel asks for it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for, status_of
+from mdstopo.scene.compile import Scene
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.packing import pack
+from mdstopo.status import Status
+
+#: how near to the highest a peak competes, and how many are kept
+CLOSENESS = 0.15
+ROWS = 4
+
+
+@dataclass(frozen=True)
+class Method:
+    """An integrator as the engine sees it.
+
+    name: as in the case file. load: imports its compiled entries (simulate, look, dense). tables: its constant
+    arrays. steps, stages: room to begin with.
+    """
+
+    name: str
+    load: Callable[[], ModuleType]
+    tables: FloatArray
+    steps: int
+    stages: int
+
+
+@dataclass(frozen=True)
+class Looked:
+    """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
+
+    rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N); meeting:
+    padded index of a member whose ends meet, or -1.
+    """
+
+    status: Status
+    time: float
+    rows: FloatArray
+    found: IndexArray
+    gradients: FloatArray
+    meeting: int
+
+
+class Driver:
+    """One scene, one method, ready to run."""
+
+    def __init__(
+        self, scene: Scene, method: Method, tolerance: float, step: float, reductions: IndexArray, n_design: int
+    ) -> None:
+        self.scene = scene
+        self.method = method
+        self._entry: Any = None
+        self.packed = pack(scene.model)
+        n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
+        self._shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
+        self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
+        self.reductions = reductions
+        self.work = np.zeros(WORK, dtype=np.int64)
+        padded = scene.model.member.shape[1]
+        count = len(reductions)
+        self._alpha = np.zeros(n_design)  # one array for all designs: a read-only one would be another type
+        self.strength = np.zeros((3, padded))
+        self.padded = np.zeros((ROWS, padded))
+        self.rows = np.zeros((count, ROWS, 4))
+        self.found = np.zeros(count, dtype=np.int64)
+        self.gradients = np.zeros((count, ROWS, n_design))
+        self.meeting = np.zeros(2, dtype=np.int64)
+        self._make_room(method.steps, method.stages)
+
+    @property
+    def entry(self) -> Any:
+        """The method's compiled entries, imported when first used."""
+        if self._entry is None:
+            self._entry = self.method.load()
+        return self._entry
+
+    def _make_room(self, steps: int, stages: int) -> None:
+        n, n_pair, damped, turning = self._shape
+        floats, ints = room_for(n, n_pair, steps, stages, damped, turning)
+        self.limits = np.array([MAX_STEPS, steps, stages], dtype=np.int64)
+        self.room = np.zeros(floats)
+        self.room_ints = np.zeros(ints, dtype=np.int64)
+
+    def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
+        """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call."""
+        code, count, time = self.run(alpha, gradient)
+        if code == OK:
+            self.entry.look(
+                self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped,
+                self.settings, self.limits, count, self.reductions, gradient, self.room, self.room_ints,
+                self.strength, self.padded, self.rows, self.found, self.gradients, self.meeting, self.work,
+            )  # fmt: skip
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.meeting[0]))
+
+    def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
+        """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
+        self._alpha[:] = alpha
+        while True:
+            self.work[:] = 0
+            code, count, time = self.entry.simulate(
+                self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped, tangent,
+                self.settings, self.limits, self.room, self.room_ints, self.strength, self.work,
+            )  # fmt: skip
+            if code != NEEDS_ROOM:
+                return code, count, time
+            self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
+
+    def simulate(self, alpha: FloatArray) -> tuple[Status, "DenseSteps"]:
+        """Simulate alpha (N,); the steps come back in arrays of their own."""
+        code, count, _ = self.run(alpha, False)
+        return status_of(code), DenseSteps(self, count, status_code=code)
+
+
+class DenseSteps:
+    """The steps of one simulation, and the motion between them."""
+
+    def __init__(self, driver: Driver, count: int, status_code: int) -> None:
+        self._driver = driver
+        self._room, self._ints = driver.room.copy(), driver.room_ints.copy()
+        self._limits, self._strength = driver.limits, driver.strength.copy()
+        self.count = count
+        self.complete = status_code == OK
+        n, n_pair, damped, turning = driver._shape
+        arrays = carve.py_func(  # type: ignore[attr-defined]
+            self._room, self._ints, n, n_pair, int(self._limits[1]), int(self._limits[2]), damped, turning
+        )
+        self.t: FloatArray = arrays[0][: count + 1]
+        self.state: FloatArray = arrays[1][: count + 1]
+        self.index: IndexArray = arrays[2][: count + 1]
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """q, v, a (3, T, n) at times (T,) within what was simulated."""
+        driver = self._driver
+        out = np.zeros((3, len(times), driver._shape[0]))
+        if self.count == 0:
+            raise ValueError("no step was completed")
+        driver.entry.dense(
+            driver.packed.ints, driver.packed.floats, driver.method.tables, driver.scene.damped, self._limits,
+            self.count, self._room, self._ints, self._strength, np.ascontiguousarray(times, dtype=np.float64), out,
+            np.zeros(WORK, dtype=np.int64),
+        )  # fmt: skip
+        return out
+
+
+#: steps an integration may take before it is given up
+MAX_STEPS = 1_000_000
+#: Newton corrections relative to the motion at which an implicit step counts as solved; the next would be rounding
+NEWTON_TOLERANCE = 1e-10

@@ -1,0 +1,409 @@
+"""Gauss collocation with nested numbers of nodes and a Newton iteration at body level, adaptive.
+
+On a window the accelerations at the nodes obey a_j = M^-1 F(q_j, v_j, t_j), with q_j, v_j given by the a_j
+(`gauss_tables`). One pass over the members at all nodes gives forces and tangents; then the linearised balance
+
+    a_j = M^-1 (F_j - K_j (q_j(a) - q_j) - C_j (v_j(a) - v_j))
+
+is solved by sweeps that touch no member (they contract quickly because h^2 |K/M| |A|^2 is small on the windows chosen
+here). The first pass uses few nodes; every further one takes more, until the Legendre coefficients of a have decayed
+below the tolerance, and goes on at that number until the Newton correction is at rounding level. So the corrections
+and the tail of the coefficients are the error estimate, at no cost, and the discrete equations hold to rounding,
+which is what makes the discrete adjoint exact (`gauss_linear`).
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from mdstopo.integrators.gauss_tables import LEVELS
+from mdstopo.integrators.steps import (
+    ACCEPTED,
+    FIELDS,
+    FORCES,
+    NEEDS_ROOM,
+    NEWTON,
+    NON_FINITE,
+    OK,
+    REJECTED,
+    STEP_LIMIT,
+    STEP_TOO_SMALL,
+    SWEEPS,
+    TANGENTS,
+    copy_rows,
+    copy_tangents,
+    deflection,
+    keep_stage,
+    keep_state,
+    largest_difference,
+    motion_weights,
+)
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import SUMS, add_loads, add_turning, forces, subtract_products
+from mdstopo.mechanics.geometry import POSE, relative_pose
+
+GaussSteps = namedtuple("GaussSteps", FIELDS)
+
+COUNTS = LEVELS
+MOST = max(LEVELS)
+#: level of the windows of a fixed step: seven nodes, order 14
+FIXED_LEVEL = 1
+
+
+@kernel
+def integrate_to_nodes(matrix, s, factor, start, slope, c, a, out):  # type: ignore[no-untyped-def]
+    """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s."""
+    n = start.shape[0]
+    for i in range(s):
+        for d in range(n):
+            out[i, d] = start[d] + c[i] * slope[d]
+        for j in range(s):
+            w = factor * matrix[i, j]
+            for d in range(n):
+                out[i, d] += w * a[j, d]
+
+
+@kernel
+def _balance(pair, inv_mass, table, s, q0, v0, hv0, h, f, k, c, turn, damped, turning, weight, ref, a, q, v, room, work):  # type: ignore[no-untyped-def]
+    """Solve the linearised balance for a (s, n) by sweeps; q, v become the states that belong to it.
+
+    In: forces f and tangents at ref (2, s, n); a as a first guess; weight (n,) of `motion_weights`; room (3, s, n).
+    Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    """
+    n = q0.shape[0]
+    before = room[0]
+    dx = room[1]
+    rhs = room[2]
+    q_ref = ref[0]
+    v_ref = ref[1]
+    nodes = table[0, 0]
+    first = table[1]
+    second = table[2]
+    none = room[3, 0]
+    none[:] = 0.0
+    correction = 0.0
+    last = np.inf
+    growing = 0
+    for sweep in range(81):
+        integrate_to_nodes(second, s, h * h, q0, hv0, nodes, a, q)
+        if damped:
+            integrate_to_nodes(first, s, h, v0, none, nodes, a, v)
+        if sweep > 0:
+            work[SWEEPS] += 1
+            change = largest_difference(q, before, weight, s)
+            correction = largest_difference(q, q_ref, weight, s)
+            if not change <= 1e8:
+                return -1.0
+            if change <= max(1e-3 * correction * correction, 1e-15):
+                break
+            growing = growing + 1 if change >= last else 0
+            if growing >= 3 or sweep == 80:
+                if change < 1e-13:
+                    break
+                return -1.0
+            last = change
+        for i in range(s):
+            for d in range(n):
+                before[i, d] = q[i, d]
+                rhs[i, d] = f[i, d]
+                dx[i, d] = q[i, d] - q_ref[i, d]
+        subtract_products(pair, k, dx, rhs, s)
+        if turning:
+            add_turning(turn, dx, rhs, s)
+        if damped:
+            for i in range(s):
+                for d in range(n):
+                    dx[i, d] = v[i, d] - v_ref[i, d]
+            subtract_products(pair, c, dx, rhs, s)
+        for i in range(s):
+            for d in range(n):
+                a[i, d] = inv_mass[d] * rhs[i, d]
+    if not damped:
+        integrate_to_nodes(first, s, h, v0, none, nodes, a, v)
+    return correction
+
+
+@kernel
+def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
+    """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration."""
+    n = inv_mass.shape[0]
+    x = np.empty((1, n))
+    y = np.empty((1, n))
+    rate = 0.0
+    for part in range(2 if damped else 1):
+        for d in range(n):
+            x[0, d] = np.sqrt(inv_mass[d]) * (1.0 + 0.1 * (d % 7))
+        value = 0.0
+        for _ in range(12):
+            size = 0.0
+            for d in range(n):
+                if inv_mass[d] > 0.0:
+                    size += x[0, d] * x[0, d] / inv_mass[d]
+            value = np.sqrt(size)
+            if value == 0.0:
+                break
+            for d in range(n):
+                x[0, d] /= value
+                y[0, d] = 0.0
+            subtract_products(pair, k if part == 0 else c, x, y, np.int64(1))
+            for d in range(n):
+                x[0, d] = inv_mass[d] * y[0, d]
+        rate = np.sqrt(value) if part == 0 else max(rate, 1.5 * value)
+    return rate
+
+
+@kernel
+def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixed_step, max_steps, steps, work):  # type: ignore[no-untyped-def]
+    """Integrate from the first to the last of model.times into steps; returns (code, number of windows).
+
+    strength: (3, M_padded). tolerance: error of the interpolated motion relative to the motion itself; ignored with
+    fixed_step > 0 (windows of that length, seven nodes). work: counts, added to. NEEDS_ROOM asks for larger `steps`.
+    """
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    n_level = tables.shape[0]
+    turning = model.load_body.shape[0] > 0
+    pair = model.pair
+    inv_mass = model.inv_mass
+    times = model.times
+    reach = model.reach
+    # numbers written in a call are types of their own, and would have the callee compiled once more
+    yes = np.bool_(True)
+    rel = np.empty((MOST, n_pair, POSE))
+    sums = np.empty((MOST, n_pair, SUMS))
+    k = np.empty((MOST, n_pair, 6, 6))
+    c = np.empty((MOST if damped else 1, n_pair, 6, 6))
+    turn = np.zeros((MOST if turning else 1, n))
+    t_node = np.empty(MOST)
+    ref = np.empty((2, MOST, n))
+    f = np.empty((MOST, n))
+    q = np.empty((MOST, n))
+    v = np.empty((MOST, n))
+    a = np.empty((MOST, n))
+    coef = np.empty((MOST, n))
+    room = np.empty((4, MOST, n))
+    table = np.empty((3, MOST, MOST))
+    vectors = np.empty((8, n))
+    weight = vectors[0]
+    load = vectors[1]
+    load_base = vectors[2]
+    hv0 = vectors[3]
+    q_base = vectors[4]
+    f_base = vectors[5]
+    q0 = vectors[6]
+    v0 = vectors[7]
+    v_base = np.empty(n)
+
+    # the start: forces and tangents give the first prediction, the first window and the scale of what matters
+    for d in range(n):
+        q0[d] = model.q0[d]
+        v0[d] = model.v0[d]
+        ref[0, 0, d] = q0[d]
+        ref[1, 0, d] = v0[d]
+        q_base[d] = q0[d]
+        v_base[d] = v0[d]
+        load_base[d] = 0.0
+    t = times[0]
+    t_node[0] = t
+    forces(model, strength, np.int64(0), np.int64(1), t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
+    work[FORCES] += 1
+    work[TANGENTS] += 1
+    rel0 = np.empty((n_pair, POSE))
+    copy_rows(rel[0], rel0)
+    k_base = np.empty((n_pair, 6, 6))
+    c_base = np.empty((n_pair, 6, 6))
+    copy_tangents(k[0], k_base)
+    copy_tangents(c[0], c_base)
+    for d in range(n):
+        f_base[d] = f[0, d]
+    add_loads(model, np.int64(0), t, q0, load_base)
+    motion = np.zeros(n_pair)
+    noise = np.empty(n_pair)
+    scale = np.empty(n_pair)
+    for p in range(n_pair):
+        stiffness = sums[0, p, 7] + sums[0, p, 11]
+        if sums[0, p, 3] > 0.0 and stiffness > 0.0:
+            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # a pair that starts strained
+        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
+    rate = fastest_rate(pair, inv_mass, k, c, damped)
+    last_time = times[times.shape[0] - 1]
+    span = last_time - t
+    wanted = span if rate * span <= 5.0 else 5.0 / rate
+    if fixed_step > 0.0:
+        wanted = fixed_step
+    keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)
+    steps.index[0, 0] = 0
+    count = 0
+    stages = 0
+
+    for segment in range(times.shape[0] - 1):
+        end = times[segment + 1]
+        while t < end:
+            if count >= max_steps:
+                return STEP_LIMIT, count
+            pieces = np.ceil((end - t) / wanted - 1e-9)
+            h = (end - t) / max(pieces, 1.0)
+            lands = pieces <= 1.0
+            if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
+                return STEP_TOO_SMALL, count
+
+            # predict with the balance linearised at the window's start (the last stage before it)
+            level = FIXED_LEVEL if fixed_step > 0.0 else 0
+            s = COUNTS[level]
+            planes = tables[level]
+            load[:] = 0.0
+            add_loads(model, segment, t + 0.5 * h, q_base, load)
+            for i in range(s):
+                t_node[i] = t + h * planes[0, 0, i]
+                for d in range(n):
+                    f[i, d] = f_base[d] + load[d] - load_base[d]
+                    a[i, d] = inv_mass[d] * f[i, d]
+                    ref[0, i, d] = q_base[d]
+                    ref[1, i, d] = v_base[d]
+                copy_tangents(k_base, k[i])
+                if damped:
+                    copy_tangents(c_base, c[i])
+                if turning:
+                    turn[i] = 0.0
+            for d in range(n):
+                hv0[d] = h * v0[d]
+            # nothing has moved yet: what the start's forces alone would do is the scale of the prediction
+            integrate_to_nodes(planes[2], s, h * h, q0, hv0, planes[0, 0], a, q)
+            relative_pose(pair, q[s - 1], v0, rel[s - 1])
+            for p in range(n_pair):
+                scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
+            motion_weights(pair, rel0, reach, scale, weight)
+            accepted = False
+            estimate = 0.0
+            previous = np.inf
+            e = 0.0
+            for newton in range(13):
+                if newton > 0:
+                    # one pass over the members at all nodes
+                    for i in range(s):
+                        for d in range(n):
+                            ref[0, i, d] = q[i, d]
+                            ref[1, i, d] = v[i, d]
+                    forces(model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
+                    work[FORCES] += s
+                    work[TANGENTS] += s
+                    work[NEWTON] += 1
+                    widest = 0.0
+                    for p in range(n_pair):
+                        reached = motion[p]
+                        for i in range(s):
+                            reached = max(reached, deflection(rel[i], rel0, reach, p))
+                        scale[p] = reached
+                        widest = max(widest, reached)
+                    for p in range(n_pair):
+                        scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+                    motion_weights(pair, rel[0], reach, scale, weight)
+                for i in range(s):
+                    table[0, 0, i] = planes[0, 0, i]
+                    for j in range(s):
+                        table[1, i, j] = planes[1, i, j]
+                        table[2, i, j] = planes[2, i, j]
+                e = _balance(
+                    pair, inv_mass, table, s, q0, v0, hv0, h, f, k, c, turn, damped, turning, weight, ref, a, q, v,
+                    room, work,
+                )  # fmt: skip
+                if e < 0.0:
+                    break
+                if newton == 0:
+                    continue
+                for i in range(s):
+                    for d in range(n):
+                        coef[i, d] = 0.0
+                    for j in range(s):
+                        w = planes[3, i, j]
+                        for d in range(n):
+                            coef[i, d] += w * a[j, d]
+                # what the next coefficient would add to the motion, from the last ones
+                estimate = 0.0
+                for d in range(n):
+                    tail = max(abs(coef[s - 1, d]), 0.1 * abs(coef[s - 2, d])) * h * h / (4.0 * s * s)
+                    estimate = max(estimate, weight[d] * tail)
+                if estimate <= tolerance or fixed_step > 0.0:
+                    # the last clause: rounding is all that is left
+                    if e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11):
+                        accepted = True
+                        break
+                    previous = e
+                elif level == n_level - 1 or (level >= 1 and e > 0.5):
+                    break  # more nodes are not to be had; a far too long window is seen early
+                else:
+                    level += 1
+                    old = s
+                    s = COUNTS[level]
+                    planes = tables[level]
+                    previous = np.inf
+                    for i in range(s):
+                        t_node[i] = t + h * planes[0, 0, i]
+                    none = room[0, 0]
+                    none[:] = 0.0
+                    _from_coefficients(planes[5], s, old, h * h, q0, hv0, planes[0, 0], coef, q)
+                    _from_coefficients(planes[4], s, old, h, v0, none, planes[0, 0], coef, v)
+                    _from_coefficients(planes[6], s, old, 1.0, none, none, planes[0, 0], coef, a)
+            if not accepted:
+                work[REJECTED] += 1
+                if fixed_step > 0.0:
+                    return (STEP_TOO_SMALL if np.isfinite(e) else NON_FINITE), count
+                wanted = 0.5 * h
+                continue
+
+            if count + 2 > steps.t.shape[0] or stages + s > steps.scalar.shape[0]:
+                return NEEDS_ROOM, count
+            for i in range(s):
+                keep_stage(
+                    stages + i, t_node[i], q[i], v[i], coef[i], rel[i], sums[i], k[i], c[i if damped else 0],
+                    turn[i if turning else 0], steps.scalar, steps.stage, steps.pull, steps.K, steps.C, steps.turn,
+                )  # fmt: skip
+                for p in range(n_pair):
+                    motion[p] = max(motion[p], deflection(rel[i], rel0, reach, p))
+            # the last stage is the base of the next prediction
+            load_base[:] = 0.0
+            add_loads(model, segment, t_node[s - 1], q[s - 1], load_base)
+            copy_tangents(k[s - 1], k_base)
+            if damped:
+                copy_tangents(c[s - 1], c_base)
+            finite = True
+            for d in range(n):
+                q_base[d] = q[s - 1, d]
+                v_base[d] = v[s - 1, d]
+                f_base[d] = a[s - 1, d] / inv_mass[d] if inv_mass[d] > 0.0 else 0.0
+                # the end, as Gauss quadrature gives it
+                position = q0[d] + hv0[d]
+                speed = v0[d]
+                for j in range(s):
+                    position += h * h * planes[0, 2, j] * a[j, d]
+                    speed += h * planes[0, 1, j] * a[j, d]
+                q0[d] = position
+                v0[d] = speed
+                finite = finite and np.isfinite(position) and np.isfinite(speed)
+            if not finite:
+                return NON_FINITE, count
+            t = end if lands else t + h
+            steps.index[count, 1] = level
+            steps.index[count, 2] = segment
+            stages += s
+            count += 1
+            steps.index[count, 0] = stages
+            keep_state(steps.t, steps.state, count, t, q0, v0)
+            work[ACCEPTED] += 1
+            if fixed_step <= 0.0:
+                change = 0.9 * (tolerance / max(estimate, 1e-30)) ** (1.0 / (s + 1)) * 11.0 / s
+                wanted = h * min(max(change, 0.4), 2.0)
+    return OK, count
+
+
+@kernel
+def _from_coefficients(plane, s, old, factor, start, slope, c, coef, out):  # type: ignore[no-untyped-def]
+    """out[i] = start + c_i slope + factor sum_k plane_ik coef[k] for i < s, k < old."""
+    n = start.shape[0]
+    for i in range(s):
+        for d in range(n):
+            out[i, d] = start[d] + c[i] * slope[d]
+        for j in range(old):
+            w = factor * plane[i, j]
+            for d in range(n):
+                out[i, d] += w * coef[j, d]

@@ -1,0 +1,228 @@
+"""Explicit Runge-Kutta methods, adaptive: Nystroem of order 12 where nothing depends on velocity, else order 8.
+
+The error of a step is that of the embedded method, measured as displacement at the attachment points relative to the
+motion so far (a velocity counts with what it moves in a step). Between steps the motion is a partial step from the
+step's start: dense output of the method's own order, and what a peak inside a step is differentiated through. The
+partial step is kept behind the others, as step `count + 1` (see `parent_of`).
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
+from mdstopo.integrators.steps import (
+    ACCEPTED,
+    FIELDS,
+    FORCES,
+    NEEDS_ROOM,
+    NON_FINITE,
+    OK,
+    REJECTED,
+    STEP_LIMIT,
+    STEP_TOO_SMALL,
+    TANGENTS,
+    deflection,
+    keep_stage,
+    keep_state,
+    motion_weights,
+)
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import SUMS, forces
+from mdstopo.mechanics.geometry import POSE, relative_pose
+
+RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)
+
+MOST = max(STAGES)
+
+
+@kernel
+def advance(  # type: ignore[no-untyped-def]
+    model, table, s, strength, segment, t, h, q0, v0, tangent, damped, o, rel, sums, f, k, c, turn, q, v, a, steps, ends,
+    work,
+):
+    """One step of length h from q0, v0: the stages into q, v, a (s, n), the end into ends (2, n).
+
+    With o >= 0 the stages are kept in `steps` from there on.
+    """
+    n = q0.shape[0]
+    n_pair = model.pair.shape[0]
+    aa = table[0]
+    first = table[1]
+    vectors = table[2]
+    t_one = np.empty(1)
+    for i in range(s):
+        for d in range(n):
+            q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
+            v[i, d] = v0[d]
+        for j in range(i):
+            w = h * h * aa[i, j]
+            u = h * first[i, j]
+            if w != 0.0:
+                for d in range(n):
+                    q[i, d] += w * a[j, d]
+            if u != 0.0:
+                for d in range(n):
+                    v[i, d] += u * a[j, d]
+        t_one[0] = t + h * vectors[0, i]
+        forces(model, strength, segment, np.int64(1), t_one, q[i:], v[i:], tangent, damped, rel, sums, f, k, c, turn)
+        for d in range(n):
+            a[i, d] = model.inv_mass[d] * f[0, d]
+        if o >= 0:
+            keep_stage(
+                o + i, t_one[0], q[i], v[i], a[i], rel[0], sums[0], k[0], c[0], turn[0], steps.scalar, steps.stage,
+                steps.pull, steps.K, steps.C, steps.turn,
+            )  # fmt: skip
+    work[FORCES] += s
+    if tangent:
+        work[TANGENTS] += s
+    for d in range(n):
+        position = q0[d] + h * v0[d]
+        speed = v0[d]
+        for j in range(s):
+            position += h * h * vectors[1, j] * a[j, d]
+            speed += h * vectors[2, j] * a[j, d]
+        ends[0, d] = position
+        ends[1, d] = speed
+
+
+@kernel
+def _error(vectors, s, h, a, weight):  # type: ignore[no-untyped-def]
+    """Estimated error of a step relative to the motion; NaN where one appears."""
+    worst = 0.0
+    coarse = 0.0
+    for d in range(weight.shape[0]):
+        eq = 0.0
+        ev = 0.0
+        fq = 0.0
+        fv = 0.0
+        for j in range(s):
+            eq += vectors[3, j] * a[j, d]
+            ev += vectors[4, j] * a[j, d]
+            fq += vectors[5, j] * a[j, d]
+            fv += vectors[6, j] * a[j, d]
+        value = h * h * weight[d] * max(abs(eq), abs(ev))
+        other = h * h * weight[d] * max(abs(fq), abs(fv))
+        if not value <= worst:
+            worst = value
+        if not other <= coarse:
+            coarse = other
+    if coarse > 0.0 and worst > 0.0:  # two estimates of low order make one of high order
+        worst = worst * worst / np.sqrt(worst * worst + 0.01 * coarse * coarse)
+    return worst
+
+
+@kernel
+def integrate(model, tables, strength, damped, tangent, tolerance, fixed_step, max_steps, steps, work):  # type: ignore[no-untyped-def]
+    """Integrate from the first to the last of model.times into steps; returns (code, number of steps).
+
+    tangent: whether tangents are kept for a reverse sweep. tolerance: error of a step relative to the motion; ignored
+    with fixed_step > 0. NEEDS_ROOM asks for larger `steps`; two more steps than are taken must fit (`point_of`).
+    """
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    turning = model.load_body.shape[0] > 0
+    method = 1 if damped else 0
+    s = STAGES[method]
+    order = ORDERS[method]
+    table = tables[method]
+    pair = model.pair
+    times = model.times
+    reach = model.reach
+    rel = np.empty((1, n_pair, POSE))
+    sums = np.empty((1, n_pair, SUMS))
+    f = np.empty((1, n))
+    k = np.empty((1, n_pair, 6, 6))
+    c = np.empty((1, n_pair, 6, 6))
+    turn = np.zeros((1, n))
+    q = np.empty((MOST, n))
+    v = np.empty((MOST, n))
+    a = np.empty((MOST, n))
+    ends = np.empty((2, n))
+    weight = np.empty(n)
+    q0 = np.empty(n)
+    v0 = np.empty(n)
+    for d in range(n):
+        q0[d] = model.q0[d]
+        v0[d] = model.v0[d]
+    rel0 = np.empty((n_pair, POSE))
+    relative_pose(pair, q0, v0, rel0)
+    motion = np.zeros(n_pair)
+    noise = np.empty(n_pair)
+    scale = np.empty(n_pair)
+    for p in range(n_pair):
+        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
+    t = times[0]
+    last_time = times[times.shape[0] - 1]
+    span = last_time - t
+    wanted = fixed_step if fixed_step > 0.0 else span
+    keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)
+    steps.index[0, 0] = 0
+    count = 0
+    stages = 0
+    strained = False
+    for segment in range(times.shape[0] - 1):
+        end = times[segment + 1]
+        while t < end:
+            if count >= max_steps:
+                return STEP_LIMIT, count
+            pieces = np.ceil((end - t) / wanted - 1e-9)
+            h = (end - t) / max(pieces, 1.0)
+            lands = pieces <= 1.0
+            if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
+                return STEP_TOO_SMALL, count
+            if count + 4 > steps.t.shape[0] or stages + 2 * s > steps.scalar.shape[0]:
+                return NEEDS_ROOM, count
+            advance(
+                model, table, s, strength, segment, t, h, q0, v0, tangent, damped, stages, rel, sums, f, k, c, turn,
+                q, v, a, steps, ends, work,
+            )  # fmt: skip
+            if not strained:  # a pair that starts strained moves on the scale of its strain
+                strained = True
+                for p in range(n_pair):
+                    pull = 0.0
+                    for j in range(3):
+                        pull += abs(steps.pull[0, p, j])
+                    if pull > 0.0 and steps.scalar[0, 1] > 0.0:
+                        motion[p] = steps.scalar[0, 1] / pull
+            widest = 0.0
+            for p in range(n_pair):
+                reached = motion[p]
+                relative_pose(pair, ends[0], ends[1], rel[0])
+                reached = max(reached, deflection(rel[0], rel0, reach, p))
+                scale[p] = reached
+                widest = max(widest, reached)
+            for p in range(n_pair):
+                scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+            motion_weights(pair, rel[0], reach, scale, weight)
+            error = _error(table[2], s, h, a, weight)
+            finite = True
+            for d in range(n):
+                finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
+            if fixed_step > 0.0:
+                if not finite:
+                    return NON_FINITE, count
+            else:
+                if not finite or not error < 1e6:
+                    wanted = 0.1 * h
+                    work[REJECTED] += 1
+                    continue
+                change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
+                wanted = h * min(max(change, 0.1), 4.0)
+                if error > tolerance:
+                    work[REJECTED] += 1
+                    continue
+            for p in range(n_pair):
+                motion[p] = max(motion[p], deflection(rel[0], rel0, reach, p))
+            t = end if lands else t + h
+            for d in range(n):
+                q0[d] = ends[0, d]
+                v0[d] = ends[1, d]
+            steps.index[count, 1] = count - 1
+            steps.index[count, 2] = segment
+            stages += s
+            count += 1
+            steps.index[count, 0] = stages
+            keep_state(steps.t, steps.state, count, t, q0, v0)
+            work[ACCEPTED] += 1
+    return OK, count

@@ -1,0 +1,191 @@
+"""What every integrator leaves behind, and the numbers by which it reports how it ended.
+
+A run is m steps. Step k goes from the state k to the state k + 1 and owns the stages index[k, FIRST] up to
+index[k + 1, FIRST]: states at which the force balance was imposed, with the tangents there. Everything that comes after
+(responses, reverse sweep, design gradient) works on these: states, never members.
+
+========  ======================  ==================================================================
+t         (m + 1,)                times of the states
+state     (m + 1, 2, n)           q, v
+index     (m + 1, 3) integers     first stage of the step; level (the method's own); segment of the loads
+scalar    (S, 3)                  t, stored energy, its rate, at each stage
+stage     (S, 3, n)               q, v, and a vector of the method's own, at each stage
+pull      (S, n_pair, 3)          E_xi, the energy's slope in the relative poses
+K         (S, n_pair, 6, 6)       -dF/dq of each pair
+C         (S, n_pair, 6, 6)       -dF/dv, no rows where nothing is damped
+turn      (S, n)                  derivative of the loads by each body's angle, no rows where no load turns
+========  ======================  ==================================================================
+
+Each integrator names its own tuple of these arrays (`FIELDS`), by whose type its functions are found (`contract`).
+"""
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.status import Status
+
+#: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)
+OK, NON_FINITE, STEP_LIMIT, STEP_TOO_SMALL, NEWTON_FAILED, NEEDS_ROOM = range(6)
+
+_STATUS = (Status.OK, Status.NON_FINITE, Status.STEP_LIMIT, Status.STEP_TOO_SMALL, Status.NEWTON_FAILED)
+
+#: positions in the array of work counts: states at which forces were summed, those of them with tangents, accepted
+#: and rejected steps, Newton corrections, body-level sweeps, reverse steps, states in design gradient passes
+FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN = range(8)
+WORK = 8
+WORK_NAMES = (
+    "force_sums", "tangents", "steps", "rejected_steps", "newton_corrections", "body_sweeps", "reverse_steps",
+    "design_states",
+)  # fmt: skip
+
+
+def status_of(code: int) -> Status:
+    """The `Status` that a kernel's code stands for."""
+    return _STATUS[code]
+
+
+FIELDS = ("t", "state", "index", "scalar", "stage", "pull", "K", "C", "turn")
+
+#: columns of `index`, `scalar`, `stage`
+FIRST, LEVEL, SEGMENT = range(3)
+TIME, ENERGY, ENERGY_RATE = range(3)
+Q, V, OWN = range(3)
+
+
+@kernel
+def carve(floats, ints, n, n_pair, steps, stages, damped, turning):  # type: ignore[no-untyped-def]
+    """The arrays of `FIELDS` with room for so many steps and stages, as views of flat arrays (see `room_for`)."""
+    index = ints[: 3 * (steps + 1)].reshape((steps + 1, 3))
+    t = floats[: steps + 1]
+    f = steps + 1
+    state = floats[f : f + (steps + 1) * 2 * n].reshape((steps + 1, 2, n))
+    f += (steps + 1) * 2 * n
+    scalar = floats[f : f + 3 * stages].reshape((stages, 3))
+    f += 3 * stages
+    stage = floats[f : f + 3 * n * stages].reshape((stages, 3, n))
+    f += 3 * n * stages
+    pull = floats[f : f + 3 * n_pair * stages].reshape((stages, n_pair, 3))
+    f += 3 * n_pair * stages
+    k = floats[f : f + 36 * n_pair * stages].reshape((stages, n_pair, 6, 6))
+    f += 36 * n_pair * stages
+    rows = stages if damped else 0
+    c = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
+    f += 36 * n_pair * rows
+    rows = stages if turning else 0
+    turn = floats[f : f + n * rows].reshape((rows, n))
+    return t, state, index, scalar, stage, pull, k, c, turn
+
+
+def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning: bool) -> tuple[int, int]:
+    """Lengths of the flat arrays of floats and of integers that `carve` needs."""
+    per_stage = 3 + 3 * n + 39 * n_pair + (36 * n_pair if damped else 0) + (n if turning else 0)
+    return (steps + 1) * (1 + 2 * n) + stages * per_stage, 3 * (steps + 1)
+
+
+# Numba's own assignment of an array to a slice brings code that formats its error messages into every kernel: seconds
+# of compilation. Hence these.
+
+
+@kernel
+def copy_rows(source, target):  # type: ignore[no-untyped-def]
+    """target = source, two-dimensional."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
+
+
+@kernel
+def copy_tangents(source, target):  # type: ignore[no-untyped-def]
+    """target = source, (n_pair, 6, 6)."""
+    for p in range(source.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                target[p, i, j] = source[p, i, j]
+
+
+@kernel
+def keep_state(times, state, k, t, q, v):  # type: ignore[no-untyped-def]
+    """State k: time, q, v."""
+    times[k] = t
+    for d in range(q.shape[0]):
+        state[k, 0, d] = q[d]
+        state[k, 1, d] = v[d]
+
+
+@kernel
+def step_at(times, count, t):  # type: ignore[no-untyped-def]
+    """The step that holds time t: the last one that begins before it."""
+    low = 0
+    high = count - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if times[middle] < t:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@kernel
+def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_out, c_out, turn_out):  # type: ignore[no-untyped-def]
+    """Store what the force balance of stage o saw: its state, sums and tangents."""
+    energy = 0.0
+    rate = 0.0
+    for p in range(rel.shape[0]):
+        energy += sums[p, 3]
+        for j in range(3):
+            rate += sums[p, 4 + j] * rel[p, 4 + j]
+            pull[o, p, j] = sums[p, 4 + j]
+        for i in range(6):
+            for j in range(6):
+                k_out[o, p, i, j] = k[p, i, j]
+                if c_out.shape[0] > 0:
+                    c_out[o, p, i, j] = c[p, i, j]
+    for d in range(q.shape[0]):
+        stage[o, 0, d] = q[d]
+        stage[o, 1, d] = v[d]
+        stage[o, 2, d] = own[d]
+        if turn_out.shape[0] > 0:
+            turn_out[o, d] = turn[d]
+    scalar[o, 0] = t
+    scalar[o, 1] = energy
+    scalar[o, 2] = rate
+
+
+@kernel
+def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
+    """How far the pair p has moved from its pose at the start, at its attachment points, m (angle within a turn)."""
+    x = rel[p, 0] - rel0[p, 0]
+    y = rel[p, 1] - rel0[p, 1]
+    c = rel[p, 2] - rel0[p, 2]
+    s = rel[p, 3] - rel0[p, 3]
+    return np.sqrt(x * x + y * y) + reach[p] * np.sqrt(c * c + s * s)
+
+
+@kernel
+def motion_weights(pair, rel, reach, scale, weight):  # type: ignore[no-untyped-def]
+    """weight (n,): change of each coordinate times its weight is at least the displacement relative to the scale.
+
+    A turn of a body moves the points of its pairs by at most the distance of the bodies plus their reach.
+    """
+    weight[:] = 0.0
+    for p in range(pair.shape[0]):
+        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
+        for side in range(2):
+            b = 3 * pair[p, side]
+            turn = (arm if side == 0 else reach[p]) / scale[p]
+            weight[b] = max(weight[b], 1.0 / scale[p])
+            weight[b + 1] = max(weight[b + 1], 1.0 / scale[p])
+            weight[b + 2] = max(weight[b + 2], turn)
+
+
+@kernel
+def largest_difference(x, y, weight, count):  # type: ignore[no-untyped-def]
+    """max over i < count and coordinates of weight |x - y|; NaN where one appears. x, y: (count, n)."""
+    worst = 0.0
+    for i in range(count):
+        for d in range(weight.shape[0]):
+            e = weight[d] * abs(x[i, d] - y[i, d])
+            if not e <= worst:
+                worst = e
+    return worst

@@ -1,0 +1,70 @@
+"""The motion of a scene as the user sees it: steps, and any time between them."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from mdstopo.integrators.driver import DenseSteps
+from mdstopo.scene.model import FloatArray
+from mdstopo.status import Status
+
+
+@dataclass(frozen=True)
+class States:
+    """States at T times: q, v, a (T, n) in m, rad and their time derivatives; lam (T, n_rows) in N, N m."""
+
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    lam: FloatArray
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One simulated load case.
+
+    t (T,): times of the accepted steps, start and end included; q, v, a (T, n): x, y, psi of each body as declared and
+    their derivatives, a by the equations of motion, right-continuous where a load jumps; lam (T, n_rows): Lagrange
+    multipliers (no rows without joints and motions). status: anything but OK means that it ends early, at t[-1];
+    message says why. work: counts by name.
+    """
+
+    load_case: str
+    status: Status
+    message: str
+    t: FloatArray
+    q: FloatArray
+    v: FloatArray
+    a: FloatArray
+    lam: FloatArray
+    work: dict[str, int]
+    steps: DenseSteps = field(repr=False)
+
+    @classmethod
+    def of(
+        cls, load_case: str, n: int, steps: DenseSteps, status: Status, message: str, work: dict[str, int]
+    ) -> "Trajectory":
+        """The trajectory of the first n coordinates (what follows is ground)."""
+        t = steps.t.copy()
+        q, v = steps.state[:, 0, :n].copy(), steps.state[:, 1, :n].copy()
+        a = steps.at(t)[2][:, :n].copy() if steps.count else np.zeros_like(q)
+        return cls(load_case, status, message, t, q, v, a, np.zeros((len(t), 0)), work, steps)
+
+    def at(self, times: ArrayLike) -> States:
+        """States at times (T,), from the integrator's own dense output.
+
+        Raises ValueError where a time lies outside what was simulated.
+        """
+        asked = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        if asked.ndim != 1 or not np.all((asked >= self.t[0]) & (asked <= self.t[-1])):
+            raise ValueError(f"times must be one-dimensional and lie within {self.t[0]:g} .. {self.t[-1]:g} s")
+        n = self.q.shape[1]
+        q, v, a = self.steps.at(asked)[:, :, :n]
+        return States(q, v, a, np.zeros((len(asked), 0)))
+
+    @cached_property
+    def duration(self) -> float:
+        """Simulated time in s."""
+        return float(self.t[-1] - self.t[0])

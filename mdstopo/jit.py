@@ -1,0 +1,81 @@
+"""The one place where kernels are compiled: decorators and the disk cache.
+
+Numba keys a cached kernel on its own source file only, so a change in a function that it calls would go unseen.
+Here the cache folder is named by a hash over every source file of the package that holds kernels, and over the
+versions that the machine code depends on: a changed line anywhere means a fresh folder, never a stale kernel.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_ROOMS = ("mechanics", "integrators", "responses", "sensitivity", "optimizer", "scene")
+# Sums may be reordered for the vector units and products fused; NaN and infinity keep their meaning.
+_VECTOR = {"reassoc", "contract", "nsz"}
+
+
+def _cache_root() -> Path:
+    stated = os.environ.get("MDSTOPO_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
+    if stated:
+        return Path(stated)
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base) / "mdstopo"
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels that belong to exactly this source and these versions."""
+    package = Path(__file__).parent
+    digest = hashlib.sha256(f"{numba.__version__} {Path(__file__).read_bytes()!r}".encode())
+    for room in _ROOMS:
+        for source in sorted((package / room).glob("**/*.py")):
+            digest.update(source.read_bytes())
+    return _cache_root() / f"kernels-{digest.hexdigest()[:16]}"
+
+
+_FOLDER = str(cache_folder())
+
+
+def _compile(function: F, **options: Any) -> F:
+    kept = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _FOLDER
+    try:
+        compiled: F = numba.njit(cache=True, error_model="numpy", **options)(function)
+    finally:
+        numba.config.CACHE_DIR = kept
+    return compiled
+
+
+# Wrappers for calls from Python cost a large part of the compilation (each unpacks every array of every tuple), so only
+# entries have one. A kernel's `py_func` runs in Python, for tests.
+_INSIDE = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def entry(function: F) -> F:
+    """Compile a function that Python calls: strict floating point, cached on disk."""
+    return _compile(function, no_cfunc_wrapper=True)
+
+
+def vector_entry(function: F) -> F:
+    """As `entry`, with loops of its own that are vectorised like a `member_kernel`'s."""
+    return _compile(function, fastmath=_VECTOR, no_cfunc_wrapper=True)
+
+
+def kernel(function: F) -> F:
+    """Compile a function that other kernels call, at body level: strict floating point, cached on disk."""
+    return _compile(function, **_INSIDE)
+
+
+def member_kernel(function: F) -> F:
+    """Compile a loop over members: sums vectorised, NaN and infinities honoured, cached on disk."""
+    return _compile(function, fastmath=_VECTOR, **_INSIDE)
+
+
+def inline(function: F) -> F:
+    """Compile a small scalar function that a member kernel inlines; the same arithmetic as there."""
+    return _compile(function, fastmath=_VECTOR, **_INSIDE)

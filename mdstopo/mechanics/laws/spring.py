@@ -1,0 +1,307 @@
+"""The spring law f = k Delta + c dDelta/dt + preload (Eq. 2), over a tile of members at one relative pose.
+
+A member's vector in the first body's frame is r = d + R q - p, with the relative pose (d, R) of its two bodies, so
+its length L = |r|, direction e = r/L and
+
+    b = dL/dxi = (e_x, e_y, tau),   tau = (R q x r)/L,      xi = (d_x, d_y, theta)
+    B2 = d2L/dxi2 = (g^T g - b b^T)/L + e . d2r,            g = dr/dxi = [I, J R q],   e . d2r = -(e . R q) on theta
+
+All kernels return sums over the tile, which is all that anything at body level ever needs:
+
+    Q = -sum f b,   K = -dQ/dxi = sum b (f_D b + f_Dd B2 xi')^T + f B2,   C = -dQ/dxi' = sum f_Dd b b^T
+    E = sum k Delta^2 / 2 (the stored energy; preload and damping store none),   E_xi = sum k Delta b
+
+with k, c and preload already multiplied by alpha^mu. A member of zero length has no direction and adds no force.
+
+Kernels come in two kinds, elastic (no damping, no preload: E_xi = -Q, K symmetric, C absent) and viscous.
+Arguments: member arrays (n,), then the pose d_x, d_y, cos theta, sin theta, then (viscous) its rate.
+"""
+
+import math
+
+import numpy as np
+
+from mdstopo.jit import inline, kernel, member_kernel
+
+ELASTIC = 0
+VISCOUS = 1
+
+#: below this squared length (m^2) a member counts as having no direction
+ZERO_LENGTH_SQUARED = 1e-30
+
+
+@inline
+def _inverse_length(r2):  # type: ignore[no-untyped-def]
+    return 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
+
+
+@member_kernel
+def elastic_force(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """Return Q (3 numbers) and E of a tile of undamped springs."""
+    sum_x = 0.0
+    sum_y = 0.0
+    sum_t = 0.0
+    energy = 0.0
+    for i in range(k.shape[0]):
+        ax = c * qx[i] - s * qy[i]
+        ay = s * qx[i] + c * qy[i]
+        rx = dx + ax - px[i]
+        ry = dy + ay - py[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        stretch = r2 * y - l0[i]
+        w = k[i] * stretch
+        energy += w * stretch
+        w *= y
+        sum_x += w * rx
+        sum_y += w * ry
+        sum_t += w * (ax * ry - ay * rx)
+    return -sum_x, -sum_y, -sum_t, 0.5 * energy
+
+
+@member_kernel
+def elastic_tangent(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K of a tile of undamped springs."""
+    sum_x = 0.0
+    sum_y = 0.0
+    sum_t = 0.0
+    energy = 0.0
+    sum_w = 0.0
+    sum_wx = 0.0
+    sum_wy = 0.0
+    kxx = 0.0
+    kxy = 0.0
+    kyy = 0.0
+    kxt = 0.0
+    kyt = 0.0
+    ktt = 0.0
+    for i in range(k.shape[0]):
+        ax = c * qx[i] - s * qy[i]
+        ay = s * qx[i] + c * qy[i]
+        rx = dx + ax - px[i]
+        ry = dy + ay - py[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        stretch = r2 * y - l0[i]
+        w = k[i] * stretch
+        energy += w * stretch
+        w *= y
+        t = ax * ry - ay * rx
+        sum_x += w * rx
+        sum_y += w * ry
+        sum_t += w * t
+        g = (k[i] - w) * y * y
+        gx = g * rx
+        gy = g * ry
+        kxx += gx * rx
+        kxy += gx * ry
+        kyy += gy * ry
+        kxt += gx * t
+        kyt += gy * t
+        sum_w += w
+        sum_wx += w * ax
+        sum_wy += w * ay
+        ktt += g * t * t - w * (ax * (rx - ax) + ay * (ry - ay))
+    return (
+        -sum_x,
+        -sum_y,
+        -sum_t,
+        0.5 * energy,
+        kxx + sum_w,
+        kxy,
+        kyy + sum_w,
+        kxt - sum_wy,
+        kyt + sum_wx,
+        ktt,
+    )
+
+
+@member_kernel
+def viscous_force(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt):  # type: ignore[no-untyped-def]
+    """Return Q, E and E_xi of a tile of springs with damping or preload."""
+    sum_x = 0.0
+    sum_y = 0.0
+    sum_t = 0.0
+    energy = 0.0
+    ex = 0.0
+    ey = 0.0
+    et = 0.0
+    for i in range(k.shape[0]):
+        ax = c * qx[i] - s * qy[i]
+        ay = s * qx[i] + c * qy[i]
+        rx = dx + ax - px[i]
+        ry = dy + ay - py[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        t = ax * ry - ay * rx
+        stretch = r2 * y - l0[i]
+        rate = y * (rx * vx + ry * vy + t * vt)
+        w = k[i] * stretch
+        energy += w * stretch
+        f = y * (w + damping[i] * rate + preload[i])
+        w *= y
+        sum_x += f * rx
+        sum_y += f * ry
+        sum_t += f * t
+        ex += w * rx
+        ey += w * ry
+        et += w * t
+    return -sum_x, -sum_y, -sum_t, 0.5 * energy, ex, ey, et
+
+
+@member_kernel
+def viscous_tangent(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt):  # type: ignore[no-untyped-def]
+    """Return Q, E, E_xi, K (nine, by rows) and the upper triangle of C of a tile of general springs."""
+    sum_x = 0.0
+    sum_y = 0.0
+    sum_t = 0.0
+    energy = 0.0
+    ex = 0.0
+    ey = 0.0
+    et = 0.0
+    kxx = 0.0
+    kxy = 0.0
+    kxt = 0.0
+    kyx = 0.0
+    kyy = 0.0
+    kyt = 0.0
+    ktx = 0.0
+    kty = 0.0
+    ktt = 0.0
+    cxx = 0.0
+    cxy = 0.0
+    cyy = 0.0
+    cxt = 0.0
+    cyt = 0.0
+    ctt = 0.0
+    for i in range(k.shape[0]):
+        ax = c * qx[i] - s * qy[i]
+        ay = s * qx[i] + c * qy[i]
+        rx = dx + ax - px[i]
+        ry = dy + ay - py[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        bx = y * rx
+        by = y * ry
+        bt = ax * by - ay * bx
+        stretch = r2 * y - l0[i]
+        rate = bx * vx + by * vy + bt * vt
+        elastic = k[i] * stretch
+        energy += elastic * stretch
+        f = elastic + damping[i] * rate + preload[i]
+        sum_x += f * bx
+        sum_y += f * by
+        sum_t += f * bt
+        ex += elastic * bx
+        ey += elastic * by
+        et += elastic * bt
+        hxx = y * (1.0 - bx * bx)
+        hxy = -y * bx * by
+        hyy = y * (1.0 - by * by)
+        hxt = -y * (ay + bx * bt)
+        hyt = y * (ax - by * bt)
+        htt = y * (ax * ax + ay * ay - bt * bt) - (bx * ax + by * ay)
+        # the row that multiplies delta xi in delta f
+        fx = k[i] * bx + damping[i] * (hxx * vx + hxy * vy + hxt * vt)
+        fy = k[i] * by + damping[i] * (hxy * vx + hyy * vy + hyt * vt)
+        ft = k[i] * bt + damping[i] * (hxt * vx + hyt * vy + htt * vt)
+        kxx += bx * fx + f * hxx
+        kxy += bx * fy + f * hxy
+        kxt += bx * ft + f * hxt
+        kyx += by * fx + f * hxy
+        kyy += by * fy + f * hyy
+        kyt += by * ft + f * hyt
+        ktx += bt * fx + f * hxt
+        kty += bt * fy + f * hyt
+        ktt += bt * ft + f * htt
+        cx = damping[i] * bx
+        cy = damping[i] * by
+        cxx += cx * bx
+        cxy += cx * by
+        cyy += cy * by
+        cxt += cx * bt
+        cyt += cy * bt
+        ctt += damping[i] * bt * bt
+    return (
+        -sum_x,
+        -sum_y,
+        -sum_t,
+        0.5 * energy,
+        ex,
+        ey,
+        et,
+        kxx,
+        kxy,
+        kxt,
+        kyx,
+        kyy,
+        kyt,
+        ktx,
+        kty,
+        ktt,
+        cxx,
+        cxy,
+        cyy,
+        cxt,
+        cyt,
+        ctt,
+    )
+
+
+@member_kernel
+def elastic_design(px, py, qx, qy, l0, k, dx, dy, c, s, ux, uy, ut, out):  # type: ignore[no-untyped-def]
+    """Add f_i (b_i . u) of each undamped spring to out; u is a virtual change of the relative pose."""
+    for i in range(k.shape[0]):
+        ax = c * qx[i] - s * qy[i]
+        ay = s * qx[i] + c * qy[i]
+        rx = dx + ax - px[i]
+        ry = dy + ay - py[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        out[i] += k[i] * (r2 * y - l0[i]) * y * (rx * ux + ry * uy + (ax * ry - ay * rx) * ut)
+
+
+@member_kernel
+def viscous_design(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt, ux, uy, ut, out):  # type: ignore[no-untyped-def]
+    """Add f_i (b_i . u) of each general spring to out; u is a virtual change of the relative pose."""
+    for i in range(k.shape[0]):
+        ax = c * qx[i] - s * qy[i]
+        ay = s * qx[i] + c * qy[i]
+        rx = dx + ax - px[i]
+        ry = dy + ay - py[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        t = ax * ry - ay * rx
+        rate = y * (rx * vx + ry * vy + t * vt)
+        f = k[i] * (r2 * y - l0[i]) + damping[i] * rate + preload[i]
+        out[i] += f * y * (rx * ux + ry * uy + t * ut)
+
+
+@member_kernel
+def stored_energy(px, py, qx, qy, l0, k, dx, dy, c, s, weight, out):  # type: ignore[no-untyped-def]
+    """Add weight V_i = weight k_i Delta_i^2 / 2 of each spring to out."""
+    for i in range(k.shape[0]):
+        rx = dx + c * qx[i] - s * qy[i] - px[i]
+        ry = dy + s * qx[i] + c * qy[i] - py[i]
+        stretch = np.sqrt(rx * rx + ry * ry) - l0[i]
+        out[i] += weight * 0.5 * k[i] * stretch * stretch
+
+
+@kernel
+def meeting_in(px, py, qx, qy, l0, k, preload, dx, dy, c, s, dx1, dy1, c1, s1):  # type: ignore[no-untyped-def]
+    """First member that carries a force and whose ends meet while the pose goes straight to a second one; else -1."""
+    for i in range(px.shape[0]):
+        if k[i] * l0[i] == preload[i]:
+            continue  # at zero length it carries nothing
+        rx = dx + c * qx[i] - s * qy[i] - px[i]
+        ry = dy + s * qx[i] + c * qy[i] - py[i]
+        ux = dx1 + c1 * qx[i] - s1 * qy[i] - px[i] - rx
+        uy = dy1 + s1 * qx[i] + c1 * qy[i] - py[i] - ry
+        u2 = ux * ux + uy * uy
+        along = -(rx * ux + ry * uy)
+        across = rx * uy - ry * ux
+        if rx * rx + ry * ry <= ZERO_LENGTH_SQUARED:
+            return i
+        if u2 > 0.0 and 0.0 <= along <= u2 and across * across <= 1e-18 * u2 * u2:
+            return i
+    return -1

@@ -1,0 +1,315 @@
+"""The driver loop, as the paper's Figure 2: evaluate, judge, adapt, approximate, solve, and again.
+
+One step is one evaluation. Between two steps everything is in `State`, so that the loop can be stopped,
+stored and resumed anywhere without a difference in any bit.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from mdstopo.optimizer.approximation import Approximation
+from mdstopo.optimizer.interior import Optimum
+from mdstopo.optimizer.presets import Settings
+from mdstopo.optimizer.problem import Floats, Problem, Sample
+from mdstopo.optimizer.projection import project
+from mdstopo.optimizer.safeguards import (
+    PRICE_CEILING,
+    PRICE_GROWTH,
+    better,
+    failure,
+    first_price,
+    merit,
+    next_convex,
+    next_shift,
+    next_trust,
+    scaled_violation,
+    verdict,
+)
+from mdstopo.optimizer.state import History, State
+from mdstopo.optimizer.subproblem import solve
+from mdstopo.status import RunStatus
+
+# Convex terms tried in turn, in the largest gradient entry over the range, where a subproblem resists.
+RESCUE_WEIGHTS = (0.01, 1.0)
+
+
+class Gsao:
+    """General Sequential Approximate Optimization of a `Problem`.
+
+    problem: what to minimise; settings: from `presets.settings`. `start` gives the first state, `step` the
+    next one, until `state.running` is false. Raises InfeasibleRows from `start` where no design satisfies
+    bounds and volume rows, and ValueError where the bounds cross.
+    """
+
+    def __init__(
+        self, problem: Problem, settings: Settings, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.problem = problem
+        self.settings = settings
+        self.clock = clock
+        self.lower = np.asarray(problem.lower, dtype=np.float64)
+        self.upper = np.asarray(problem.upper, dtype=np.float64)
+        if not np.all(self.lower <= self.upper):
+            raise ValueError("a lower bound lies above its upper bound")
+        width = self.upper - self.lower
+        self.range = np.where(width > 0.0, width, 1.0)
+        self.trusted = settings.flag("trust_region")
+
+    def start(self, initial: Floats | None = None) -> State:
+        """Evaluate the (projected) initial design and propose a first step."""
+        began = self.clock()
+        first = self.problem.initial if initial is None else initial
+        alpha = project(np.asarray(first, dtype=np.float64), self.lower, self.upper, self.problem.linear)
+        sample = self.problem.evaluate(alpha)
+        wrong = failure(sample)
+        n = len(alpha)
+        price = np.zeros(0) if wrong else first_price(sample, self.settings)
+        violation = float("inf") if wrong else scaled_violation(sample)
+        state = State(
+            alpha=alpha,
+            objective=sample.objective,
+            rows=sample.rows,
+            gradients=sample.gradients,
+            constraint_rows=sample.constraint_rows,
+            constraint_gradients=sample.constraint_gradients,
+            violation=violation,
+            trial=alpha,
+            predicted=0.0,
+            kkt=float("nan"),
+            shift=np.full(n, self.settings.number("shift_start")),
+            steps=np.zeros((2, n)),
+            trust=self.settings.number("trust_start") if self.trusted else 1.0,
+            convex=self.settings.number("convex_start"),
+            price=price,
+            iteration=0,
+            evaluations=1,
+            small=0,
+            failed=0,
+            seconds=0.0,
+            best_alpha=alpha,
+            best_objective=sample.objective,
+            best_violation=violation,
+            status=RunStatus.RUNNING,
+            reason="",
+            history=History(),
+        )
+        if wrong:
+            state.status = RunStatus.FAILED
+            state.reason = f"the initial design cannot be evaluated: {wrong}"
+        else:
+            self._propose(state)
+        return self._finish(state, sample, alpha, 0.0, not wrong, began)
+
+    def step(self, state: State) -> State:
+        """One iteration: evaluate the proposed design, judge it, adapt, and propose the next.
+
+        Raises ValueError where the state is not running.
+        """
+        if not state.running:
+            raise ValueError(f"the run has ended: {state.reason}")
+        began = self.clock()
+        state = replace(state, iteration=state.iteration + 1, evaluations=state.evaluations + 1)
+        tried, origin = state.trial, state.alpha
+        sample = self.problem.evaluate(tried)
+        wrong = failure(sample)
+        accepted = False
+        if wrong:
+            self._retreat(state, wrong)
+        else:
+            accepted = self._judge(state, sample)
+        if state.running:
+            self._propose(state)
+        change = float(np.abs(tried - origin).max(initial=0.0))
+        return self._finish(state, sample, tried, change, accepted, began)
+
+    def reopen(self, state: State) -> State:
+        """The state under the present limits: a run that a moved limit or tolerance ended goes on."""
+        state = replace(state)
+        state.status, state.reason = verdict(state, self._move(state), self.settings)
+        return state
+
+    # The steps of the loop.
+
+    def _judge(self, state: State, sample: Sample) -> bool:
+        """Accept or reject the evaluated trial and adapt what depends on that; whether it was accepted."""
+        settings = self.settings
+        before = merit(state.objective, state.constraint_rows, state.price)
+        after = merit(sample.objective, sample.constraint_rows, state.price)
+        actual = before - after
+        ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
+        # A decrease that rounding decides is none: both sums carry it.
+        negligible = settings.number("decrease_tolerance") * abs(state.objective)
+        small = abs(actual) <= negligible and abs(state.predicted) <= negligible
+        state.small = state.small + 1 if small else 0
+        state.failed = 0
+        violation = scaled_violation(sample)
+        accepted = not self.trusted or ratio >= settings.number("accept_ratio")
+        state.convex = next_convex(state.convex, ratio, actual < state.predicted, settings)
+        state.trust = next_trust(state.trust, ratio, settings) if self.trusted else 1.0
+        if better(sample.objective, violation, state, settings.tolerance):
+            state.best_alpha, state.best_objective, state.best_violation = (
+                state.trial,
+                sample.objective,
+                violation,
+            )
+        if accepted:
+            state.steps = np.stack([state.steps[1], state.trial - state.alpha])
+            state.shift = next_shift(state.shift, state.steps, settings)
+            state.alpha = state.trial
+            state.objective, state.violation = sample.objective, violation
+            state.rows, state.gradients = sample.rows, sample.gradients
+            state.constraint_rows = sample.constraint_rows
+            state.constraint_gradients = sample.constraint_gradients
+        return accepted
+
+    def _retreat(self, state: State, wrong: str) -> None:
+        """After a failed evaluation: a smaller box around the iterate, or the end after too many in a row."""
+        state.failed += 1
+        state.small = 0
+        move = self._move(state)
+        state.trust = min(state.trust, move) * 0.5
+        if state.failed > self.settings.number("failures"):
+            state.status = RunStatus.FAILED
+            state.reason = (
+                f"{state.failed} evaluations in a row failed, the last one because {wrong}; "
+                "the best design so far is kept"
+            )
+
+    def _propose(self, state: State) -> None:
+        """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
+        model = self._approximate(state)
+        lower, upper = self._box(state, model)
+        optimum = solve(model, lower, upper, self.problem.linear, state.price)
+        for weight in RESCUE_WEIGHTS:
+            if optimum.converged:
+                break
+            steepest = float(np.abs(model.slopes[: model.n_objective]).max())
+            model = replace(model, kappa=model.kappa + weight * steepest / self.range)
+            optimum = solve(model, lower, upper, self.problem.linear, state.price)
+        promised, constraints = model.model(optimum.x)
+        before = merit(state.objective, state.constraint_rows, state.price)
+        state.trial = optimum.x
+        state.predicted = before - merit(promised, constraints, state.price)
+        state.kkt = self._kkt(state, model, optimum) if optimum.converged else float("nan")
+        if not optimum.converged and not state.predicted > 0.0:
+            state.status = RunStatus.FAILED
+            state.reason = "the approximate subproblem could not be solved; the best design so far is kept"
+        if len(state.price) and state.violation > self.settings.tolerance:
+            bought = optimum.multipliers[model.n_objective :] >= 0.99 * state.price
+            dearest = PRICE_CEILING * first_price(state.sample, self.settings)
+            dearer = np.minimum(PRICE_GROWTH * state.price, np.maximum(dearest, state.price))
+            state.price = np.where(bought, dearer, state.price)
+
+    def _approximate(self, state: State) -> Approximation:
+        settings = self.settings
+        highest = float(state.rows.max())
+        near = state.rows >= highest - settings.number("peak_window") * abs(highest)
+        chosen = np.flatnonzero(near)[: int(settings.number("peaks"))]
+        slopes = np.concatenate(
+            [state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))]
+        )
+        distance = state.shift * self.range
+        below = distance
+        if settings.flag("zero_shift"):
+            # A variable at zero would have its shift on top of it.
+            below = np.maximum(state.alpha, 1e-9 * self.range)
+        steepest = float(np.abs(state.gradients[chosen]).max())
+        return Approximation(
+            state.alpha,
+            below,
+            distance,
+            np.concatenate([state.rows[chosen], state.constraint_rows]),
+            slopes,
+            len(chosen),
+            settings.number("power"),
+            settings.flag("sign_rule"),
+            state.convex * steepest / self.range,
+        )
+
+    def _box(self, state: State, model: Approximation) -> tuple[Floats, Floats]:
+        """Bounds, move limit, trust box, and the margin that keeps x strictly between its shifts."""
+        settings = self.settings
+        reach = np.minimum(settings.number("move_limit"), state.trust * self.range)
+        below, above = reach, reach
+        if not model.linear:
+            share = 1.0 - settings.number("shift_margin")
+            if not settings.flag("zero_shift"):
+                below = np.minimum(below, share * model.below)
+            elif float(self.lower.min()) <= 0.0:
+                below = np.where(self.lower > 0.0, below, np.minimum(below, (1.0 - 1e-3) * model.below))
+            if not model.linear_above:
+                above = np.minimum(above, share * model.above)
+        return np.maximum(self.lower, state.alpha - below), np.minimum(self.upper, state.alpha + above)
+
+    # Measures.
+
+    def _kkt(self, state: State, model: Approximation, optimum: Optimum) -> float:
+        """The projected KKT residual at the iterate with the subproblem's multipliers, relative to max
+        |dU/dalpha|.
+
+        The largest of: what a step along the negative gradient of the Lagrangian, scaled by the largest
+        gradient entry, moves within the bounds; the gap of competing rows that carry a multiplier; the slack
+        of volume rows that carry one. At an optimum the subproblem returns the iterate and its multipliers,
+        and all are zero.
+        """
+        steepest = float(np.abs(state.gradients[0]).max(initial=0.0))
+        if steepest == 0.0:
+            return 0.0
+        linear = self.problem.linear
+        n_obj = model.n_objective
+        gradient = np.einsum("r,ri->i", optimum.multipliers, model.slopes)
+        gradient = (gradient + np.einsum("r,ri->i", optimum.linear_multipliers, linear.A)) / steepest
+        moved = np.abs(state.alpha - np.clip(state.alpha - gradient, self.lower, self.upper)).max(initial=0.0)
+        gaps = optimum.multipliers[:n_obj] * (model.values[:n_obj].max() - model.values[:n_obj])
+        slack = np.where(linear.equal, 0.0, optimum.linear_multipliers * linear.excess(state.alpha))
+        held = optimum.multipliers[n_obj:] * state.constraint_rows
+        complementarity = float(np.abs(gaps).sum() + np.abs(slack).sum() + np.abs(held).sum()) / steepest
+        return max(float(moved), complementarity)
+
+    def _move(self, state: State) -> float:
+        return float((np.abs(state.trial - state.alpha) / self.range).max(initial=0.0))
+
+    def _finish(
+        self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
+    ) -> State:
+        """Look at the stops and write the history's row."""
+        state.status, state.reason = verdict(state, self._move(state), self.settings)
+        state.seconds += self.clock() - began
+        state.history = state.history.extended(
+            sample,
+            self.problem.linear.excess(design),
+            change,
+            state.evaluations,
+            state.seconds,
+            state.kkt,
+            accepted,
+        )
+        return state
+
+
+def run(
+    optimizer: Gsao,
+    state: State | None = None,
+    *,
+    on_iteration: Callable[[State], None] | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+) -> State:
+    """Drive an optimiser to its end, from `state` or from the start.
+
+    on_iteration sees every new state, the first included. Between iterations stop_requested is asked; if it
+    says yes the state is returned still running, and `run` continues from it as if nothing had been.
+    """
+    if state is None:
+        state = optimizer.start()
+        if on_iteration is not None:
+            on_iteration(state)
+    while state.running:
+        if stop_requested is not None and stop_requested():
+            break
+        state = optimizer.step(state)
+        if on_iteration is not None:
+            on_iteration(state)
+    return state

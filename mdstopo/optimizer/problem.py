@@ -1,0 +1,102 @@
+"""What an optimiser may know of a problem: a box, linear rows, and samples of the functions. No mechanics.
+
+    minimise    U(x) = max_r f_r(x)
+    subject to  c_j(x) <= 0,   A x <= b or A x = b,   lower <= x <= upper
+
+The rows f_r are those pieces of U that compete at a design (the peaks of a maximum over time); which ones
+there are may change from design to design.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.status import Status
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class LinearRows:
+    """Linear rows (Eq. 14): A x <= b, and A x = b where `equal`.
+
+    A: (m, N); b: (m,); equal: (m,). An `at least` row is written with the signs of A and b turned.
+    """
+
+    A: Floats
+    b: Floats
+    equal: Bools
+
+    @classmethod
+    def none(cls, n: int) -> "LinearRows":
+        """No rows at all, for `n` variables."""
+        return cls(np.zeros((0, n)), np.zeros(0), np.zeros(0, dtype=np.bool_))
+
+    def __len__(self) -> int:
+        return len(self.b)
+
+    def excess(self, x: Floats) -> Floats:
+        """A x - b, (m,): positive where a limit is exceeded. Summed in a fixed order, whatever the
+        threads."""
+        return np.asarray(np.einsum("ij,j->i", self.A, x) - self.b)
+
+
+def _no_rows() -> Floats:
+    return np.zeros(0)
+
+
+def _no_gradients() -> Floats:
+    return np.zeros((0, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One design, evaluated.
+
+    objective: U, the number to be minimised, equal to rows[0].
+    rows (R,), gradients (R, N): the competing pieces of U, highest first.
+    constraint_rows (C,), constraint_gradients (C, N): nonlinear constraints, feasible where <= 0.
+    status: anything but `Status.OK` means the evaluation failed; values may then be missing.
+    message: what a failure was about (the member, the time), in words; may be empty.
+    info: what the driver should record with the iterate, number or array by name (`objectives`, `peak_time`).
+    The
+        names and shapes must not change from sample to sample of one problem.
+    """
+
+    objective: float
+    rows: Floats = field(default_factory=_no_rows)
+    gradients: Floats = field(default_factory=_no_gradients)
+    constraint_rows: Floats = field(default_factory=_no_rows)
+    constraint_gradients: Floats = field(default_factory=_no_gradients)
+    status: Status = Status.OK
+    message: str = ""
+    info: Mapping[str, Floats | float] = field(default_factory=dict)
+
+
+class Problem(Protocol):
+    """The duties of a problem.
+
+    1. `initial`, `lower`, `upper` (N,) and `linear` never change; lower <= upper; `initial` may be
+    infeasible. 2. `evaluate` is a pure function of x: the same bits in, the same bits out, or resumed runs
+    differ. 3. `evaluate` never raises because of x: a design that cannot be computed comes back with a
+    status. 4. `gradient=False` may leave `gradients` and `constraint_gradients` empty.
+    """
+
+    @property
+    def initial(self) -> Floats: ...
+
+    @property
+    def lower(self) -> Floats: ...
+
+    @property
+    def upper(self) -> Floats: ...
+
+    @property
+    def linear(self) -> LinearRows: ...
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample: ...

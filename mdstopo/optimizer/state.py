@@ -1,0 +1,197 @@
+"""The whole state of an optimisation between two iterations: arrays and numbers, nothing else.
+
+`State.to_arrays` and `State.from_arrays` are inverse to the bit, so that a resumed run is exact by
+construction: there is no other place in which the optimiser remembers anything.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.optimizer.problem import Floats, Sample
+from mdstopo.status import RunStatus, Status
+
+Array = NDArray[Any]
+
+
+@dataclass(slots=True)
+class History:
+    """One row per evaluated design, row 0 the start; K + 1 rows after K iterations.
+
+    objective (K+1,): U, NaN where the evaluation failed. info: what the samples report, each (K+1, ...).
+    constraints (K+1, m): A x - b. nonlinear (K+1, C): c. change (K+1,): largest |change of alpha| against the
+    iterate that the step started from. evaluations (K+1,): so far. seconds (K+1,): wall time so far. kkt
+    (K+1,): projected KKT residual of the best iterate so far relative to the largest |dU/dalpha|. accepted
+    (K+1,): was the design taken?
+    """
+
+    objective: list[float] = field(default_factory=list)
+    constraints: list[Floats] = field(default_factory=list)
+    nonlinear: list[Floats] = field(default_factory=list)
+    change: list[float] = field(default_factory=list)
+    evaluations: list[int] = field(default_factory=list)
+    seconds: list[float] = field(default_factory=list)
+    kkt: list[float] = field(default_factory=list)
+    accepted: list[bool] = field(default_factory=list)
+    info: dict[str, list[Floats]] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.objective)
+
+    def extended(
+        self,
+        sample: Sample,
+        constraints: Floats,
+        change: float,
+        evaluations: int,
+        seconds: float,
+        kkt: float,
+        accepted: bool,
+    ) -> "History":
+        """This history and one row more; the receiver stays as it is. Where the sample failed its values are
+        NaN."""
+        ok = sample.status is Status.OK
+        nonlinear = sample.constraint_rows
+        if not ok:
+            nonlinear = np.full_like(self.nonlinear[0] if self.nonlinear else nonlinear, np.nan)
+        names = self.info if self.info else dict.fromkeys(sample.info)
+        rows = {name: _reported(sample, name, self.info.get(name)) for name in names}
+        return History(
+            [*self.objective, float(sample.objective) if ok else float("nan")],
+            [*self.constraints, constraints],
+            [*self.nonlinear, nonlinear],
+            [*self.change, change],
+            [*self.evaluations, evaluations],
+            [*self.seconds, seconds],
+            [*self.kkt, kkt],
+            [*self.accepted, accepted],
+            {name: [*self.info.get(name, []), row] for name, row in rows.items()},
+        )
+
+    def to_arrays(self) -> dict[str, Array]:
+        """Every column as an array, by name; the columns of `info` as `info/<name>`."""
+        out: dict[str, Array] = {}
+        for f in fields(self):
+            if f.name != "info":
+                out[f.name] = np.array(getattr(self, f.name), dtype=_COLUMN_TYPES.get(f.name, np.float64))
+        out |= {f"info/{name}": np.array(rows, dtype=np.float64) for name, rows in self.info.items()}
+        return out
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Array]) -> "History":
+        """The inverse of `to_arrays`."""
+        out = cls()
+        for name, column in arrays.items():
+            head, _, key = name.partition("/")
+            if head == "info":
+                out.info[key] = list(np.asarray(column, dtype=np.float64))
+            elif column.ndim == 1:
+                setattr(out, name, column.tolist())
+            else:
+                setattr(out, name, list(np.asarray(column, dtype=np.float64)))
+        return out
+
+
+def _reported(sample: Sample, name: str, before: list[Floats] | None) -> Floats:
+    """What the sample reports under a name; NaN in the shape of earlier rows where it reports nothing."""
+    if name in sample.info:
+        return np.asarray(sample.info[name], dtype=np.float64)
+    return np.full_like(before[0], np.nan) if before else np.array(np.nan)
+
+
+_COLUMN_TYPES: dict[str, type] = {"evaluations": np.int64, "accepted": np.bool_}
+
+
+@dataclass(slots=True)
+class State:
+    """What the optimiser knows after an iteration.
+
+    The iterate and what was found there: `alpha` (N,), `objective`, `rows` (R,), `gradients` (R, N),
+    `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (largest c, or 0).
+    The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
+    the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
+    shifts, `steps` (2, N) the last two accepted steps, `trust` the half width of the trust box in ranges,
+    `convex` the relative weight of the quadratic term, `price` (C,) of violations. Counters: `iteration`,
+    `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`. The best so far:
+    `best_alpha` (N,), `best_objective`, `best_violation`.
+    """
+
+    alpha: Floats
+    objective: float
+    rows: Floats
+    gradients: Floats
+    constraint_rows: Floats
+    constraint_gradients: Floats
+    violation: float
+    trial: Floats
+    predicted: float
+    kkt: float
+    shift: Floats
+    steps: Floats
+    trust: float
+    convex: float
+    price: Floats
+    iteration: int
+    evaluations: int
+    small: int
+    failed: int
+    seconds: float
+    best_alpha: Floats
+    best_objective: float
+    best_violation: float
+    status: RunStatus
+    reason: str
+    history: History
+
+    @property
+    def running(self) -> bool:
+        """Whether another iteration is due."""
+        return self.status is RunStatus.RUNNING
+
+    @property
+    def sample(self) -> Sample:
+        """The iterate's function values as a sample."""
+        return Sample(
+            self.objective,
+            self.rows,
+            self.gradients,
+            self.constraint_rows,
+            self.constraint_gradients,
+            Status.OK,
+        )
+
+    def to_arrays(self) -> dict[str, Array]:
+        """The state as arrays by name (numbers as 0-d arrays, text as UTF-8 bytes, `history/<column>`)."""
+        out: dict[str, Array] = {}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, History):
+                out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
+            elif isinstance(value, str):
+                out[f.name] = np.frombuffer(value.encode(), dtype=np.uint8).copy()
+            else:
+                out[f.name] = np.array(value)
+        return out
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, Array]) -> "State":
+        """The inverse of `to_arrays`. Raises KeyError naming the first array that is missing."""
+        values: dict[str, object] = {}
+        history: dict[str, Array] = {}
+        for name, array in arrays.items():
+            if name.startswith("history/"):
+                history[name.removeprefix("history/")] = np.asarray(array)
+        for f in fields(cls):
+            if f.name == "history":
+                values[f.name] = History.from_arrays(history)
+                continue
+            array = np.asarray(arrays[f.name])
+            if f.name in ("status", "reason"):
+                text = array.tobytes().decode()
+                values[f.name] = RunStatus(text) if f.name == "status" else text
+            else:
+                values[f.name] = array.item() if array.ndim == 0 else np.array(array)
+        return cls(**values)  # type: ignore[arg-type]

@@ -1,0 +1,30 @@
+"""Stored energy of the design members, g = sum alpha^mu V (Eq. 21), over time; its value, rate and derivatives.
+
+Along the motion dg/dt = sum over pairs of E_xi . xi', and dg/dq = T^T E_xi: both from the sums of one force pass.
+"""
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import member_sums
+from mdstopo.mechanics.geometry import add_pair_force, relative_pose
+
+
+@kernel
+def energy_at(pair, block, member, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
+    """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
+    relative_pose(pair, q, v, rel[0])
+    member_sums(block, member, strength, rel, np.int64(1), np.bool_(False), sums)
+    value = 0.0
+    rate = 0.0
+    for p in range(pair.shape[0]):
+        value += sums[0, p, 3]
+        rate += sums[0, p, 4] * rel[0, p, 4] + sums[0, p, 5] * rel[0, p, 5] + sums[0, p, 6] * rel[0, p, 6]
+    return value, rate
+
+
+@kernel
+def energy_slope(pair, rel, pull, weight, out):  # type: ignore[no-untyped-def]
+    """out (n,) += weight dg/dq from the relative poses and E_xi (n_pair, 3) of one state."""
+    for p in range(pair.shape[0]):
+        add_pair_force(pair, rel, p, weight * pull[p, 0], weight * pull[p, 1], weight * pull[p, 2], out)

@@ -1,0 +1,213 @@
+"""The peaks of a response in continuous time.
+
+Samples (stages of the steps, start and end) with values and rates bracket every change of sign of dg/dt; in each
+bracket the root is found on the method's own interpolation, so the peak is where the discrete motion has it, never on
+a grid. At a start from rest dg/dt = 0 without a peak. What competes with the highest is returned, highest first, the
+earlier first where equal. For minima everything is done to -g.
+"""
+
+import numpy as np
+
+from mdstopo.integrators.contract import point_of, sample
+from mdstopo.integrators.steps import step_at
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import SUMS
+from mdstopo.mechanics.geometry import POSE
+from mdstopo.responses.energy import energy_at
+
+#: columns of a peak: time, value, step, fraction of it
+TIME, VALUE, STEP, FRACTION = range(4)
+
+
+@kernel
+def cubic_peak(da, db, slope):  # type: ignore[no-untyped-def]
+    """Where in (0, 1) the cubic with end rates da > 0 >= db and mean rate slope has its peak."""
+    # its rate: da + 2 half s + square s^2
+    half = 3.0 * slope - 2.0 * da - db
+    square = 3.0 * (da + db - 2.0 * slope)
+    root = np.sqrt(max(half * half - square * da, 0.0))
+    s = da / (root - half) if root - half > 0.0 else 0.5
+    return s if s > 0.0 and s < 1.0 else da / (da - db)
+
+
+@kernel
+def cubic_dip(da, db, slope):  # type: ignore[no-untyped-def]
+    """Where the cubic has an extremum although its rates at both ends have one sign; -1 where it has none."""
+    half = 3.0 * slope - 2.0 * da - db
+    square = 3.0 * (da + db - 2.0 * slope)
+    if square == 0.0 or half * half - square * da <= 0.0:
+        return -1.0
+    s = -half / square
+    return s if s > 0.0 and s < 1.0 else -1.0
+
+
+@kernel
+def keep_peak(peaks, found, time, value):  # type: ignore[no-untyped-def]
+    """Insert a peak, highest first and the earlier first where equal; return how many are kept."""
+    rows = peaks.shape[0]
+    place = found
+    while place > 0 and (
+        value > peaks[place - 1, 1] or (value == peaks[place - 1, 1] and time < peaks[place - 1, 0])
+    ):
+        place -= 1
+    if place >= rows:
+        return found
+    for i in range(min(found, rows - 1), place, -1):
+        peaks[i, 0] = peaks[i - 1, 0]
+        peaks[i, 1] = peaks[i - 1, 1]
+    peaks[place, 0] = time
+    peaks[place, 1] = value
+    return min(found + 1, rows)
+
+
+@kernel
+def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-def]
+    """Sort samples t, g, d (S,) into brackets (S, 2): index of the left sample, and where between to look first.
+
+    Peaks at the ends of time go to `peaks` at once. Brackets that cannot hold a peak within `closeness` of the
+    highest sample are dropped. Returns the numbers of brackets and of peaks.
+    """
+    samples = t.shape[0]
+    highest = -np.inf
+    for i in range(samples):
+        highest = max(highest, g[i])
+    found = 0
+    if d[0] < 0.0 or (d[0] == 0.0 and g[0] >= g[1] and d[1] <= 0.0):
+        found = keep_peak(peaks, found, t[0], g[0])
+    if d[samples - 1] > 0.0:
+        found = keep_peak(peaks, found, t[samples - 1], g[samples - 1])
+    count = 0
+    for i in range(samples - 1):
+        width = t[i + 1] - t[i]
+        da = d[i]
+        db = d[i + 1]
+        # a bound on the value inside, from both tangents
+        bound = max(g[i] + max(da, 0.0) * width, g[i + 1] + max(-db, 0.0) * width)
+        if width <= 0.0 or bound < highest - closeness * abs(highest):
+            continue
+        slope = (g[i + 1] - g[i]) / width
+        if da > 0.0 and db <= 0.0:
+            bracket[count, 0] = i
+            bracket[count, 1] = cubic_peak(da, db, slope)
+            count += 1
+        elif (da > 0.0 and db > 0.0) or (da < 0.0 and db < 0.0):
+            s = cubic_dip(da, db, slope)
+            if s > 0.0:
+                bracket[count, 0] = i
+                bracket[count, 1] = s
+                count += 1
+    return count, found
+
+
+@kernel
+def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, work):  # type: ignore[no-untyped-def]
+    """Fill peaks (rows, 4) with the highest peaks of sign g (VALUE holds g); return how many.
+
+    Only peaks within `closeness` (relative) of the highest are refined and kept.
+    """
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    q = np.empty(n)
+    v = np.empty(n)
+    rel = np.empty((1, n_pair, POSE))
+    sums = np.empty((1, n_pair, SUMS))
+    pair = model.pair
+    block = model.block
+    member = model.member
+    room = steps.index[count, 0] + 2
+    t = np.empty(room)
+    g = np.empty(room)
+    d = np.empty(room)
+    samples = 2 + sample(steps, count, damped, t[1:], g[1:], d[1:])
+    t = t[:samples]
+    g = g[:samples]
+    d = d[:samples]
+    for i in range(1, samples - 1):
+        g[i] *= sign
+        d[i] *= sign
+    for end in range(2):
+        i = end * (samples - 1)
+        state = steps.state[end * count]
+        value, rate = energy_at(pair, block, member, strength, state[0], state[1], rel, sums)
+        t[i] = steps.t[end * count]
+        g[i] = sign * value
+        d[i] = sign * rate
+    work[0] += 2
+    guessed = np.empty(samples, np.bool_)
+    for i in range(samples):
+        guessed[i] = np.isnan(d[i])
+    for i in range(1, samples - 1):
+        if guessed[i]:  # the slope of the parabola through the neighbours
+            left = (g[i] - g[i - 1]) / (t[i] - t[i - 1])
+            right = (g[i + 1] - g[i]) / (t[i + 1] - t[i])
+            d[i] = (left * (t[i + 1] - t[i]) + right * (t[i] - t[i - 1])) / (t[i + 1] - t[i - 1])
+    bracket = np.empty((samples, 2))
+    brackets, found = brackets_of(t, g, d, closeness, bracket, peaks)
+    span = t[samples - 1] - t[0] + abs(t[0]) + abs(t[samples - 1])
+    for j in range(brackets):
+        i = int(bracket[j, 0])
+        a = t[i]
+        b = t[i + 1]
+        crossing = d[i] > 0.0 and d[i + 1] <= 0.0
+        time = a + bracket[j, 1] * (b - a)
+        rises = not guessed[i]
+        falls = not guessed[i + 1]
+        if not rises:
+            a = t[i - 1]
+        if not falls:
+            b = t[i + 2]
+        # the secant begins with the end that is nearer in rate
+        nearer = i if abs(d[i]) < abs(d[i + 1]) else i + 1
+        x0 = t[nearer]
+        d0 = d[nearer]
+        value = g[i]
+        for _ in range(60):
+            k = step_at(steps.t, count, time)
+            c = (time - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
+            point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
+            work[0] += 1
+            value, rate = energy_at(pair, block, member, strength, q, v, rel, sums)
+            value *= sign
+            rate *= sign
+            if not crossing and not (d[i] > 0.0 and rate < 0.0) and not (d[i] < 0.0 and rate > 0.0):
+                break  # the dip of the cubic was none of the motion's
+            if not crossing:
+                crossing = rises = falls = True
+                if rate < 0.0:
+                    b = time
+                else:
+                    a = time
+            elif rate > 0.0:
+                a = time
+                rises = True
+            else:
+                b = time
+                falls = True
+            if rate == 0.0 or b - a <= 4e-16 * span:
+                break
+            step = -rate * (time - x0) / (rate - d0) if rate != d0 else 0.0
+            x0 = time
+            d0 = rate
+            following = time + step
+            if step == 0.0 or not (following > a and following < b):
+                following = 0.5 * (a + b)
+            if abs(following - time) <= 1e-14 * span:
+                break
+            time = following
+        if crossing and rises and falls:
+            found = keep_peak(peaks, found, time, value)
+    if found == 0:
+        best = 0
+        for i in range(samples):
+            if g[i] > g[best]:
+                best = i
+        found = keep_peak(peaks, found, t[best], g[best])
+    kept = 1
+    while kept < found and peaks[kept, 1] >= peaks[0, 1] - closeness * abs(peaks[0, 1]):
+        kept += 1
+    for i in range(kept):
+        k = step_at(steps.t, count, peaks[i, 0])
+        peaks[i, 1] *= sign
+        peaks[i, 2] = k
+        peaks[i, 3] = (peaks[i, 0] - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
+    return kept

@@ -1,0 +1,191 @@
+"""A case and one of its load cases, compiled into the arrays that the kernels need (`Model`), once.
+
+What a scene lacks is absent from the arrays: no ground without a member tied to it, no damping columns read where
+nothing is damped, loads through the centre of mass folded into one table of generalised forces.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mdstopo.case.model import GROUND, Case, Load, LoadCase, MemberGroup, SpringLaw
+from mdstopo.scene.model import VECTOR, FloatArray, Model
+from mdstopo.scene.signals import breakpoints, segment_values
+
+ELASTIC, VISCOUS = 0, 1
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One load case, ready to be computed.
+
+    model: the arrays; bodies: names in the order of the state (ground last, where it is there); n_bodies: those
+    that move; damped: whether any force depends on velocity; skipped: what was left out, and why.
+    """
+
+    load_case: LoadCase
+    model: Model
+    bodies: tuple[str, ...]
+    n_bodies: int
+    damped: bool
+    skipped: tuple[str, ...]
+
+    @cached_property
+    def n(self) -> int:
+        """Coordinates of the moving bodies."""
+        return 3 * self.n_bodies
+
+    @property
+    def start(self) -> float:
+        return self.load_case.start
+
+    @property
+    def end(self) -> float:
+        return self.load_case.end
+
+
+def compile_members(case: Case, index: dict[str, int]) -> dict[str, FloatArray]:
+    """Blocks, pairs and member arrays: what all load cases share. index: body name to its place in the state."""
+    pairs: dict[tuple[int, int], int] = {}
+    blocks, powers, first = [], [], 0
+    total = sum(-(-len(group) // VECTOR) * VECTOR for group in case.members)
+    member = np.zeros((8, total))
+    start = 0
+    for group in case.members:
+        law = _spring(group)
+        pair = pairs.setdefault((index[group.body_from], index[group.body_to]), len(pairs))
+        count = len(group)
+        stop = start + -(-count // VECTOR) * VECTOR
+        rows = member[:, start : start + count]
+        rows[0:2] = group.p_local.T
+        rows[2:4] = group.q_local.T
+        rows[4] = group.length if law.free_length is None else law.free_length
+        rows[5:8] = np.array([[law.stiffness], [law.damping], [law.preload]])
+        kind = VISCOUS if law.damping > 0.0 or law.preload != 0.0 else ELASTIC
+        blocks.append([pair, start, stop, kind, first if group.design else -1, count])
+        powers.append(group.power)
+        first += count if group.design else 0
+        start = stop
+    return {
+        "pairs": np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
+        "block": np.array(blocks, dtype=np.int64).reshape(-1, 6),
+        "power": np.array(powers, dtype=np.float64),
+        "member": member,
+        "shortest": np.array([float(group.length.min()) for group in case.members]),
+    }
+
+
+def _spring(group: MemberGroup) -> SpringLaw:
+    """The one law that the engine knows; anything else has been refused by name (`scene.refusals`)."""
+    (law,) = group.laws
+    if not isinstance(law, SpringLaw):
+        raise TypeError(f"{group.name}: no kernel for the law {law.type!r}")
+    return law
+
+
+def state_order(case: Case) -> tuple[str, ...]:
+    """Bodies as declared, and ground after them where a member is tied to it or a body has no member at all."""
+    names = tuple(body.name for body in case.bodies)
+    held = {name for group in case.members for name in (group.body_from, group.body_to)}
+    return (*names, GROUND) if GROUND in held or set(names) - held else names
+
+
+def compile_scene(case: Case, load_case: LoadCase, shared: dict[str, FloatArray]) -> Scene:
+    """The arrays of one load case; `shared` are those of `compile_members`."""
+    names = state_order(case)
+    index = {name: i for i, name in enumerate(names)}
+    n_bodies = len(load_case.bodies)
+    inv_mass = np.zeros(3 * len(names))
+    q0, v0 = np.zeros_like(inv_mass), np.zeros_like(inv_mass)
+    for i, body in enumerate(load_case.bodies):
+        inv_mass[3 * i : 3 * i + 3] = 1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia
+        q0[3 * i : 3 * i + 3] = *body.position, body.angle
+        v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
+
+    pairs, reach, shortest = _watched_pairs(names, shared)
+    times = breakpoints(load_case)
+    force = np.zeros((len(times) - 1, 3 * len(names), 2))
+    for i, body in enumerate(load_case.bodies):
+        force[:, 3 * i, 0] += body.mass * load_case.gravity[0]
+        force[:, 3 * i + 1, 0] += body.mass * load_case.gravity[1]
+    turning: list[Load] = []
+    for load in load_case.loads:
+        if load.body == GROUND:
+            continue
+        b = 3 * index[load.body]
+        force[:, b + 2] += segment_values(load.moment, times)
+        if load.frame == "global" and tuple(load.at_local) == (0.0, 0.0):
+            force[:, b] += segment_values(load.force[0], times)
+            force[:, b + 1] += segment_values(load.force[1], times)
+        elif any(np.any(segment_values(component, times)) for component in load.force):
+            turning.append(load)
+    load_force = np.zeros((len(times) - 1, len(turning), 2, 2))
+    for k, load in enumerate(turning):
+        load_force[:, k, 0] = segment_values(load.force[0], times)
+        load_force[:, k, 1] = segment_values(load.force[1], times)
+
+    block, member = shared["block"], shared["member"]
+    damped = bool(np.any(member[6] > 0.0))
+    model = Model(
+        inv_mass=inv_mass,
+        q0=q0,
+        v0=v0,
+        pair=pairs,
+        reach=reach,
+        shortest=shortest,
+        block=block,
+        power=shared["power"],
+        member=member,
+        times=times,
+        force=force,
+        load_body=np.array([index[load.body] for load in turning], dtype=np.int64),
+        load_follows=np.array([load.frame == "body" for load in turning], dtype=np.int64),
+        load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
+        load_force=load_force,
+    )
+    for array in model:
+        array.flags.writeable = False
+    return Scene(load_case, model, names, n_bodies, damped, _skipped(case, names, damped, times, turning, block))
+
+
+def _watched_pairs(
+    names: tuple[str, ...], shared: dict[str, FloatArray]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Pairs that members connect, then each body without members against ground: errors are measured on pairs."""
+    pairs = [tuple(pair) for pair in shared["pairs"].tolist()]
+    held = {body for pair in pairs for body in pair}
+    ground = len(names) - 1
+    pairs += [(ground, i) for i in range(len(names)) if i not in held and i != ground]
+    reach, shortest = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
+    for (pair, start, stop, *_), length in zip(shared["block"].tolist(), shared["shortest"], strict=True):
+        q = shared["member"][2:4, start:stop]
+        shortest[pair] = min(shortest[pair], length)
+        reach[pair] = max(reach[pair], float(np.sqrt(np.max(np.einsum("ij,ij->j", q, q)))))
+    reach[reach == 0.0] = 1.0
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2), reach, shortest
+
+
+def _skipped(
+    case: Case,
+    names: tuple[str, ...],
+    damped: bool,
+    times: FloatArray,
+    turning: list[Load],
+    block: FloatArray,
+) -> tuple[str, ...]:
+    notes = []
+    if not damped:
+        notes.append("velocity terms: nothing is damped")
+    if GROUND not in names:
+        notes.append("ground: no member is tied to it")
+    if len(times) == 2:
+        notes.append("kinks in time: all loads are smooth")
+    if not turning:
+        notes.append("load stiffness: no load turns with a body or acts off its centre of mass")
+    if not any(kind == VISCOUS for kind in block[:, 3].tolist()):
+        notes.append("damping and preload columns of the members")
+    fixed = sum(len(group) for group in case.members if not group.design)
+    if fixed:
+        notes.append(f"design gradient of {fixed} members that are no design variables")
+    return tuple(notes)

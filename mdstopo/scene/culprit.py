@@ -1,0 +1,95 @@
+"""Who is to blame: members and bodies by name when a motion cannot be computed, and the scene's frequencies.
+
+Nothing here is on the path of an evaluation that goes well.
+"""
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.scene.compile import Scene
+from mdstopo.scene.model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, FloatArray
+from mdstopo.scene.packing import pack
+from mdstopo.status import Status
+
+#: a member this much shorter than at the start, when the step collapses, is what stopped the motion
+COLLAPSED = 1e-4
+
+
+class Culprits:
+    """Names for the indices of one scene."""
+
+    def __init__(self, case: Case, scene: Scene) -> None:
+        self.case = case
+        self.scene = scene
+
+    def member(self, padded: int) -> str:
+        """A member in words, from its place in the padded arrays."""
+        for group, block in zip(self.case.members, self.scene.model.block.tolist(), strict=True):
+            i = padded - block[START]
+            if 0 <= i < block[COUNT]:
+                p, q = group.p_world[i], group.q_world[i]
+                return (
+                    f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
+                    f"({q[0]:g}, {q[1]:g}) on {group.body_to}"
+                )
+        raise IndexError(f"no member at {padded}")
+
+    def explain(self, design: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
+        """The status and its culprit, for a motion that ended at `time` in state (2, n)."""
+        where = f"at t = {time:.6g} s"
+        meeting = self._collapsed(design, state[0])
+        if meeting >= 0 and status in (Status.STEP_TOO_SMALL, Status.STEP_LIMIT, Status.NEWTON_FAILED):
+            return Status.ZERO_LENGTH, f"{self.member(meeting)}, {where}"
+        speed = np.abs(state[1, : self.scene.n]).reshape(-1, 3).max(axis=1)
+        wild = np.flatnonzero(~np.isfinite(speed))
+        body = self.scene.bodies[int(wild[0]) if wild.size else int(speed.argmax())]
+        return status, f"{where}; the fastest body is {body}"
+
+    def _collapsed(self, design: FloatArray, q: FloatArray) -> int:
+        """Padded index of the member that has shrunk to nothing while it carries a force, or -1."""
+        model = self.scene.model
+        best, found = COLLAPSED, -1
+        for block, group in zip(model.block.tolist(), self.case.members, strict=True):
+            part = slice(block[START], block[START] + block[COUNT])
+            strength = np.ones(block[COUNT])
+            if block[DESIGN] >= 0:
+                strength = design[block[DESIGN] : block[DESIGN] + block[COUNT]] ** group.power
+            member = model.member[:, part]
+            a, b = (3 * body for body in model.pair[block[PAIR]].tolist())
+            ends = []
+            for body, rows in ((a, (PX, PY)), (b, (QX, QY))):
+                c, s = np.cos(q[body + 2]), np.sin(q[body + 2])
+                x, y = member[rows[0]], member[rows[1]]
+                ends.append(np.array([q[body] + c * x - s * y, q[body + 1] + s * x + c * y]))
+            ratio = np.hypot(*(ends[1] - ends[0])) / group.length
+            carries = strength * (member[STIFFNESS] * member[L0] - member[PRELOAD]) != 0.0
+            ratio = np.where(carries, ratio, np.inf)
+            i = int(ratio.argmin())
+            if ratio[i] < best:
+                best, found = float(ratio[i]), block[START] + i
+        return found
+
+    def natural_frequencies(self, design: FloatArray) -> FloatArray:
+        """Angular frequencies (rad/s) of small undamped motion about the start; unstable modes are left out."""
+        model, n, pairs = self.scene.model, len(self.scene.model.inv_mass), len(self.scene.model.pair)
+        strength = model.member[5:8].copy()
+        for block, group in zip(model.block.tolist(), self.case.members, strict=True):
+            if block[DESIGN] >= 0:
+                part = slice(block[START], block[START] + block[COUNT])
+                first = block[DESIGN]
+                strength[:, part] *= design[first : first + block[COUNT]] ** group.power
+        from mdstopo.mechanics.start_entry import start_tangents
+
+        k, turn = np.zeros((1, pairs, 6, 6)), np.zeros((1, n))
+        packed = pack(model)
+        start_tangents(packed.ints, packed.floats, strength, self.scene.damped, k, turn)
+        matrix = np.zeros((n, n))
+        for p, (a, b) in enumerate(model.pair.tolist()):
+            rows = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
+            matrix[np.ix_(rows, rows)] += k[0, p]
+        for body in range(0, n, 3):
+            matrix[body : body + 3, body + 2] -= turn[0, body : body + 3]
+        root = np.sqrt(model.inv_mass)
+        values = np.linalg.eigvals(root[:, None] * matrix * root[None, :])[: len(root)].real
+        frequencies: FloatArray = np.sort(np.sqrt(values[values > 0.0]))
+        return frequencies

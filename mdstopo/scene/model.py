@@ -1,0 +1,63 @@
+"""A scene as arrays: what one load case needs to be computed, and nothing else.
+
+n_b bodies have n = 3 n_b coordinates q = (x, y, psi) each. `ground` is the last body, with infinite mass, where a
+member is tied to it; it is absent otherwise. Members live in blocks of one law and one pair of bodies, structure of
+arrays; blocks are padded to a multiple of the vector width with members of no stiffness. Loads are linear in time
+within a segment, and the integrators land on the ends of segments, so a kernel never asks on which side of a kink
+it stands. All arrays are read-only; everything is a run-time value, so a changed case compiles nothing anew.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+#: rows of `Model.member`
+PX, PY, QX, QY, L0, STIFFNESS, DAMPING, PRELOAD = range(8)
+#: columns of `Model.block`
+PAIR, START, STOP, KIND, DESIGN, COUNT = range(6)
+#: blocks are padded to a multiple of this
+VECTOR = 16
+#: members of one tile, few enough that all rows stay in the first-level cache while several poses pass over them
+TILE = 512
+
+
+class Model(NamedTuple):
+    """What is constant during every evaluation of one load case.
+
+    ============  ================  =====================================================================
+    inv_mass      (n,)              1/m, 1/m, 1/J of each body; 0 for ground
+    q0, v0        (n,)              state at the start
+    pair          (n_pair, 2)       the two bodies of each pair that members connect: P's, then Q's
+    reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
+    shortest      (n_pair,)         shortest initial length of a member, m (inf without members)
+    block         (n_block, 6)      pair, start, stop (padded), kind of law, first design variable or -1, count
+    power         (n_block,)        mu of Eq. 12
+    member        (8, M_padded)     P, Q in body frames; free length; stiffness, damping, preload at alpha = 1
+    times         (n_seg + 1,)      start, kinks of the loads, end
+    force         (n_seg, n, 2)     generalised load at the segment's start, slope in time; with gravity
+    load_body     (n_load,)         loads whose effect depends on the body's rotation: which body,
+    load_follows  (n_load,)         1 where the force turns with it, 0 where it keeps its global direction,
+    load_arm      (n_load, 2)       point of attack in body coordinates,
+    load_force    (n_seg, n_load, 2, 2)   and components, value and slope
+    ============  ================  =====================================================================
+    """
+
+    inv_mass: FloatArray
+    q0: FloatArray
+    v0: FloatArray
+    pair: IndexArray
+    reach: FloatArray
+    shortest: FloatArray
+    block: IndexArray
+    power: FloatArray
+    member: FloatArray
+    times: FloatArray
+    force: FloatArray
+    load_body: IndexArray
+    load_follows: IndexArray
+    load_arm: FloatArray
+    load_force: FloatArray

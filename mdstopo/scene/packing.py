@@ -1,0 +1,90 @@
+"""A model as two flat arrays, because every array handed to a compiled function costs about a microsecond.
+
+`pack` lays the arrays of a `Model` one after the other; `unpack`, compiled into every kernel that is called from
+Python, gives the same `Model` back as views. The first integers are the sizes.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.scene.model import FloatArray, IndexArray, Model
+
+#: bodies' coordinates, pairs, blocks, padded members, segments, turning loads
+SIZES = 6
+
+
+class Packed(NamedTuple):
+    """ints: sizes, pair, block, load_body, load_follows; floats: the rest, in the order of `Model`."""
+
+    ints: IndexArray
+    floats: FloatArray
+
+
+def pack(model: Model) -> Packed:
+    """Flatten a model.
+
+    The arrays are not flagged read-only, although nothing writes to them: the flag is part of an array's type, and
+    every kernel would be compiled twice.
+    """
+    sizes = [
+        len(model.inv_mass),
+        len(model.pair),
+        len(model.block),
+        model.member.shape[1],
+        len(model.times) - 1,
+        len(model.load_body),
+    ]
+    ints = np.concatenate(
+        [np.array(sizes, dtype=np.int64)]
+        + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows)]
+    ).astype(np.int64)
+    parts: list[Any] = [
+        model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power, model.member, model.times, model.force,
+        model.load_arm, model.load_force,
+    ]  # fmt: skip
+    floats = np.concatenate([np.asarray(a, dtype=np.float64).ravel() for a in parts])
+    return Packed(ints, floats)
+
+
+@kernel
+def unpack(ints, floats):  # type: ignore[no-untyped-def]
+    """The `Model` whose arrays are views of the packed ones."""
+    n = ints[0]
+    n_pair = ints[1]
+    n_block = ints[2]
+    padded = ints[3]
+    n_seg = ints[4]
+    n_load = ints[5]
+    i = 6
+    pair = ints[i : i + 2 * n_pair].reshape((n_pair, 2))
+    i += 2 * n_pair
+    block = ints[i : i + 6 * n_block].reshape((n_block, 6))
+    i += 6 * n_block
+    load_body = ints[i : i + n_load]
+    i += n_load
+    load_follows = ints[i : i + n_load]
+    inv_mass = floats[0:n]
+    q0 = floats[n : 2 * n]
+    v0 = floats[2 * n : 3 * n]
+    f = 3 * n
+    reach = floats[f : f + n_pair]
+    f += n_pair
+    shortest = floats[f : f + n_pair]
+    f += n_pair
+    power = floats[f : f + n_block]
+    f += n_block
+    member = floats[f : f + 8 * padded].reshape((8, padded))
+    f += 8 * padded
+    times = floats[f : f + n_seg + 1]
+    f += n_seg + 1
+    force = floats[f : f + 2 * n_seg * n].reshape((n_seg, n, 2))
+    f += 2 * n_seg * n
+    load_arm = floats[f : f + 2 * n_load].reshape((n_load, 2))
+    f += 2 * n_load
+    load_force = floats[f : f + 4 * n_seg * n_load].reshape((n_seg, n_load, 2, 2))
+    return Model(
+        inv_mass, q0, v0, pair, reach, shortest, block, power, member, times, force, load_body, load_follows,
+        load_arm, load_force,
+    )  # fmt: skip

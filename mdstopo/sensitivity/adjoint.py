@@ -1,0 +1,141 @@
+"""The exact gradient of the discretised objective: one reverse sweep over the steps, one pass over the members.
+
+The sweep starts at the step that holds the looked-at time (or spreads over all stages, for integrals), pulls the
+cotangents of the state back step by step at body level, and keeps the virtual displacement z of every stage's force
+balance. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum_s f_i (b_i . T z_s): one pass, members outside, stages
+inside. The peak's time is held fixed (envelope theorem).
+"""
+
+import numpy as np
+
+from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import SUMS, design_gradient, energy_gradient
+from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.responses.energy import energy_at, energy_slope
+from mdstopo.responses.peaks import find_peaks
+from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
+
+
+@kernel
+def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, work):  # type: ignore[no-untyped-def]
+    """Pull the cotangent mu_q (n,) of the position at fraction c of step w (c < 0: its end) back to the start.
+
+    stage_q_bar (S, n): explicit cotangents of the stage positions, or no rows. Out: z (S, n) and used (S,), 1 for the
+    stages that the sweep went through.
+    """
+    n = mu_q.shape[0]
+    lam_q = np.zeros(n)
+    lam_v = np.zeros(n)
+    lam_x = np.zeros((carried(steps), n))
+    none = np.zeros(n)
+    point = np.zeros(n)
+    for d in range(n):
+        if c < 0.0:
+            lam_q[d] = mu_q[d]
+        else:
+            point[d] = mu_q[d]
+    while w >= 0:
+        o = steps.index[w, 0]
+        end = steps.index[w + 1, 0]
+        bar = stage_q_bar[o:end] if stage_q_bar.shape[0] > 0 else stage_q_bar
+        reverse_step(
+            pair, inv_mass, tables, steps, w, c, point, none, bar, lam_q, lam_v, lam_x, z[o:end], damped, turning,
+            work,
+        )  # fmt: skip
+        used[o:end] = 1
+        point[:] = 0.0
+        c = -1.0
+        w = parent_of(steps, w)
+
+
+@kernel
+def energy_rows(  # type: ignore[no-untyped-def]
+    model, tables, strength, steps, count, damped, reduction, closeness, gradient, rows, padded, work
+):
+    """Value, time and gradient of the stored energy reduced over time.
+
+    In: reduction (MAX..FINAL), closeness (how near to the highest a peak competes, relative), gradient (wanted or not).
+    Out: rows (R, 4) time, value, step, fraction (time NaN for mean and integral); padded (R, M_padded) gradients with
+    respect to alpha^mu. Returns how many rows there are.
+    """
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    pair = model.pair
+    turning = model.load_body.shape[0] > 0
+    integral = reduction == MEAN or reduction == INTEGRAL
+    unit = model.member[5:8]
+    stages = steps.index[count, 0]
+    point = np.empty((1, 3, n))
+    q = point[0, 0]
+    v = point[0, 1]
+    rel = np.empty((1, n_pair, POSE))
+    sums = np.empty((1, n_pair, SUMS))
+    weight = np.zeros(stages if integral else 1)
+    bar = np.zeros((stages if integral else 0, n))
+    mu_q = np.empty(n)
+    pull = np.empty((n_pair, 3))
+    found = 1
+    if integral:
+        scale = 1.0 / (steps.t[count] - steps.t[0]) if reduction == MEAN else 1.0
+        value = 0.0
+        for w in range(count):
+            stage_weights(tables, steps, w, weight[steps.index[w, 0] : steps.index[w + 1, 0]])
+        for i in range(stages):
+            weight[i] *= scale
+            value += weight[i] * steps.scalar[i, 1]
+            relative_pose(pair, steps.stage[i, 0], steps.stage[i, 1], rel[0])
+            energy_slope(pair, rel[0], steps.pull[i], weight[i], bar[i])
+        rows[0, 0] = np.nan
+        rows[0, 1] = value
+        rows[0, 2] = count - 1
+        rows[0, 3] = 1.0
+    elif reduction == FINAL:
+        rows[0, 0] = steps.t[count]
+        rows[0, 2] = count - 1
+        rows[0, 3] = 1.0
+    else:
+        sign = 1.0 if reduction == MAX else -1.0
+        found = find_peaks(model, tables, strength, steps, count, damped, sign, closeness, rows, work)
+    if not gradient and reduction != FINAL:
+        return found
+    for r in range(found):
+        k = int(rows[r, 2])
+        c = rows[r, 3]
+        w = k
+        c_w = -1.0
+        mu_q[:] = 0.0
+        if not integral:
+            weight[0] = 1.0
+            if c >= 1.0 or (k == 0 and c == 0.0):
+                state = steps.state[k + 1 if c >= 1.0 else 0]
+                for d in range(n):
+                    q[d] = state[0, d]
+                    v[d] = state[1, d]
+            else:
+                w, c_w = reach(model, tables, strength, steps, count, k, c, damped, q, v, work)
+            value, _ = energy_at(pair, model.block, model.member, strength, q, v, rel, sums)
+            work[0] += 1
+            if reduction == FINAL:
+                rows[0, 1] = value
+            for p in range(n_pair):
+                for j in range(3):
+                    pull[p, j] = sums[0, p, 4 + j]
+            energy_slope(pair, rel[0], pull, weight[0], mu_q)
+        if not gradient:
+            continue
+        out = padded[r]
+        out[:] = 0.0
+        if integral or not (k == 0 and c == 0.0):  # a peak at the start is not reached by the motion
+            reached = max(stages, steps.index[w + 1, 0])
+            z = np.empty((reached, n))
+            used = np.zeros(reached, np.int64)
+            reverse_sweep(
+                pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, work
+            )
+            design_gradient(pair, model.block, model.member, steps.stage, z, used, out, work)
+        if integral:
+            energy_gradient(pair, model.block, model.member, unit, steps.stage, weight, out)
+        else:
+            energy_gradient(pair, model.block, model.member, unit, point, weight, out)
+    return found

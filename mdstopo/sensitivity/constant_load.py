@@ -1,0 +1,86 @@
+"""Constant dynamic loading: the sensitivity of the pose at one time, everything but the members' springs held fixed.
+
+At t_n inertia, damping and applied loads count as constant, so that K dq/dalpha_i = -T^T b_i f_i, and
+
+    dG/dalpha_i = V_i - f_i (b_i . T z),   z = K^+T dg/dq
+
+at alpha^mu. K is singular for free bodies: least squares of least norm, singular values below 1e-10 of the largest
+dropped. An approximation; the paper's Figure 6 shows how far it carries.
+"""
+
+import numpy as np
+
+from mdstopo.jit import entry
+from mdstopo.mechanics.assembly import (
+    SUMS,
+    design_gradient,
+    energy_gradient,
+    member_sums,
+    pair_tangents,
+    scale_members,
+    unscale_gradient,
+)
+from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.responses.energy import energy_slope
+from mdstopo.scene.model import FloatArray
+from mdstopo.scene.packing import Packed, unpack
+
+#: singular values below this times the largest are dropped
+DROPPED = 1e-10
+
+
+@entry
+def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):  # type: ignore[no-untyped-def]
+    """Fill stiffness (P, n, n) = -dF/dq at rest and slope (P, n) = dg/dq at the poses states (P, 2, n)."""
+    model = unpack(ints, floats)
+    pair = model.pair
+    n_pair = pair.shape[0]
+    rel = np.empty((1, n_pair, POSE))
+    sums = np.empty((1, n_pair, SUMS))
+    k = np.empty((n_pair, 6, 6))
+    pull = np.empty((n_pair, 3))
+    scale_members(model.block, model.power, model.member, alpha, strength)
+    for i in range(states.shape[0]):
+        relative_pose(pair, states[i, 0], states[i, 1], rel[0])
+        member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(True), sums)
+        pair_tangents(pair, rel[0], states[i, 0], sums[0], np.bool_(False), k, k)
+        for p in range(n_pair):
+            for j in range(3):
+                pull[p, j] = sums[0, p, 4 + j]
+        energy_slope(pair, rel[0], pull, 1.0, slope[i])
+        for p in range(n_pair):
+            for r in range(6):
+                for c in range(6):
+                    stiffness[i, 3 * pair[p, r // 3] + r % 3, 3 * pair[p, c // 3] + c % 3] += k[p, r, c]
+
+
+@entry
+def _gradient(ints, floats, alpha, weights, states, z, padded, out):  # type: ignore[no-untyped-def]
+    """out (N,) = sum over the poses of weight (V_i - f_i b_i . T z)."""
+    model = unpack(ints, floats)
+    used = np.ones(z.shape[0], np.int64)
+    work = np.zeros(8, np.int64)
+    padded[:] = 0.0
+    design_gradient(model.pair, model.block, model.member, states, z, used, padded, work)
+    energy_gradient(model.pair, model.block, model.member, model.member[5:8], states, weights, padded)
+    unscale_gradient(model.block, model.power, alpha, padded, out)
+
+
+def constant_load(packed: Packed, alpha: FloatArray, poses: FloatArray, weights: FloatArray) -> FloatArray:
+    """Gradient (N,) of sum_p weights_p g(q_p) with respect to alpha (N,), by constant dynamic loading.
+
+    packed: the scene. poses (P, n): q at the looked-at time (P = 1, weight 1), or at the nodes of a mean or integral
+    with their weights (P,).
+    """
+    count, n = poses.shape
+    moving = np.flatnonzero(packed.floats[:n] > 0.0)  # ground does not answer
+    members = int(packed.ints[3])
+    states = np.zeros((count, 2, n))
+    states[:, 0] = poses
+    stiffness, slope, z = np.zeros((count, n, n)), np.zeros((count, n)), np.zeros((count, n))
+    _stiffness(packed.ints, packed.floats, alpha, states, np.zeros((3, members)), stiffness, slope)
+    inverse = np.linalg.pinv(stiffness[:, moving[:, None], moving], rcond=DROPPED)
+    z[:, moving] = weights[:, None] * np.einsum("pji,pj->pi", inverse, slope[:, moving])
+    gradient = np.zeros(len(alpha))
+    _gradient(packed.ints, packed.floats, alpha, weights, states, z, np.zeros(members), gradient)
+    return gradient

@@ -1,0 +1,107 @@
+"""What is done with finished steps, whatever integrator made them: objectives, gradients, dense output."""
+
+import numpy as np
+
+from mdstopo.integrators.contract import point_of
+from mdstopo.integrators.steps import copy_rows, deflection, step_at
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import SUMS, add_loads, member_sums, unscale_gradient
+from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
+from mdstopo.mechanics.laws.spring import meeting_in
+from mdstopo.sensitivity.adjoint import energy_rows
+
+
+@kernel
+def look_at(  # type: ignore[no-untyped-def]
+    model, tables, strength, alpha, steps, count, damped, reductions, closeness, gradient, padded, rows, found, gradients,
+    meeting, work,
+):
+    """Every objective of the load case.
+
+    In: reductions (n_obj,); room: padded (R, M_padded). Out: rows (n_obj, R, 4) time, value, step, fraction; found
+    (n_obj,); gradients (n_obj, R, N); meeting (2,), see `find_meeting`.
+    """
+    find_meeting(model, strength, steps, count, meeting)
+    for j in range(reductions.shape[0]):
+        found[j] = energy_rows(
+            model, tables, strength, steps, count, damped, reductions[j], closeness, gradient, rows[j], padded, work
+        )
+        if gradient:
+            for r in range(found[j]):
+                unscale_gradient(model.block, model.power, alpha, padded[r], gradients[j, r])
+
+
+@kernel
+def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-untyped-def]
+    """meeting (2,): padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
+
+    No member can, and nothing is looked at, while no pair moves as far as its shortest member is long.
+    """
+    meeting[0] = -1
+    n_pair = model.pair.shape[0]
+    stages = steps.index[count, 0]
+    rel0 = np.empty((n_pair, POSE))
+    rel = np.empty((n_pair, POSE))
+    relative_pose(model.pair, model.q0, model.v0, rel0)
+    possible = False
+    for i in range(stages + 1):
+        last = i == stages
+        state = steps.state[count] if last else steps.stage[i]
+        relative_pose(model.pair, state[0], state[1], rel)
+        for p in range(n_pair):
+            possible = possible or not deflection(rel, rel0, model.reach, p) < model.shortest[p]
+    if not possible:
+        return
+    for i in range(stages + 1):
+        last = i == stages
+        state = steps.state[count] if last else steps.stage[i]
+        relative_pose(model.pair, state[0], state[1], rel)
+        for k in range(model.block.shape[0]):
+            p = model.block[k, 0]
+            lo = model.block[k, 1]
+            hi = lo + model.block[k, 5]
+            m = model.member
+            j = meeting_in(
+                m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
+                strength[2, lo:hi], rel0[p, 0], rel0[p, 1], rel0[p, 2], rel0[p, 3], rel[p, 0], rel[p, 1],
+                rel[p, 2], rel[p, 3],
+            )  # fmt: skip
+            if j >= 0:
+                meeting[0] = lo + j
+                meeting[1] = i
+                return
+        copy_rows(rel, rel0)
+
+
+@kernel
+def dense_states(model, tables, strength, steps, count, damped, times, out, work):  # type: ignore[no-untyped-def]
+    """out (3, T, n) = q, v, a at times (T,), a by the equations of motion (right-continuous at kinks)."""
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    rel = np.empty((1, n_pair, POSE))
+    sums = np.empty((1, n_pair, SUMS))
+    f = np.empty(n)
+    for i in range(times.shape[0]):
+        t = times[i]
+        k = step_at(steps.t, count, t)
+        if k + 1 < count and steps.t[k + 1] == t:
+            k += 1  # right-continuous
+        h = steps.t[k + 1] - steps.t[k]
+        q = out[0, i]
+        v = out[1, i]
+        c = (t - steps.t[k]) / h
+        if t == steps.t[k] or t == steps.t[k + 1]:
+            state = steps.state[k if t == steps.t[k] else k + 1]
+            for d in range(n):
+                q[d] = state[0, d]
+                v[d] = state[1, d]
+        else:
+            point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
+        relative_pose(model.pair, q, v, rel[0])
+        member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(False), sums)
+        f[:] = 0.0
+        add_loads(model, steps.index[k, 2], t, q, f)
+        for p in range(n_pair):
+            add_pair_force(model.pair, rel[0], p, sums[0, p, 0], sums[0, p, 1], sums[0, p, 2], f)
+        for d in range(n):
+            out[2, i, d] = model.inv_mass[d] * f[d]

@@ -1,0 +1,144 @@
+"""Sensitivities of all members carried through one linear map: what `direct` does a step.
+
+A step is a linear map of the changes of its start (D numbers: q, v and what the method carries) and of the force that
+each member adds at its stages. The map is found at body level by pushing unit changes through the integrator's
+tangent step; one pass over the members then applies it to all of them,
+
+    dS_i <- A dS_i + sum over stages W_s (T^T b f)_i
+
+(f at unit strength). S is stored by state, members along the rows: (D, M_padded).
+"""
+
+import numpy as np
+
+from mdstopo.integrators.contract import carried, tangent_step
+from mdstopo.jit import kernel, member_kernel
+from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
+from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
+
+#: members that are carried through together: their rows stay in the first-level cache
+STRIP = 128
+
+
+@kernel
+def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):  # type: ignore[no-untyped-def]
+    """Fill matrix (D + 1, D + 3 n_pair s) of step w, to its end (c < 0) or its fraction c.
+
+    Columns: changes of the start; then for each stage and pair the three entries of b f of a member there. Rows: changes
+    of the end; last the change of mu_q . q at the end plus that of bar_s . q_s at the stages, mu_q (n,), bar (s, n).
+    """
+    n = inv_mass.shape[0]
+    n_pair = pair.shape[0]
+    rows = carried(steps)
+    width = (2 + rows) * n
+    o = steps.index[w, 0]
+    s = steps.index[w + 1, 0] - o
+    y = np.empty(width)
+    force = np.zeros((s, n))
+    moved = np.empty((s, n))
+    rel = np.empty((n_pair, POSE))
+    dx = y[2 * n :].reshape((rows, n))
+    for j in range(width + 3 * n_pair * s):
+        y[:] = 0.0
+        stage = 0
+        if j < width:
+            if inv_mass[j % n] == 0.0:
+                matrix[:, j] = 0.0
+                continue
+            y[j] = 1.0
+        else:
+            stage = (j - width) // (3 * n_pair)
+            p = (j - width) // 3 % n_pair
+            axis = (j - width) % 3
+            if p == 0 and axis == 0:
+                relative_pose(pair, steps.stage[o + stage, 0], steps.stage[o + stage, 1], rel)
+            # a member's generalised force is -T^T b f
+            unit = -1.0
+            add_pair_force(
+                pair, rel, p, unit if axis == 0 else 0.0, unit if axis == 1 else 0.0, unit if axis == 2 else 0.0,
+                force[stage],
+            )  # fmt: skip
+        tangent_step(
+            pair, inv_mass, tables, steps, w, c, y[:n], y[n : 2 * n], dx, force, moved, damped, turning
+        )
+        value = 0.0
+        for d in range(n):
+            value += mu_q[d] * y[d]
+            for i in range(s):
+                value += bar[i, d] * moved[i, d]
+        for i in range(width):
+            matrix[i, j] = y[i]
+        matrix[width, j] = value
+        force[stage] = 0.0
+
+
+@member_kernel
+def add_three(a, b, c, x, y, z, out):  # type: ignore[no-untyped-def]
+    """out (m,) += a x + b y + c z, members along the rows."""
+    for i in range(out.shape[0]):
+        out[i] += a * x[i] + b * y[i] + c * z[i]
+
+
+@kernel
+def apply_matrix(pair, block, member, stage, s, matrix, first, last, adding, S, target):  # type: ignore[no-untyped-def]
+    """target (last - first, M_padded) = (adding: +=) rows first..last of matrix times the changes S and member forces.
+
+    In: stage (s, 3, n) the states of the step's stages, S (D, M_padded). target may be S itself. Only design members.
+    """
+    n_pair = pair.shape[0]
+    width = S.shape[0]
+    rel = np.empty((s, n_pair, POSE))
+    for i in range(s):
+        relative_pose(pair, stage[i, 0], stage[i, 1], rel[i])
+    push = np.empty((3 * s, STRIP))
+    fresh = np.empty((last - first, STRIP))
+    for k in range(block.shape[0]):
+        if block[k, 4] < 0:
+            continue
+        p = block[k, 0]
+        for lo in range(block[k, 1], block[k, 2], STRIP):
+            hi = min(lo + STRIP, block[k, 2])
+            wide = hi - lo
+            px = member[0, lo:hi]
+            py = member[1, lo:hi]
+            qx = member[2, lo:hi]
+            qy = member[3, lo:hi]
+            l0 = member[4, lo:hi]
+            ks = member[5, lo:hi]
+            cs = member[6, lo:hi]
+            ps = member[7, lo:hi]
+            for i in range(3 * s):
+                r = rel[i // 3, p]
+                axis = i % 3
+                ux = 1.0 if axis == 0 else 0.0
+                uy = 1.0 if axis == 1 else 0.0
+                ut = 1.0 if axis == 2 else 0.0
+                o = push[i, :wide]
+                o[:] = 0.0
+                if block[k, 3] == 0:
+                    elastic_design(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], ux, uy, ut, o)
+                else:
+                    viscous_design(
+                        px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6], ux, uy, ut, o
+                    )
+            for i in range(first, last):
+                o = fresh[i - first, :wide]
+                for g in range(wide):
+                    o[g] = target[i - first, lo + g] if adding else 0.0
+                for group in range(width // 3 + s):
+                    if group < width // 3:
+                        j = 3 * group
+                        x = S[j, lo:hi]
+                        y = S[j + 1, lo:hi]
+                        z = S[j + 2, lo:hi]
+                    else:
+                        own = 3 * group - width
+                        j = width + own * n_pair + 3 * p
+                        x = push[own, :wide]
+                        y = push[own + 1, :wide]
+                        z = push[own + 2, :wide]
+                    if matrix[i, j] != 0.0 or matrix[i, j + 1] != 0.0 or matrix[i, j + 2] != 0.0:
+                        add_three(matrix[i, j], matrix[i, j + 1], matrix[i, j + 2], x, y, z, o)
+            for i in range(last - first):
+                for g in range(wide):
+                    target[i, lo + g] = fresh[i, g]

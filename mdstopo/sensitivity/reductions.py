@@ -1,0 +1,5 @@
+"""Reductions of a response over time: the words of the case file and the codes of the kernels."""
+
+MAX, MIN, MEAN, INTEGRAL, FINAL = range(5)
+
+REDUCTIONS = {"max": MAX, "min": MIN, "mean": MEAN, "integral": INTEGRAL, "final": FINAL}

@@ -1,0 +1,67 @@
+"""What a careful user would ask of a finished design, asked for them."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import GROUND, Case, VolumeRow
+from mdstopo.store.contents import Motion
+
+Floats = NDArray[np.float64]
+
+_USED = 0.9  # share of a volume limit below which it is far from active
+_LARGER = 1.05  # ratio of relative motions from which one exceeds the other
+
+
+def advise(
+    case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]
+) -> tuple[str, ...]:
+    """Warnings about the final design `alpha`.
+
+    before, after: the motion by load case with the starting and the final design. Both warnings are signs of
+    the soft branch: stored energy also falls when members that restrain the bodies are taken away.
+    """
+    found = []
+    for row in case.constraints:
+        if isinstance(row, VolumeRow) and row.sense == "limit" and row.bound > 0.0:
+            share = float(row.coefficients @ alpha) / row.bound
+            if share < _USED:
+                found.append(
+                    f"only {share:.1%} of the volume limit {row.bound:g} of {', '.join(row.groups)} is used: "
+                    "the objective may have been lowered by removing what restrains; "
+                    "spend the volume (`equals`), or bound a displacement"
+                )
+    for name, motion in after.items():
+        if not (motion.status.ok and before[name].status.ok):
+            continue
+        earlier, later = relative_motion(case, before[name]), relative_motion(case, motion)
+        if later > _LARGER * earlier:
+            found.append(
+                f"in load case {name} the bodies that members join move {later:.4g} m against each other, "
+                f"more than the {earlier:.4g} m of the starting design: it restrains them less; "
+                "if that matters, bound a displacement"
+            )
+    return tuple(found)
+
+
+def relative_motion(case: Case, motion: Motion) -> float:
+    """Largest displacement, in m, of a body's centre of mass seen from another one that members tie it to.
+
+    The displacement is that of an observer riding on the first body, since the start.
+    """
+    index = {body.name: i for i, body in enumerate(case.bodies)}
+    pairs = {(group.body_from, group.body_to) for group in case.members if group.design}
+    largest = 0.0
+    for one, other in sorted(pairs):
+        if one == GROUND:
+            one, other = other, one
+        first = motion.q[:, 3 * index[one] : 3 * index[one] + 3]
+        second = np.zeros((1, 3))
+        if other != GROUND:
+            second = motion.q[:, 3 * index[other] : 3 * index[other] + 3]
+        dx, dy = second[:, 0] - first[:, 0], second[:, 1] - first[:, 1]
+        c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
+        seen = np.stack([c * dx + s * dy, c * dy - s * dx], axis=1)
+        largest = max(largest, float(np.sqrt(((seen - seen[0]) ** 2).sum(axis=1)).max(initial=0.0)))
+    return largest

@@ -1,0 +1,68 @@
+"""What a run asks of the engine, as protocols: the session can be tested without mechanics."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.optimizer.problem import Problem
+from mdstopo.status import Status
+from mdstopo.store.contents import Motion
+
+Floats = NDArray[np.float64]
+
+
+class Peak(Protocol):
+    """A time that competes for an objective, and the value there."""
+
+    @property
+    def time(self) -> float: ...
+    @property
+    def value(self) -> float: ...
+
+
+class Evaluation(Protocol):
+    """One design, evaluated: gradients (N,) and competing peaks by objective."""
+
+    @property
+    def gradients(self) -> Mapping[str, Floats]: ...
+    @property
+    def peaks(self) -> Mapping[str, Sequence[Peak]]: ...
+    @property
+    def status(self) -> Status: ...
+
+
+class Engine(Protocol):
+    """A case, compiled: what `mdstopo.engine.Evaluator` offers to a run."""
+
+    @property
+    def integrator(self) -> str: ...
+    @property
+    def integrator_reason(self) -> str: ...
+    @property
+    def sensitivity(self) -> str: ...
+    def problem(self) -> Problem: ...
+    def evaluate(self, alpha: Floats, gradient: bool = True) -> Evaluation: ...
+    def trajectory(self, alpha: Floats, load_case: str) -> Motion: ...
+
+
+MakeEngine = Callable[[Case], Engine]
+
+
+COMPILING = "compiling the kernels, once for this version: up to half a minute"
+
+
+def compilation_due() -> bool:
+    """Whether the kernels of this version have never been compiled here."""
+    from mdstopo.jit import cache_folder
+
+    return not cache_folder().exists()
+
+
+def make_engine(case: Case) -> Engine:
+    """The real one; imported here, because it brings the compiler with it."""
+    from mdstopo.engine import Evaluator
+
+    return Evaluator(case)

@@ -1,0 +1,7 @@
+"""What can stop a run from outside."""
+
+
+class WorkerError(Exception):
+    """A worker process ended before its work was done; the message is a sentence for the user."""
+
+    exit_status = 1

@@ -1,0 +1,83 @@
+"""What a run tells while it goes and when it ends."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.optimizer.state import State
+from mdstopo.status import RunStatus
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """One iteration of one start.
+
+    start, starts: which of how many, from 0. objective: U at this design (NaN where its evaluation failed);
+    best: the lowest so far; violation: largest excess over a constraint, in the constraint's unit; change:
+    largest |change of alpha|; evaluations: of this start so far.
+    """
+
+    start: int
+    starts: int
+    iteration: int
+    max_iterations: int
+    objective: float
+    best: float
+    violation: float
+    change: float
+    evaluations: int
+
+    @classmethod
+    def of(cls, state: State, start: int, starts: int, max_iterations: int) -> "Progress":
+        """That of a state which has just been reached."""
+        history = state.history
+        rows = np.concatenate([np.atleast_1d(history.constraints[-1]), np.atleast_1d(history.nonlinear[-1])])
+        return cls(
+            start=start,
+            starts=starts,
+            iteration=state.iteration,
+            max_iterations=max_iterations,
+            objective=float(history.objective[-1]),
+            best=float(state.best_objective),
+            violation=float(rows.max(initial=0.0)),
+            change=float(history.change[-1]),
+            evaluations=int(state.evaluations),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A run that has ended, or was stopped.
+
+    alpha (N,): the best design. objectives: raw G there, by name. initial_objectives: at the best start's
+    first design. peaks: (time, value) of all that compete at the best design, highest first; empty for a run
+    that was stopped. history: columns by the names of the file's `iterations/...`, K + 1 rows. states: each
+    start's last state, None where it has not begun; best_start: whose result this is. evaluations,
+    iterations: of all starts. seconds: wall time of the iterations in this process; compile_seconds: of
+    getting ready, loading or compiling kernels.
+    """
+
+    case: Case
+    alpha: Floats
+    objectives: Mapping[str, float]
+    initial_objectives: Mapping[str, float]
+    peaks: Mapping[str, tuple[tuple[float, float], ...]]
+    history: Mapping[str, NDArray[np.generic]]
+    status: RunStatus
+    reason: str
+    path: Path | None
+    warnings: tuple[str, ...]
+    states: tuple[State | None, ...]
+    best_start: int
+    evaluations: int
+    iterations: int
+    seconds: float
+    compile_seconds: float
+    integrator: str
+    integrator_reason: str

@@ -1,0 +1,102 @@
+"""The optimiser's states as parts of a result file, and back."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case, VolumeRow
+from mdstopo.optimizer.starts import best_run
+from mdstopo.optimizer.state import State
+from mdstopo.store.contents import Datasets
+from mdstopo.store.errors import DamagedError
+from mdstopo.store.reader import ResultView
+
+Array = NDArray[np.generic]
+
+
+def best_of(case: Case, states: Sequence[State | None]) -> int | None:
+    """Index of the start whose result counts; None where none has begun."""
+    if all(state is None for state in states):
+        return None
+    return best_run(states, case.optimizer.tolerance)
+
+
+def iteration_columns(case: Case, state: State) -> dict[str, Array]:
+    """Columns of `iterations/...`, each (K + 1, ...), row 0 the start."""
+    columns = state.history.to_arrays()
+    rows = len(state.history)
+    constraints = columns.get("info/constraints")
+    if constraints is None:
+        signs = [
+            -1.0 if row.sense == "at_least" else 1.0 for row in case.constraints if isinstance(row, VolumeRow)
+        ]
+        constraints = columns["constraints"].reshape(rows, len(signs)) * np.array(signs)
+    # Where even the first evaluation failed, the engine has reported nothing.
+    unknown = np.full((rows, len(case.objectives)), np.nan)
+    return {
+        "objectives": columns.get("info/objectives", unknown).reshape(rows, -1),
+        "peak_time": columns.get("info/peak_time", unknown).reshape(rows, -1),
+        "constraints": constraints,
+        "combined": columns["objective"],
+        "change": columns["change"],
+        "evaluations": columns["evaluations"],
+        "seconds": columns["seconds"],
+        "kkt": columns["kkt"],
+        "accepted": columns["accepted"],
+    }
+
+
+def best_row(state: State) -> int:
+    """The iterate that is the best design."""
+    objective = np.array(state.history.objective)
+    found = np.flatnonzero(objective == state.best_objective)
+    return int(found[0]) if len(found) else 0
+
+
+def run_part(case: Case, states: Sequence[State | None]) -> Datasets:
+    """Everything a run has reached: best design, its iterations, every start, every optimiser's state."""
+    best = best_of(case, states)
+    if best is None:
+        raise ValueError("no start has begun")
+    state = states[best]
+    assert state is not None
+    part: Datasets = {"design/alpha": state.best_alpha}
+    part |= {f"iterations/{name}": column for name, column in iteration_columns(case, state).items()}
+    if len(states) > 1:
+        part |= _starts_part(case, states)
+    for index, each in enumerate(states):
+        if each is not None:
+            part |= {f"optimizer/{index}/{name}": array for name, array in each.to_arrays().items()}
+    return part
+
+
+def _starts_part(case: Case, states: Sequence[State | None]) -> Datasets:
+    objectives = np.full((len(states), len(case.objectives)), np.nan)
+    alpha = np.full((len(states), case.n_design), np.nan)
+    words = []
+    for index, state in enumerate(states):
+        words.append("running" if state is None else str(state.status))
+        if state is not None:
+            objectives[index] = iteration_columns(case, state)["objectives"][best_row(state)]
+            alpha[index] = state.best_alpha
+    return {"starts/objectives": objectives, "starts/alpha": alpha, "starts/status": words}
+
+
+def restore(view: ResultView, starts: int) -> list[State | None]:
+    """The states in a file; None for starts that have not begun. States beyond `starts` are left out.
+
+    Raises DamagedError where a state is not whole.
+    """
+    by_start: dict[int, dict[str, Array]] = {}
+    for path, array in view.under("optimizer").items():
+        index, _, name = path.partition("/")
+        by_start.setdefault(int(index) if index.isdigit() else -1, {})[name] = array
+    return [_state(view, by_start[index]) if index in by_start else None for index in range(starts)]
+
+
+def _state(view: ResultView, arrays: Mapping[str, Array]) -> State:
+    try:
+        return State.from_arrays(arrays)
+    except (KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{view.path}: damaged: the optimiser's state is not whole ({error})") from error

@@ -1,0 +1,347 @@
+"""The run itself, each step a verb: admit, restore, iterate, conclude, save."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.optimizer.problem import Problem
+from mdstopo.optimizer.state import State
+from mdstopo.session.advice import advise
+from mdstopo.session.engine import COMPILING, Engine, MakeEngine, compilation_due, make_engine
+from mdstopo.session.errors import WorkerError
+from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
+from mdstopo.session.starts import first_design, run_start, warm_up
+from mdstopo.status import RunStatus
+from mdstopo.store.admit import admit, admit_resume, prepare_place
+from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.checkpoint import Checkpointer
+from mdstopo.store.contents import (
+    Datasets,
+    Motion,
+    case_part,
+    result_image,
+    sensitivity_part,
+    trajectory_part,
+)
+from mdstopo.store.errors import DifferentCaseError, WriteError
+from mdstopo.store.lock import Lock
+from mdstopo.store.provenance import Provenance
+from mdstopo.store.reader import ResultView
+
+Floats = NDArray[np.float64]
+Notify = Callable[[str], None]
+
+_DISK_SPEED = 2e8  # bytes a second: a first guess of what a checkpoint costs, until one has been timed
+_SMALL = 100_000  # members up to which an evaluation costs nothing beside loading its kernels
+_STATE_ARRAYS = 16  # arrays of N numbers that a checkpoint holds for each start, roughly
+
+
+def run_session(
+    case: Case,
+    *,
+    path: Path | str | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    starts: int | None = None,
+    workers: int | None = None,
+    initial: Floats | None = None,
+    on_iteration: Callable[[Progress], None] | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+    notify: Notify | None = None,
+    command: str = "",
+    engine: MakeEngine = make_engine,
+) -> Outcome:
+    """Optimise a case and keep its result file up to date.
+
+    Parameters
+    ----------
+    path
+        the result file; None keeps everything in memory.
+    resume, overwrite
+        continue the unfinished run in the file, or replace it.
+    starts, workers
+        how many starts (default: the case's) on how many processes (default 1); no result depends on the
+        latter.
+    initial
+        (N,) design to begin with in place of the case's.
+    on_iteration, stop_requested, notify
+        called after each iteration; asked after each iteration whether to stop; given sentences for the user.
+    command
+        the command line, for the record.
+    engine
+        makes the engine.
+
+    Raises
+    ------
+    CaseError
+        if there is nothing to vary or nothing to improve, or no design keeps the volume rows.
+    StoreError
+        if the file must not or cannot be written, is in use, or holds a run that cannot be resumed.
+    KeyboardInterrupt
+        if the run is stopped before there is anything to save.
+    """
+    _check_optimizable(case)
+    if starts is not None:
+        if starts < 1:
+            raise ValueError(f"starts must be at least 1, not {starts}")
+        case = replace(case, optimizer=replace(case.optimizer, starts=starts))
+    if initial is not None and (initial.shape != (case.n_design,) or not np.isfinite(initial).all()):
+        raise ValueError(f"initial must be {case.n_design} finite numbers, one for each design variable")
+    tell = notify or _ignore
+    run = _Run(case, initial, on_iteration or _ignore, stop_requested or _never, tell, command)
+    if path is None:
+        return run.go(engine, None, None, workers or 1)
+    place = prepare_place(Path(path))
+    with Lock(place):
+        remove_leftovers(place)
+        if resume:
+            previous = admit_resume(place, case, tell)
+        else:
+            previous = None
+            admit(place, case, "run", overwrite, tell)
+        return run.go(engine, place, previous, workers or 1)
+
+
+class _Run:
+    """One run: what it has reached, and how it is saved."""
+
+    def __init__(
+        self,
+        case: Case,
+        initial: Floats | None,
+        on_iteration: Callable[[Progress], None],
+        stop_requested: Callable[[], bool],
+        notify: Notify,
+        command: str,
+    ) -> None:
+        self.case = case
+        self.initial = initial
+        self.on_iteration = on_iteration
+        self.stop_requested = stop_requested
+        self.notify = notify
+        self.command = command
+        self.states: list[State | None] = [None] * case.optimizer.starts
+        self.warnings: tuple[str, ...] = tuple(mistake.message for mistake in case.warnings)
+        self.finals: Datasets = {}
+        self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
+
+    def go(self, make: MakeEngine, path: Path | None, previous: ResultView | None, workers: int) -> Outcome:
+        """The whole run."""
+        if previous is not None:
+            self.restore(previous)
+        began = time.perf_counter()
+        if make is make_engine and compilation_due():
+            self.notify(COMPILING)
+        engine = make(self.case)
+        problem = engine.problem()
+        self.warm_up(engine, problem, self.project(problem))
+        compiled = time.perf_counter()
+        if path is not None:
+            self.open(path, engine)
+        try:
+            self.iterate(make, problem, path, workers)
+        except WorkerError as error:
+            if path is not None and best_of(self.case, self.states) is not None:
+                self.save(path, RunStatus.INTERRUPTED, str(error))
+            raise
+        ended = time.perf_counter()
+        best = best_of(self.case, self.states)
+        if best is None:
+            raise KeyboardInterrupt
+        status, reason = self.conclude(best)
+        if status not in (RunStatus.RUNNING, RunStatus.INTERRUPTED):
+            self.complete(engine, best)
+        if path is not None:
+            self.save(path, status, reason)
+        return self.outcome(engine, path, best, status, reason, ended - compiled, compiled - began)
+
+    def warm_up(self, engine: Engine, problem: Problem, begin: Floats) -> None:
+        """Load or compile every kernel, so that the iterations are timed for themselves."""
+        warm_up(self.case)
+        self.before = self.motions(engine, begin)
+        if self.case.n_members <= _SMALL:
+            problem.evaluate(begin)
+
+    def restore(self, view: ResultView) -> None:
+        """Take up the states of an earlier process."""
+        before = view.arrays.get("design/initial")
+        if self.initial is not None and (before is None or not np.array_equal(before, self.initial)):
+            raise DifferentCaseError(
+                f"{view.path} cannot be resumed with another --alpha: it began with another design",
+                ("--alpha",),
+            )
+        if before is not None:
+            self.initial = np.asarray(before, dtype=np.float64)
+        self.states = restore(view, self.case.optimizer.starts)
+
+    def open(self, path: Path, engine: Engine) -> None:
+        """Collect what every checkpoint repeats."""
+        chosen = self.case.optimizer
+        self.fixed = case_part(self.case)
+        if self.initial is not None:
+            self.fixed["design/initial"] = self.initial
+        self.provenance = Provenance.collect(self.command)
+        self.settings: dict[str, str | int | float | bool] = {
+            "integrator": engine.integrator,
+            "integrator_reason": engine.integrator_reason,
+            "sensitivity": engine.sensitivity,
+            "solver_tolerance": self.case.solver.tolerance,
+            "preset": chosen.preset,
+            "max_iterations": chosen.max_iterations,
+            "tolerance": chosen.tolerance,
+            "starts": chosen.starts,
+            "seed": chosen.seed,
+        }
+        self.settings |= {f"set {key}": value for key, value in self.case.overrides.items()}
+
+    def project(self, problem: Problem) -> Floats:
+        """The first start's first design, with a notice where it is not the stated one."""
+        stated, nearest = first_design(self.case, problem, self.initial)
+        if not np.array_equal(stated, nearest) and self.states[0] is None:
+            moved = float(np.abs(nearest - stated).max())
+            self.notify(
+                "the initial design violates bounds or volume rows: it is replaced by the nearest one that "
+                f"does not (largest change of alpha {moved:.3g})"
+            )
+        return nearest
+
+    def iterate(self, make: MakeEngine, problem: Problem, path: Path | None, workers: int) -> None:
+        """Advance every start, checkpointing as time goes by."""
+        chosen = self.case.optimizer
+        size = 8.0 * self.case.n_design * _STATE_ARRAYS * chosen.starts
+        saver = None if path is None else Checkpointer(lambda: self.checkpoint(path), size / _DISK_SPEED)
+
+        def keep(index: int, state: State) -> None:
+            self.states[index] = state
+            self.on_iteration(Progress.of(state, index, chosen.starts, chosen.max_iterations))
+            if saver is not None:
+                saver.offer()
+
+        if workers > 1 and chosen.starts > 1:
+            from mdstopo.session.workers import run_in_workers  # most runs need no other process
+
+            run_in_workers(self.case, self.states, self.initial, make, workers, keep, self.stop_requested)
+            return
+        if workers > 1:
+            self.notify("one start needs one process: the other workers are not used")
+        for index in range(chosen.starts):
+            if self.stop_requested():
+                break
+            state = self.states[index]
+            self.states[index] = run_start(
+                self.case, problem, index, state, self.initial, keep, self.stop_requested
+            )
+
+    def conclude(self, best: int) -> tuple[RunStatus, str]:
+        """The run's status and why it ended."""
+        if any(state is None or state.running for state in self.states):
+            return RunStatus.INTERRUPTED, "stopped on request; the last iteration is saved"
+        state = self.states[best]
+        assert state is not None
+        return state.status, state.reason
+
+    def complete(self, engine: Engine, best: int) -> None:
+        """Add what only the final design has: its motion, its sensitivities, advice."""
+        state = self.states[best]
+        assert state is not None
+        evaluation = engine.evaluate(state.best_alpha, gradient=True)
+        if not evaluation.status.ok:
+            self.warnings += (f"the final design has no sensitivities: {evaluation.status.value}",)
+        self.peaks = {
+            name: tuple((peak.time, peak.value) for peak in found) for name, found in evaluation.peaks.items()
+        }
+        after = self.motions(engine, state.best_alpha)
+        for name, motion in after.items():
+            if not motion.status.ok:
+                self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
+        self.warnings += advise(self.case, state.best_alpha, self.before, after)
+        self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients)
+
+    def motions(self, engine: Engine, alpha: Floats) -> Mapping[str, Motion]:
+        return {each.name: engine.trajectory(alpha, each.name) for each in self.case.load_cases}
+
+    def checkpoint(self, path: Path) -> None:
+        """Save in mid-run; a full disk then is no reason to lose the run, it may have room at the end."""
+        try:
+            self.save(path, RunStatus.RUNNING, "running")
+        except WriteError as error:
+            self.notify(f"no checkpoint: {error}")
+
+    def save(self, path: Path, status: RunStatus, reason: str) -> None:
+        """Write the file as a whole."""
+        datasets = self.fixed | run_part(self.case, self.states) | self.finals
+        replace_file(
+            path,
+            result_image(
+                self.case,
+                "run",
+                status.value,
+                reason,
+                datasets,
+                self.provenance,
+                self.settings,
+                self.warnings,
+            ),
+        )
+
+    def outcome(
+        self,
+        engine: Engine,
+        path: Path | None,
+        best: int,
+        status: RunStatus,
+        reason: str,
+        seconds: float,
+        compile_seconds: float,
+    ) -> Outcome:
+        """What the caller learns."""
+        state = self.states[best]
+        assert state is not None
+        columns = iteration_columns(self.case, state)
+        names = [objective.name for objective in self.case.objectives]
+        begun = [each for each in self.states if each is not None]
+        return Outcome(
+            case=self.case,
+            alpha=state.best_alpha,
+            objectives=dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True)),
+            initial_objectives=dict(zip(names, columns["objectives"][0].tolist(), strict=True)),
+            peaks=self.peaks,
+            history=columns,
+            status=status,
+            reason=reason,
+            path=path,
+            warnings=self.warnings,
+            states=tuple(self.states),
+            best_start=best,
+            evaluations=sum(int(each.evaluations) for each in begun),
+            iterations=sum(int(each.iteration) for each in begun),
+            seconds=seconds,
+            compile_seconds=compile_seconds,
+            integrator=engine.integrator,
+            integrator_reason=engine.integrator_reason,
+        )
+
+
+def _check_optimizable(case: Case) -> None:
+    mistakes = []
+    if not case.objectives:
+        mistakes.append(case.marks.mistake("objectives", "an optimisation needs at least one objective"))
+    if not case.n_design:
+        mistakes.append(case.marks.mistake("members", "an optimisation needs members with `design: true`"))
+    if mistakes:
+        raise CaseError(mistakes, str(case.path or case.name))
+
+
+def _ignore(_: object) -> None:
+    return None
+
+
+def _never() -> bool:
+    return False

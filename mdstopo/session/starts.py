@@ -1,0 +1,94 @@
+"""One start of the optimiser, from its first design (or its last state) to its end."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.optimizer.driver import Gsao, run
+from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.optimizer.projection import InfeasibleRows, project
+from mdstopo.optimizer.starts import random_feasible
+from mdstopo.optimizer.state import State
+
+Floats = NDArray[np.float64]
+Keep = Callable[[int, State], None]
+Stop = Callable[[], bool]
+
+
+def make_optimizer(case: Case, problem: Problem) -> Gsao:
+    """The optimiser that the case asks for."""
+    chosen = case.optimizer
+    return Gsao(
+        problem,
+        settings(
+            chosen.preset,
+            dict(chosen.options),
+            max_iterations=chosen.max_iterations,
+            tolerance=chosen.tolerance,
+        ),
+    )
+
+
+class _Toy:
+    """A problem of three variables: enough to meet every kernel."""
+
+    def __init__(self) -> None:
+        self.initial = np.full(3, 0.5)
+        self.lower = np.full(3, 0.001)
+        self.upper = np.ones(3)
+        self.linear = LinearRows(np.ones((1, 3)), np.array([1.5]), np.array([True]))
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        """Two competing rows."""
+        slopes = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
+        values = np.sum(slopes / x, axis=1)
+        order = np.argsort(-values, kind="stable")
+        return Sample(
+            float(values.max()), values[order], (-slopes / x**2)[order], np.zeros(0), np.zeros((0, 3))
+        )
+
+
+def warm_up(case: Case) -> None:
+    """Load (at first: compile) the optimiser's kernels, so that iterations are timed for themselves."""
+    optimizer = make_optimizer(case, _Toy())
+    state = optimizer.start()
+    if state.running:
+        optimizer.step(state)
+
+
+def first_design(case: Case, problem: Problem, initial: Floats | None) -> tuple[Floats, Floats]:
+    """Where the first start begins, and the nearest design to it that keeps bounds and volume rows.
+
+    Raises CaseError where there is none.
+    """
+    stated = problem.initial if initial is None else initial
+    try:
+        return stated, project(stated, problem.lower, problem.upper, problem.linear)
+    except InfeasibleRows as error:
+        raise CaseError(
+            [case.marks.mistake("constraints", str(error))], str(case.path or case.name)
+        ) from error
+
+
+def run_start(
+    case: Case,
+    problem: Problem,
+    index: int,
+    state: State | None,
+    initial: Floats | None,
+    keep: Keep,
+    stop: Stop,
+) -> State:
+    """Step until the optimiser ends or `stop` says so; `keep` gets every state. Returns the last one."""
+    optimizer = make_optimizer(case, problem)
+    if state is None:
+        first = initial if index == 0 else random_feasible(problem, case.optimizer.seed, index)
+        state = optimizer.start(first)
+        keep(index, state)
+    else:
+        state = optimizer.reopen(state)
+    return run(optimizer, state, on_iteration=lambda reached: keep(index, reached), stop_requested=stop)

@@ -1,0 +1,75 @@
+"""The other end of `workers`: `python -m mdstopo.session.worker`, spoken to over its standard streams."""
+
+import os
+import pickle
+import queue
+import signal
+import sys
+import threading
+from typing import IO, Any
+
+from mdstopo.optimizer.state import State
+from mdstopo.session.starts import run_start
+from mdstopo.store.checkpoint import Checkpointer
+
+
+def main() -> None:
+    """Read the case, then one start after another, until the input is closed."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    # Whatever prints by mistake must not disturb the messages.
+    output = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    source = sys.stdin.buffer
+    case, initial, make_engine = pickle.load(source)
+    inbox: queue.Queue[Any] = queue.Queue()
+    stopped = threading.Event()
+    threading.Thread(target=_listen, args=(source, inbox, stopped), daemon=True).start()
+    problem = make_engine(case).problem()
+    while (task := inbox.get()) is not None:
+        index, arrays = task
+        sender = _Sender(output)
+        state = None if arrays is None else State.from_arrays(arrays)
+        last = run_start(case, problem, index, state, initial, sender.keep, stopped.is_set)
+        sender.send("done", index, last)
+        if stopped.is_set():
+            return
+
+
+class _Sender:
+    """Sends states as often as a checkpoint would be written."""
+
+    def __init__(self, output: IO[bytes]) -> None:
+        self._output = output
+        self._latest: tuple[int, State] | None = None
+        self._timer = Checkpointer(self._send_latest)
+
+    def keep(self, index: int, state: State) -> None:
+        self._latest = (index, state)
+        self._timer.offer()
+
+    def send(self, kind: str, index: int, state: State) -> None:
+        pickle.dump((kind, index, state.to_arrays()), self._output)
+        self._output.flush()
+
+    def _send_latest(self) -> None:
+        if self._latest is not None:
+            self.send("state", *self._latest)
+
+
+def _listen(source: IO[bytes], inbox: "queue.Queue[Any]", stopped: threading.Event) -> None:
+    while True:
+        try:
+            inbox.put(pickle.load(source))
+        except (EOFError, OSError, pickle.UnpicklingError):
+            # The parent closed the input: it wants to stop, or is gone.
+            stopped.set()
+            inbox.put(None)
+            return
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except BrokenPipeError:
+        os._exit(1)

@@ -1,0 +1,35 @@
+"""How a computation ended. The values are the sentences users read.
+
+Inside the program a solve that cannot go on returns a `Status`, never an exception: exceptions are for bad
+input and for bugs. `RunStatus` is how a whole optimisation stands; its values are the words of the result
+file.
+"""
+
+import enum
+
+
+class Status(enum.Enum):
+    """The end of one evaluation or one simulation; the value is the sentence shown to the user."""
+
+    OK = "done"
+    NON_FINITE = "a value that is not finite appeared"
+    ZERO_LENGTH = "the ends of a member that carries a force meet, so that it has no direction"
+    STEP_LIMIT = "the integrator needed more steps than it may take"
+    STEP_TOO_SMALL = "the step became too small to move time on"
+    NEWTON_FAILED = "Newton's iteration of the implicit integrator did not converge"
+    NO_GRADIENT = "the objective has a value but no gradient here"
+
+    @property
+    def ok(self) -> bool:
+        """Whether values and gradients can be trusted."""
+        return self is Status.OK
+
+
+class RunStatus(enum.StrEnum):
+    """Where an optimisation stands; members equal their words in the result file."""
+
+    RUNNING = "running"
+    CONVERGED = "converged"
+    MAX_ITERATIONS = "max_iterations"
+    INTERRUPTED = "interrupted"
+    FAILED = "failed"

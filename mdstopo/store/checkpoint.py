@@ -1,0 +1,51 @@
+"""When to save: by time, and never longer than what is saved is worth."""
+
+import time
+from collections.abc import Callable
+
+INTERVAL = 0.4
+"""Seconds of work after which a checkpoint is due: with its own writing, about half a second can be lost."""
+
+_COST_FACTOR = 2.0  # work saved per time spent saving it, at least
+
+
+class Checkpointer:
+    """Calls `save` whenever the work done since the last time is worth it.
+
+    Parameters
+    ----------
+    save
+        writes a checkpoint.
+    expected_cost
+        seconds that the first one is expected to take; afterwards the last one's is used.
+    clock
+        a clock in seconds.
+    """
+
+    def __init__(
+        self,
+        save: Callable[[], None],
+        expected_cost: float = 0.0,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._save = save
+        self._cost = expected_cost
+        self._clock = clock
+        self._saved_at = clock()
+        self._offered_at = self._saved_at
+        self.count = 0
+
+    def offer(self) -> bool:
+        """To be called after each iteration; true if a checkpoint was written."""
+        now = self._clock()
+        unsaved = now - self._saved_at
+        iteration = now - self._offered_at
+        self._offered_at = now
+        # One more iteration like the last may carry the loss past the interval, so it counts already.
+        if unsaved + iteration < INTERVAL or unsaved < _COST_FACTOR * self._cost:
+            return False
+        self._save()
+        self._saved_at = self._offered_at = self._clock()
+        self._cost = self._saved_at - now
+        self.count += 1
+        return True

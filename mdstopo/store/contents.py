@@ -1,0 +1,112 @@
+"""What stands where in a result file: the contract's paths, filled from the program's objects.
+
+Each function gives a part of the file as {path: value}; `image.encode` turns their union into bytes.
+"""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.status import Status
+from mdstopo.store.compare import describe
+from mdstopo.store.image import Attribute, Value, encode, texts
+from mdstopo.store.provenance import Provenance
+
+FORMAT = 1
+
+Floats = NDArray[np.float64]
+Datasets = dict[str, Value]
+
+
+class Motion(Protocol):
+    """The steps of a trajectory: t (T,), q, v, a (T, 3 n_bodies), lam (T, n_rows); how it ended."""
+
+    @property
+    def t(self) -> Floats: ...
+    @property
+    def q(self) -> Floats: ...
+    @property
+    def v(self) -> Floats: ...
+    @property
+    def a(self) -> Floats: ...
+    @property
+    def lam(self) -> Floats: ...
+    @property
+    def status(self) -> Status: ...
+
+
+def case_part(case: Case) -> Datasets:
+    """The case as read and its members, in their order."""
+    groups = case.members
+    counts = [len(group.length) for group in groups]
+    pieces: Datasets = {
+        "case": case.text,
+        "resume/case": describe(case),
+        "members/p": _rows([group.p_world for group in groups]),
+        "members/q": _rows([group.q_world for group in groups]),
+        "members/group": np.repeat(texts([group.name for group in groups]), counts),
+        "objectives": [objective.name for objective in case.objectives],
+        "members/design": np.repeat(np.array([group.design for group in groups], dtype=np.bool_), counts),
+    }
+    return pieces | {f"files/{name}": digest for name, digest in case.files.items()}
+
+
+def trajectory_part(trajectories: Mapping[str, Motion]) -> Datasets:
+    """The motion in each load case, by its name."""
+    part: Datasets = {}
+    for name, motion in trajectories.items():
+        part |= {
+            f"trajectories/{name}/t": motion.t,
+            f"trajectories/{name}/q": motion.q,
+            f"trajectories/{name}/v": motion.v,
+            f"trajectories/{name}/a": motion.a,
+            f"trajectories/{name}/lambda": motion.lam,
+        }
+    return part
+
+
+def sensitivity_part(gradients: Mapping[str, Floats], method: str | None = None) -> Datasets:
+    """dG/dalpha (N,) by objective, below its method's name where there are several methods."""
+    prefix = "sensitivities" if method is None else f"sensitivities/{method}"
+    return {f"{prefix}/{objective}": gradient for objective, gradient in gradients.items()}
+
+
+def result_image(
+    case: Case,
+    kind: str,
+    status: str,
+    reason: str,
+    datasets: Datasets,
+    provenance: Provenance,
+    settings: Mapping[str, Attribute],
+    warnings: tuple[str, ...] = (),
+) -> bytes:
+    """A whole result file.
+
+    kind: the command that made it. status: a word of `RunStatus`. reason: a sentence. settings: what was
+    chosen and why (integrator, sensitivity method, seed), as attributes of the group `settings`.
+    """
+    root: dict[str, Attribute] = {
+        "format": FORMAT,
+        "mdstopo": provenance.mdstopo,
+        "case_sha256": case.sha256,
+        "status": status,
+        "kind": kind,
+        "reason": reason,
+        "name": case.name,
+        "title": case.title or "",
+        "case_path": "" if case.path is None else str(case.path),
+    }
+    attributes: dict[str, Mapping[str, Attribute]] = {
+        "": root,
+        "provenance": provenance.attributes(),
+        "settings": settings,
+    }
+    return encode(attributes, {**datasets, "warnings": list(warnings)})
+
+
+def _rows(blocks: list[Floats]) -> Floats:
+    return np.concatenate(blocks) if blocks else np.zeros((0, 2))

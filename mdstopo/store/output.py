@@ -1,0 +1,59 @@
+"""Files that are written once, at the end of a command."""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from mdstopo.case.model import Case
+from mdstopo.store.admit import admit, prepare_place
+from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.contents import Datasets, case_part, result_image
+from mdstopo.store.image import Attribute
+from mdstopo.store.lock import Lock
+from mdstopo.store.provenance import Provenance
+
+
+class OutputFile:
+    """A place that may be written, held while the command computes."""
+
+    def __init__(self, path: Path, case: Case, kind: str, command: str) -> None:
+        self._path = path
+        self._case = case
+        self._kind = kind
+        self._command = command
+
+    def write(
+        self,
+        status: str,
+        reason: str,
+        datasets: Datasets,
+        settings: Mapping[str, Attribute],
+        warnings: tuple[str, ...] = (),
+    ) -> None:
+        """Write the result, the case with it. Raises WriteError if the disk refuses."""
+        image = result_image(
+            self._case,
+            self._kind,
+            status,
+            reason,
+            case_part(self._case) | datasets,
+            Provenance.collect(self._command),
+            settings,
+            warnings,
+        )
+        replace_file(self._path, image)
+
+
+@contextmanager
+def output_file(
+    path: Path, case: Case, kind: str, *, overwrite: bool, notify: Callable[[str], None], command: str = ""
+) -> Iterator[OutputFile]:
+    """Claim a place for the result of the command `kind`, before the work is done.
+
+    Raises StoreError where it must not or cannot be written or is in use.
+    """
+    place = prepare_place(path)
+    with Lock(place):
+        remove_leftovers(place)
+        admit(place, case, kind, overwrite, notify)
+        yield OutputFile(place, case, kind, command)

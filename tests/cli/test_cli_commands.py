@@ -1,0 +1,290 @@
+"""The commands on a small case with the real engine."""
+
+import json
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from mdstopo.cli.group import run_group
+from mdstopo.store import atomic
+
+CASE = """\
+format: 1
+title: Probe
+gravity: [0, -9.8]
+time: {end: 0.1}
+bodies:
+  torso: {mass: 60, inertia: 10, position: [0, 0]}
+  vehicle: {mass: 2000, inertia: 6000, position: [0, -1]}
+points:
+  edge: {body: torso, grid: {rectangle: {center: [0, 0], size: [0.5, 0.5], count: 4}}}
+  frame: {body: vehicle, grid: {line: {from: [-0.8, -1], to: [0.8, -1], count: 3}}}
+members:
+  belts: {from: edge, to: frame, law: {type: spring, stiffness: 20000}}
+loads:
+  - {body: vehicle, acceleration: [9.8, 0], angular_acceleration: 20}
+objectives:
+  G: {response: energy}
+constraints:
+  - {volume: all, equals: 1.2}
+optimizer: {max_iterations: 6, move_limit: 0.01, tolerance: 0}
+"""
+ENDLESS = ["optimizer.max_iterations=100000", "optimizer.tolerance=0", "optimizer.move_limit=1e-5"]
+ENDLESS += ["optimizer.decrease_tolerance=0"]
+
+
+@pytest.fixture(autouse=True)
+def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A folder with the case in it; handlers of signals are put back."""
+    monkeypatch.chdir(tmp_path)
+    Path("probe.yaml").write_text(CASE)
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in kept.items():
+        signal.signal(number, handler)
+
+
+def call(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]:
+    status = run_group(list(words))
+    said = capsys.readouterr()
+    return status, said.out, said.err
+
+
+def answer(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, Any]:
+    """The JSON object that a command prints, and nothing else."""
+    status, out, _ = call(capsys, *words, "--json", "--quiet")
+    assert status == 0
+    assert out.count("\n") == 1
+    found = json.loads(out)
+    assert isinstance(found, dict)
+    return found
+
+
+def test_run_says_what_it_reached_and_writes_the_file(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, err = call(capsys, "run", "probe.yaml")
+    assert status == 0
+    for word in (
+        "Probe: max iterations",
+        "7 evaluations",
+        "volume of belts",
+        "integrator",
+        "results/probe.h5",
+    ):
+        assert word in out, word
+    assert "Traceback" not in err
+    with h5py.File("results/probe.h5", "r") as file:
+        assert file.attrs["status"] == "max_iterations"
+        assert file["iterations/objectives"].shape == (7, 1)
+        assert file["trajectories/default/q"].shape[1] == 6
+        assert file["trajectories/default/t"][[0, -1]].tolist() == [0.0, 0.1]
+        assert file["sensitivities/G"].shape == file["design/alpha"].shape == (12,)
+    assert os.listdir("results") == ["probe.h5"]
+
+
+def test_run_for_machines_and_in_silence(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "run", "probe.yaml")
+    assert found["status"] == "max_iterations"
+    assert found["evaluations"] == 7
+    assert found["objectives"]["G"] < found["initial_objectives"]["G"]
+    assert found["peaks"]["G"][0]["value"] == pytest.approx(found["objectives"]["G"], rel=1e-12)
+    assert found["resume"] is None
+    status, out, err = call(capsys, "run", "probe.yaml", "--quiet", "--out", "b.h5")
+    assert (status, out, err) == (0, "", "")
+
+
+def test_a_finished_file_is_replaced_with_a_notice_and_an_unfinished_one_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    call(capsys, "run", "probe.yaml")
+    status, _, err = call(capsys, "run", "probe.yaml")
+    assert status == 0
+    assert "is replaced" in err
+    with h5py.File("results/probe.h5", "r+") as file:
+        file.attrs["status"] = "interrupted"
+    status, out, err = call(capsys, "run", "probe.yaml")
+    assert (status, out) == (2, "")
+    assert "--resume continues it" in err
+    assert call(capsys, "run", "probe.yaml", "--overwrite")[0] == 0
+
+
+def test_more_iterations_resumed_equal_a_straight_run(capsys: pytest.CaptureFixture[str]) -> None:
+    call(capsys, "run", "probe.yaml", "--set", "optimizer.max_iterations=3")
+    call(capsys, "run", "probe.yaml", "--resume")
+    call(capsys, "run", "probe.yaml", "--out", "straight.h5")
+    with h5py.File("results/probe.h5", "r") as one, h5py.File("straight.h5", "r") as other:
+        for name in ("design/alpha", "iterations/objectives", "trajectories/default/q", "sensitivities/G"):
+            assert one[name][()].tobytes() == other[name][()].tobytes(), name
+    status, _, err = call(capsys, "run", "probe.yaml", "--resume", "--set", "members.belts.law.stiffness=7")
+    assert status == 2
+    assert "differs in members.belts.law.stiffness" in err
+
+
+def test_a_design_goes_in_and_out_through_files(capsys: pytest.CaptureFixture[str]) -> None:
+    np.save("a.npy", np.full(12, 0.1))
+    found = answer(capsys, "run", "probe.yaml", "--alpha", "a.npy")
+    assert found["iterations"] == 6
+    simulated = answer(capsys, "simulate", "probe.yaml", "--alpha", "results/probe.h5")
+    assert simulated["path"] == "results/probe.simulate.h5"
+    with h5py.File("results/probe.h5", "r") as run, h5py.File("results/probe.simulate.h5", "r") as simulate:
+        assert run["trajectories/default/q"][()].tobytes() == simulate["trajectories/default/q"][()].tobytes()
+    np.save("short.npy", np.ones(3))
+    status, _, err = call(capsys, "simulate", "probe.yaml", "--alpha", "short.npy")
+    assert status == 2
+    assert "holds 3 values; the case has 12" in err
+
+
+def test_check_says_what_is_in_the_case(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call(capsys, "check", "probe.yaml")
+    assert status == 0
+    for word in (
+        "2 bodies, 6 degrees of freedom",
+        "12 members",
+        "2060 kg",
+        "omega t1",
+        "integrator",
+        "left out",
+    ):
+        assert word in out, word
+    found = answer(capsys, "check", "probe.yaml")
+    assert found["design_variables"] == 12
+    assert len(found["frequencies"][0]["initial"]) == 3
+    assert not Path("results").exists()
+
+
+def test_check_describes_what_cannot_be_computed_and_refuses_it(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("joint.yaml").write_text(
+        CASE + "joints:\n  - {type: revolute, bodies: [torso, ground], at: [0, 0]}\n"
+    )
+    status, out, err = call(capsys, "check", "joint.yaml")
+    assert status == 2
+    assert "2 bodies" in out
+    assert err.startswith("joint.yaml:")
+    assert "joints (revolute) are not computed yet" in err
+
+
+def test_simulate_says_where_the_bodies_end(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call(capsys, "simulate", "probe.yaml")
+    assert status == 0
+    assert "load case default" in out
+    assert "torso" in out
+    status, _, err = call(capsys, "simulate", "probe.yaml", "--load-case", "other")
+    assert status == 2
+    assert "there are default" in err
+
+
+def test_gradient_compares_with_differences(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "gradient", "probe.yaml", "--method", "adjoint", "--differences", "--members", "4")
+    method = found["methods"]["adjoint"]
+    assert method["differences"]["G"] < 1e-6
+    assert method["seconds"] > 0.0
+    with h5py.File("results/probe.gradient.h5", "r") as file:
+        assert file["sensitivities/adjoint/G"].shape == (12,)
+        assert file["differences/G"].shape == (4,)
+
+
+def test_show_says_what_a_file_holds(capsys: pytest.CaptureFixture[str]) -> None:
+    call(capsys, "run", "probe.yaml")
+    status, out, _ = call(capsys, "show", "results/probe.h5", "--members", "3")
+    assert status == 0
+    for word in (
+        "max iterations",
+        "6 iterations, 7 evaluations",
+        "the 3 largest of 12",
+        "belts",
+        "numpy",
+        "seed",
+    ):
+        assert word in out, word
+    found = answer(capsys, "show", "results/probe.h5")
+    assert len(found["objectives"]["G"]) == 7
+    assert found["datasets"]["design/alpha"] == [12]
+
+
+def test_a_full_disk_is_a_sentence_and_status_1(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(atomic.os, "fsync", full)
+    for name in ("run", "simulate"):
+        status, _, err = call(capsys, name, "probe.yaml")
+        assert status == 1
+        assert err.strip().endswith("No space left on device")
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_anything_runs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for name in ("run", "simulate", "gradient"):
+        status, out, err = call(capsys, name, "probe.yaml", "--out", "probe.yaml/x.h5")
+        assert (status, out) == (2, "")
+        assert "cannot be made" in err
+        status, _, err = call(capsys, name, "probe.yaml", "--out", "probe.yaml", "--overwrite")
+        assert status == 2
+        assert "this is the case file" in err
+    assert Path("probe.yaml").read_text() == CASE
+
+
+def begin(*words: str) -> "subprocess.Popen[str]":
+    return subprocess.Popen(
+        [sys.executable, "-m", "mdstopo", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+def wait_for_checkpoint(process: "subprocess.Popen[str]", path: Path) -> None:
+    while not path.exists():
+        assert process.poll() is None, process.communicate()
+        time.sleep(0.02)
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_is_status_3_and_its_command_resumes_it(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    sets = [word for pair in ENDLESS for word in ("--set", pair)]
+    process = begin("run", "probe.yaml", "--out", "my file.h5", *sets)
+    wait_for_checkpoint(process, Path("my file.h5"))
+    status, _, err = call(capsys, "run", "probe.yaml", "--out", "my file.h5", *sets)
+    assert status == 2
+    assert f"is in use by process {process.pid}" in err
+    process.send_signal(signal.SIGTERM)
+    out, err = process.communicate()
+    assert process.returncode == 3
+    assert "Probe: interrupted" in out
+    command = shlex.split(err.strip().splitlines()[-1].removeprefix("interrupted; to go on: "))
+    with h5py.File("my file.h5", "r") as file:
+        reached = len(file["iterations/combined"]) - 1
+        assert file.attrs["status"] == "interrupted"
+    status, out, _ = call(capsys, *command[1:], "--set", f"optimizer.max_iterations={reached + 5}")
+    assert status == 0
+    with h5py.File("my file.h5", "r") as file:
+        assert len(file["iterations/combined"]) - 1 == reached + 5
+
+
+@pytest.mark.slow
+def test_workers_end_when_their_parent_is_killed() -> None:
+    sets = [word for pair in ENDLESS for word in ("--set", pair)]
+    process = begin("run", "probe.yaml", "--starts", "2", "--workers", "2", *sets)
+    wait_for_checkpoint(process, Path("results/probe.h5"))
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    if not children.exists():
+        pytest.skip("the children of a process cannot be listed here")
+    workers = [int(word) for word in children.read_text().split()]
+    process.kill()
+    process.communicate()
+    assert len(workers) == 2
+    deadline = time.monotonic() + 10.0
+    while any(Path(f"/proc/{pid}").exists() for pid in workers):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)

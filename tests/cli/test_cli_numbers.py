@@ -1,0 +1,117 @@
+"""The quantities that `check` and `gradient` derive."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from mdstopo.case.reader import read_case
+from mdstopo.cli.check_numbers import frequencies, material, totals
+from mdstopo.cli.gradient_numbers import chosen_members, differences, disagreement
+
+Floats = NDArray[np.float64]
+
+CASE = """
+format: 1
+gravity: [0, -10]
+time: {start: 1, end: 3}
+bodies:
+  a: {mass: 1, inertia: 1, position: [0, 0]}
+  b: {mass: 3, inertia: 1, position: [4, 0]}
+members:
+  m: {from: {body: a, at: [0, 1]}, to: {body: b, at: [4, 1]}, law: {type: spring, stiffness: 5}, cost: 2}
+loads:
+  - {body: a, force: {table: [[0, 0, 0], [2, 8, 0]]}}
+objectives:
+  G: {response: energy}
+constraints:
+  - {volume: all, fraction: 0.5}
+"""
+
+
+def test_totals_are_those_of_the_bodies_members_and_loads() -> None:
+    case = read_case(CASE.replace("force: {table: [[0, 0, 0], [2, 8, 0]]}", "force: [4, 0]"))
+    found = {name: (value, unit) for name, value, unit in totals(case)}
+    assert found["mass"] == (4.0, "kg")
+    assert found["centre of mass, x"] == (3.0, "m")
+    assert found["duration"] == (2.0, "s")
+    assert found["stiffness of all springs at alpha = 1"] == (5.0, "N/m")
+    assert found["volume at alpha = 1"] == (2.0, "")
+    assert found["external force at the start, x"] == (4.0, "N")
+    assert found["external force at the start, y"] == (-40.0, "N")
+
+
+def test_loads_that_change_are_taken_at_the_start() -> None:
+    case = read_case(CASE.replace("{table: [[0, 0, 0], [2, 8, 0]]}", "{table: [[0, 0, 0], [2, 8, 0]]}"))
+    found = {name: value for name, value, _ in totals(case)}
+    assert found["external force at the start, x"] == pytest.approx(4.0)
+
+
+def test_material_rows_show_what_the_bounds_allow() -> None:
+    assert material(read_case(CASE)) == [["m", "at most", "1", "0.2", "0.002", "2"]]
+
+
+class Modes:
+    def natural_frequencies(self, alpha: Floats, load_case: str) -> Floats:
+        return np.array([0.0, 1e-9, 30.0, 5.0]) * np.sqrt(alpha[0] / 0.1)
+
+
+def test_the_criterion_takes_the_lowest_elastic_mode() -> None:
+    (entry,) = frequencies(read_case(CASE), Modes())
+    assert entry["initial"] == [5.0, 30.0]
+    assert entry["criterion"] == pytest.approx(5.0 * 5.0 * np.sqrt(0.001 / 0.1) * 4.0)
+
+
+def test_cases_without_elastic_modes_have_no_criterion() -> None:
+    class Free:
+        def natural_frequencies(self, alpha: Floats, load_case: str) -> Floats:
+            return np.zeros(6)
+
+    (entry,) = frequencies(read_case(CASE), Free())
+    assert entry["initial"] == []
+    assert entry["criterion"] is None
+
+
+def smooth(alpha: Floats) -> dict[str, float]:
+    weights = np.arange(1.0, len(alpha) + 1.0)
+    return {"G": float(np.sin(weights * alpha).sum()), "H": float((weights / (0.5 + alpha)).sum())}
+
+
+def test_differences_are_right_to_many_digits_also_near_and_at_zero() -> None:
+    alpha = np.array([0.1, 1e-3, 0.0, 1.0, 0.4])
+    members = np.arange(5)
+    weights = np.arange(1.0, 6.0)
+    found = differences(smooth, alpha, members)
+    assert np.abs(found["G"] - weights * np.cos(weights * alpha)).max() < 1e-9
+    assert np.abs(found["H"] + weights / (0.5 + alpha) ** 2).max() < 1e-7
+
+
+def test_differences_never_ask_for_negative_alpha() -> None:
+    asked: list[float] = []
+
+    def watched(alpha: Floats) -> dict[str, float]:
+        asked.append(float(alpha.min()))
+        return smooth(alpha)
+
+    differences(watched, np.array([1e-6, 0.0, 1.0]), np.arange(3))
+    assert min(asked) >= 0.0
+
+
+def test_members_are_chosen_reproducibly_without_repeats() -> None:
+    chosen = chosen_members(1020, 10, seed=0)
+    assert len(set(chosen.tolist())) == 10
+    assert chosen.tolist() == chosen_members(1020, 10, seed=0).tolist() == sorted(chosen.tolist())
+    assert chosen_members(3, 10, seed=0).tolist() == [0, 1, 2]
+
+
+def test_disagreement_is_relative_to_the_largest_entry() -> None:
+    assert disagreement(np.array([1.0, 10.1]), np.array([1.0, 10.0])) == pytest.approx(0.01)
+    assert disagreement(np.zeros(2), np.zeros(2)) == 0.0
+
+
+def test_the_repository_cases_can_be_summed_up() -> None:
+    from mdstopo.case.reader import load_case
+
+    for path in sorted((Path(__file__).parents[2] / "cases").glob("*.yaml")):
+        assert {name: value for name, value, _ in totals(load_case(path))}["mass"] == 2060.0, path.name

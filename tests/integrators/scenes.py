@@ -1,0 +1,219 @@
+"""Small scenes as arrays, and the paper's Figure 3, run through the compiled entries without a case file."""
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+
+from mdstopo.integrators.driver import CLOSENESS, NEWTON_TOLERANCE, ROWS
+from mdstopo.integrators.gauss_tables import gauss_tables
+from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for
+from mdstopo.scene.model import VECTOR, Model
+from mdstopo.scene.packing import pack
+from mdstopo.sensitivity.reductions import MAX
+
+
+@dataclass(frozen=True)
+class Group:
+    """Random members between two bodies: how many, k, c, preload, mu, whether they are design variables."""
+
+    a: int
+    b: int
+    count: int
+    stiffness: float = 300.0
+    damping: float = 0.0
+    preload: float = 0.0
+    power: float = 1.0
+    design: bool = True
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A model with what the entries ask beside it."""
+
+    model: Model
+    damped: bool
+    n_design: int
+
+
+def random_scene(
+    groups, masses, seed=3, times=(0.0, 0.3), turning=0, jumps=False, ground=False, spin=0.0, span=1.0
+) -> Scene:
+    """Bodies 1.3 m apart with members between random points; loads linear in each segment, `turning` of them off-centre."""
+    rng = np.random.default_rng(seed)
+    n_bodies = len(masses) + ground
+    n = 3 * n_bodies
+    inv_mass = np.zeros(n)
+    for i, (m, j) in enumerate(masses):
+        inv_mass[3 * i : 3 * i + 3] = 1 / m, 1 / m, 1 / j
+    q0 = np.zeros(n)
+    centre = np.array([[1.3 * i, 0.4 * (-1) ** i] for i in range(n_bodies)])
+    q0.reshape(-1, 3)[:, :2] = centre
+    q0.reshape(-1, 3)[:, 2] = np.where(inv_mass[2::3] > 0.0, rng.uniform(-0.3, 0.3, n_bodies), 0.0)
+    v0 = spin * rng.standard_normal(n) * (inv_mass > 0.0)
+    pairs: list[tuple[int, int]] = []
+    blocks, rows, powers, first, start = [], [], [], 0, 0
+    reach = np.zeros(len({(g.a, g.b) for g in groups}))
+    for g in groups:
+        if (g.a, g.b) not in pairs:
+            pairs.append((g.a, g.b))
+        p = rng.uniform(-0.4, 0.4, (g.count, 2))
+        q = rng.uniform(-0.4, 0.4, (g.count, 2))
+        world = []
+        for body, local in ((g.a, p), (g.b, q)):
+            c, s = np.cos(q0[3 * body + 2]), np.sin(q0[3 * body + 2])
+            world.append(centre[body] + local @ np.array([[c, s], [-s, c]]))
+        stop = start + -(-g.count // VECTOR) * VECTOR
+        member = np.zeros((8, stop - start))
+        member[0:2, : g.count], member[2:4, : g.count] = p.T, q.T
+        member[4, : g.count] = np.hypot(*(world[1] - world[0]).T)
+        member[5:8, : g.count] = np.array([[g.stiffness], [g.damping], [g.preload]]) * rng.uniform(0.5, 1.5, g.count)
+        rows.append(member)
+        pair = pairs.index((g.a, g.b))
+        reach[pair] = max(reach[pair], 0.57)
+        blocks.append([pair, start, stop, int(g.damping > 0 or g.preload != 0), first if g.design else -1, g.count])
+        powers.append(g.power)
+        first += g.count if g.design else 0
+        start = stop
+    times = np.array(times, dtype=float)
+    n_segment = len(times) - 1
+    values = rng.standard_normal((n_segment + 1, n)) * np.where(inv_mass > 0, 15.0 / np.maximum(inv_mass, 1e-9), 0.0)
+    force = np.zeros((n_segment, n, 2))
+    load_force = np.zeros((n_segment, turning, 2, 2))
+    extra = rng.standard_normal((n_segment + 1, turning, 2)) * 20.0
+    for i in range(n_segment):
+        length = times[i + 1] - times[i]
+        jump = 1.0 + 0.5 * i if jumps else 1.0
+        force[i, :, 0], force[i, :, 1] = jump * values[i], (values[i + 1] - values[i]) / length
+        load_force[i, :, :, 0], load_force[i, :, :, 1] = extra[i], (extra[i + 1] - extra[i]) / length
+    model = Model(
+        inv_mass=inv_mass, q0=q0, v0=v0, pair=np.array(pairs, dtype=np.int64), reach=reach,
+        shortest=np.full(len(pairs), 1e-3), block=np.array(blocks, dtype=np.int64), power=np.array(powers),
+        member=np.concatenate(rows, axis=1), times=times, force=force,
+        load_body=np.arange(turning, dtype=np.int64) % len(masses),
+        load_follows=np.arange(turning, dtype=np.int64) % 2,
+        load_arm=rng.uniform(-0.3, 0.3, (turning, 2)), load_force=load_force,
+    )  # fmt: skip
+    return Scene(model, any(g.damping > 0 for g in groups), first)
+
+
+def figure_3(acceleration=(9.8, 0.0), turn=20.0, end=0.2) -> Scene:
+    """The paper's scene: 20 points on a square, 51 on a U, 1020 members."""
+    side = np.linspace(0.0, 2.0, 20, endpoint=False)
+    edge, r = (side // 0.5).astype(int), side % 0.5
+    square = np.array([[-0.25 + r, 0.25 + 0 * r, 0.25 - r, -0.25 + 0 * r], [-0.25 + 0 * r, -0.25 + r, 0.25 + 0 * r, 0.25 - r]])
+    P = square[:, edge, np.arange(20)].T
+    t, one = np.linspace(-0.8, 0.8, 17), np.ones(17)
+    Q = np.concatenate([np.c_[-one, t], np.c_[t, -one], np.c_[one, t]]) - (0.0, -1.0)
+    p, q = np.repeat(P, 51, axis=0), np.tile(Q, (20, 1))
+    member = np.zeros((8, 1024))
+    member[0:2, :1020], member[2:4, :1020] = p.T, q.T
+    member[4, :1020] = np.hypot(*(q + (0.0, -1.0) - p).T)
+    member[5, :1020] = 225.0
+    inv_mass = 1 / np.array([60.0, 60.0, 10.0, 2000.0, 2000.0, 6000.0])
+    force = np.zeros((1, 6, 2))
+    force[0, :, 0] = np.array([0, -9.8, 0, acceleration[0], acceleration[1] - 9.8, turn]) / inv_mass
+    q0 = np.array([0.0, 0, 0, 0, -1, 0])
+    model = Model(
+        inv_mass=inv_mass, q0=q0, v0=np.zeros(6), pair=np.array([[0, 1]]), reach=np.array([2.1]),
+        shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020]]), power=np.ones(1), member=member,
+        times=np.array([0.0, end]), force=force, load_body=np.zeros(0, np.int64),
+        load_follows=np.zeros(0, np.int64), load_arm=np.zeros((0, 2)), load_force=np.zeros((1, 0, 2, 2)),
+    )  # fmt: skip
+    return Scene(model, False, 1020)
+
+
+class Bench:
+    """One scene through one method's entries: evaluate, then whatever differentiates what that left in room."""
+
+    def __init__(self, scene: Scene, method="generalized_alpha", radius=0.8, reductions=(MAX,)) -> None:
+        self.scene, self.method = scene, method
+        self.entry = import_module(f"mdstopo.integrators.{method}_entry")
+        self.tables: Any = np.array([radius]) if method == "generalized_alpha" else gauss_tables()
+        self.packed = pack(scene.model)
+        self.reductions = np.array(reductions)
+        self.size = 64
+
+    def run(self, alpha, step=0.0, tolerance=1e-10, gradient=True):
+        """Status code, times of the steps; rows, found, gradients are kept."""
+        m = self.scene.model
+        n, pairs, turning = len(m.inv_mass), len(m.pair), len(m.load_body) > 0
+        padded, count = m.member.shape[1], len(self.reductions)
+        self.alpha = np.asarray(alpha, dtype=float)
+        self.strength = np.zeros((3, padded))
+        self.rows = np.zeros((count, ROWS, 4))
+        self.found = np.zeros(count, dtype=np.int64)
+        self.gradients = np.zeros((count, ROWS, self.scene.n_design))
+        while True:
+            self.limits = np.array([200_000, self.size, 12 * self.size])
+            floats, ints = room_for(n, pairs, self.size, 12 * self.size, self.scene.damped, turning)
+            self.room, self.room_ints = np.zeros(floats), np.zeros(ints, dtype=np.int64)
+            self.work = np.zeros(WORK, dtype=np.int64)
+            settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
+            code, self.count, _ = self.entry.simulate(
+                *self.packed, self.tables, self.alpha, self.scene.damped, True, settings, self.limits, self.room,
+                self.room_ints, self.strength, self.work,
+            )  # fmt: skip
+            if code != NEEDS_ROOM:
+                break
+            self.size *= 2
+        if code == OK:
+            self.entry.look(
+                *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits, self.count,
+                self.reductions, gradient, self.room, self.room_ints, self.strength, np.zeros((ROWS, padded)),
+                self.rows, self.found, self.gradients, np.zeros(2, dtype=np.int64), self.work,
+            )  # fmt: skip
+        arrays = carve.py_func(self.room, self.room_ints, n, pairs, self.size, 12 * self.size, self.scene.damped, turning)
+        self.t, self.state = arrays[0][: self.count + 1], arrays[1][: self.count + 1]
+        self.scalar = arrays[3]
+        return code
+
+    @property
+    def value(self):
+        return self.rows[0, 0, 1]
+
+    @property
+    def gradient(self):
+        return self.gradients[0, 0]
+
+    def direct(self, history=False):
+        """Gradients (n_obj, R, N) by `direct`; with history also dg/dalpha at the steps' ends (count + 1, N)."""
+        from mdstopo.sensitivity import direct_entry
+
+        out = np.zeros_like(self.gradients)
+        lines = np.zeros((self.count + 1 if history else 0, self.scene.n_design))
+        getattr(direct_entry, self.method)(
+            *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count, self.reductions,
+            self.room, self.room_ints, self.strength, self.rows, self.found, out, lines, self.work,
+        )  # fmt: skip
+        return (out, lines) if history else out
+
+    def iterative(self):
+        """Gradients by `iterative`, and the step at which it gave up, or -1."""
+        from mdstopo.sensitivity import iterative_entry
+
+        out = np.zeros_like(self.gradients)
+        step = iterative_entry.generalized_alpha(
+            *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count, self.reductions,
+            self.room, self.room_ints, self.strength, self.rows, self.found, out, self.work,
+        )  # fmt: skip
+        return out, step
+
+    def at(self, times):
+        """q, v, a (3, T, n) of the dense output."""
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        out = np.zeros((3, len(times), len(self.scene.model.inv_mass)))
+        self.entry.dense(
+            *self.packed, self.tables, self.scene.damped, self.limits, self.count, self.room, self.room_ints,
+            self.strength, times, out, self.work,
+        )  # fmt: skip
+        return out
+
+
+def solved(scene, alpha, **options) -> Bench:
+    """A bench after a run that must succeed."""
+    settings = {key: options.pop(key) for key in ("method", "radius", "reductions") if key in options}
+    bench = Bench(scene, **settings)
+    assert bench.run(alpha, **options) == OK
+    return bench
