@@ -23,6 +23,7 @@ from mdstopo.scene.culprit import Culprits
 from mdstopo.scene.refusals import refusals
 from mdstopo.sensitivity.reductions import REDUCTIONS
 from mdstopo.status import Status
+from mdstopo.warm import Beside
 
 if TYPE_CHECKING:
     from mdstopo.optimizer.problem import Problem
@@ -34,10 +35,11 @@ MOTION = 1.0
 class Evaluator:
     """A case, ready to be evaluated again and again.
 
+    beside: compile with a second process at the first use on a machine (`warm`).
     Raises CaseError where the case asks for what the engine cannot do yet.
     """
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, beside: bool = True) -> None:
         refused = refusals(case)
         if refused:
             raise CaseError(refused, str(case.path or case.name))
@@ -45,6 +47,7 @@ class Evaluator:
         self.integrator, self.integrator_reason = choose(case.solver)
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         self._method = method_of(self.integrator, case.solver)
+        self._beside = Beside(self.integrator) if beside else None
         order = state_order(case)
         shared = compile_members(case, {name: i for i, name in enumerate(order)})
         self.scenes: dict[str, Scene] = {
@@ -88,7 +91,7 @@ class Evaluator:
         for name, objectives in self._by_load_case.items():
             if not objectives:
                 continue
-            driver = self._driver(name)
+            driver = self.driver(name)
             result = driver.evaluate(design, exact)
             _count(work, driver)
             status, message = self._verdict(name, design, result)
@@ -113,7 +116,7 @@ class Evaluator:
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
         """The motion of one load case with the design alpha (N,)."""
         design = self.design(alpha)
-        driver = self._driver(load_case)
+        driver = self.driver(load_case)
         status, steps = driver.simulate(design)
         message = ""
         if not status.ok:
@@ -152,7 +155,8 @@ class Evaluator:
             if power < 1.0 and np.any(design[part] == 0.0):
                 raise ValueError(f"alpha = 0 in group {name} has no derivative: its power {power:g} is below 1")
 
-    def _driver(self, name: str) -> Driver:
+    def driver(self, name: str) -> Driver:
+        """The buffers and compiled entries of one load case, made at their first use."""
         if name not in self._drivers:
             looked = self._by_load_case[name]
             solver = self.case.solver
@@ -163,6 +167,7 @@ class Evaluator:
                 solver.step or 0.0,
                 np.array([REDUCTIONS[objective.over_time] for objective in looked], dtype=np.int64),
                 self._n,
+                self._beside,
             )
             if self.integrator == "generalized_alpha" and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
@@ -183,7 +188,7 @@ class Evaluator:
         culprit = self._culprit(name)
         if result.status.ok:
             return Status.ZERO_LENGTH, culprit.member(result.meeting)
-        status, steps = self._driver(name).simulate(design)
+        status, steps = self.driver(name).simulate(design)
         return culprit.explain(design, status, float(steps.t[-1]), steps.state[-1])
 
     def _evaluation(
@@ -197,7 +202,7 @@ class Evaluator:
     ) -> Evaluation:
         names = [objective.name for objective in self.case.objectives]
         if not status.ok:
-            lost = tuple([Peak(np.nan, np.nan, None)])
+            lost = (Peak(np.nan, np.nan, None),)
             looked = {name: looked.get(name, lost) if status is Status.NO_GRADIENT else lost for name in names}
         gradients = {}
         for name in names:

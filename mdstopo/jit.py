@@ -42,12 +42,13 @@ _FOLDER = str(cache_folder())
 
 
 def _compile(function: F, **options: Any) -> F:
-    kept = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _FOLDER
+    config: Any = numba.config
+    kept = config.CACHE_DIR
+    config.CACHE_DIR = _FOLDER
     try:
         compiled: F = numba.njit(cache=True, error_model="numpy", **options)(function)
     finally:
-        numba.config.CACHE_DIR = kept
+        config.CACHE_DIR = kept
     return compiled
 
 

@@ -126,9 +126,7 @@ def _say_frequencies(output: Output, found: list[dict[str, Any]]) -> None:
         output.table(rows)
         if entry["criterion"] is not None:
             verdict = "> 4: stiffer is better" if entry["criterion"] > 4.0 else "<= 4"
-            output.say(
-                f"  omega(initial) omega(lower bounds) t1^2 = {number(entry['criterion'], 4)} {verdict}"
-            )
+            output.say(f"  omega(initial) omega(lower bounds) t1^2 = {number(entry['criterion'], 4)} {verdict}")
             if entry["criterion"] <= 4.0:
                 for sentence in _SOFT_BRANCH:
                     output.say(f"  {sentence}")

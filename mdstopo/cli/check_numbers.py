@@ -33,10 +33,7 @@ def totals(case: Case) -> list[tuple[str, float, str]]:
             ("volume of the initial design", float(case.cost @ case.initial), ""),
         ]
     stiffness = sum(
-        len(group) * law.stiffness
-        for group in case.members
-        for law in group.laws
-        if isinstance(law, SpringLaw)
+        len(group) * law.stiffness for group in case.members for law in group.laws if isinstance(law, SpringLaw)
     )
     if stiffness:
         rows.append(("stiffness of all springs at alpha = 1", float(stiffness), "N/m"))
@@ -78,8 +75,7 @@ def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
     for load_case in case.load_cases:
         duration = load_case.end - load_case.start
         initial, lower = (
-            _elastic(engine.natural_frequencies(alpha, load_case.name))
-            for alpha in (case.initial, case.lower)
+            _elastic(engine.natural_frequencies(alpha, load_case.name)) for alpha in (case.initial, case.lower)
         )
         both = min(len(initial), len(lower)) > 0
         found.append(

@@ -46,9 +46,7 @@ _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves o
     multiple=True,
     help="A method; may be repeated (default: adjoint and direct).",
 )
-@click.option(
-    "--differences", "differencing", is_flag=True, help="Compare with extrapolated differences too."
-)
+@click.option("--differences", "differencing", is_flag=True, help="Compare with extrapolated differences too.")
 @click.option(
     "--members",
     "count",
@@ -104,25 +102,21 @@ def command(
         if differencing and not failure:
             _difference(case, alpha, count, results, datasets)
         if history and not failure:
-            for objective in case.objectives:
-                t, rows = results["direct"]["histories"][objective.name]
-                datasets[f"trajectories/{objective.load_case}/t"] = t
-                datasets |= sensitivity_part({objective.name: rows}, "direct/history")
+            failure = _histories(engine, case, alpha, datasets)
         status = RunStatus.FAILED if failure else RunStatus.CONVERGED
         file.write(
             status.value,
             failure or "done",
             datasets,
             {"integrator": engine.integrator, "integrator_reason": engine.integrator_reason},
+            tuple(f"{method}: {result['message']}" for method, result in results.items() if result["message"]),
         )
     _say(output, case, engine, results, failure, path)
     output.document(_document(case, engine, results, failure, path))
     return 1 if failure else 0
 
 
-def _prepared(
-    output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool
-) -> "Case":
+def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool) -> "Case":
     """The case as the methods need it; raises CaseError where they cannot be applied."""
     from mdstopo.case.errors import CaseError
 
@@ -132,10 +126,11 @@ def _prepared(
         raise CaseError([case.marks.mistake(key, words)], str(case_path))
     if history and "direct" not in methods:
         raise click.UsageError("--history needs --method direct")
+    if "iterative" in methods and case.solver.integrator not in ("auto", "generalized_alpha"):
+        words = f"the iterative method does not go with {case.solver.integrator}, only with generalized_alpha"
+        raise CaseError([case.marks.mistake("solver.integrator", words)], str(case_path))
     if "iterative" in methods and case.solver.integrator == "auto":
-        output.notice(
-            "iterative belongs to generalized_alpha: all methods use that integrator, to be comparable"
-        )
+        output.notice("iterative belongs to generalized_alpha: all methods use that integrator, to be comparable")
         return replace(case, solver=replace(case.solver, integrator="generalized_alpha"))
     return case
 
@@ -157,8 +152,8 @@ def _all_methods(
         results[method] = {
             "objectives": dict(evaluation.objectives),
             "gradients": gradients,
-            "histories": evaluation.histories,
             "seconds": timed(partial(engine.evaluate, alpha, sensitivity=method)),
+            "message": evaluation.message,
             "disagreement": {name: disagreement(gradients[name], reference[name]) for name in gradients},
         }
     return results, ""
@@ -190,6 +185,20 @@ def _difference(
     datasets |= {f"differences/{name}": values for name, values in found.items()}
 
 
+def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", datasets: dict[str, Any]) -> str:
+    """Add the histories dg(t)/dalpha; why there are none, where there are none."""
+    from mdstopo.sensitivity.methods import histories
+    from mdstopo.store.contents import sensitivity_part
+
+    for objective in case.objectives:
+        status, t, rows = histories(engine.driver(objective.load_case), engine.design(alpha))
+        if not status.ok:
+            return f"history: {status.value}"
+        datasets[f"trajectories/{objective.load_case}/t"] = t
+        datasets |= sensitivity_part({objective.name: rows}, "direct/history")
+    return ""
+
+
 def _say(
     output: Output,
     case: "Case",
@@ -199,9 +208,7 @@ def _say(
     path: Path,
 ) -> None:
     output.say(f"{case.title or case.name}: {failure or 'done'}")
-    rows = [
-        ["method", "objective", "value", "largest |dG/dalpha|", "differs by", "from differences by", "time"]
-    ]
+    rows = [["method", "objective", "value", "largest |dG/dalpha|", "differs by", "from differences by", "time"]]
     for method, result in results.items():
         for name, gradient in result["gradients"].items():
             rows.append(
@@ -216,9 +223,10 @@ def _say(
                 ]
             )
     output.table(rows)
-    output.table(
-        [["integrator", f"{engine.integrator}: {engine.integrator_reason}"], ["result", str(path)]], indent=""
-    )
+    for method, result in results.items():
+        if result["message"]:
+            output.notice(f"warning: {method}: {result['message']}")
+    output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"], ["result", str(path)]], indent="")
 
 
 def _document(
@@ -230,7 +238,7 @@ def _document(
         "status": "failed" if failure else "converged",
         "reason": failure or "done",
         "methods": {
-            method: {key: value for key, value in result.items() if key not in ("gradients", "histories")}
+            method: {key: value for key, value in result.items() if key != "gradients"}
             for method, result in results.items()
         },
         "integrator": engine.integrator,

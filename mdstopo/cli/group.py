@@ -48,9 +48,7 @@ def _show_version(context: click.Context, _parameter: click.Parameter, asked: bo
         context.exit()
 
 
-cli = LazyGroup(
-    name="mdstopo", context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}
-)
+cli = LazyGroup(name="mdstopo", context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 cli.params.append(
     click.Option(
         ["--version"],

@@ -61,9 +61,7 @@ def alpha_option(function: F) -> F:
 def output_options(function: F) -> F:
     """--json and --quiet."""
     function = click.option("--quiet", "-q", is_flag=True, help="Say nothing but mistakes.")(function)
-    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")(
-        function
-    )
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON object instead of text.")(function)
 
 
 def _pairs(_context: click.Context, _parameter: click.Parameter, values: tuple[str, ...]) -> dict[str, str]:

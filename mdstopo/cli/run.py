@@ -37,9 +37,7 @@ _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is 
 @set_option
 @alpha_option
 @click.option("--starts", type=click.IntRange(1), metavar="N", help="How many starts (default: the case's).")
-@click.option(
-    "--workers", type=click.IntRange(1), metavar="N", help="How many processes work on them (default 1)."
-)
+@click.option("--workers", type=click.IntRange(1), metavar="N", help="How many processes work on them (default 1).")
 @output_options
 def command(
     case_path: Path,
@@ -121,16 +119,12 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     rows = []
     for name, value in outcome.objectives.items():
         rows.append([name, f"{number(outcome.initial_objectives[name], 9)} -> {number(value, 9)}"])
-        rows += [
-            ["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in outcome.peaks.get(name, ())
-        ]
+        rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in outcome.peaks.get(name, ())]
     rows.append(["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"])
     if len(outcome.states) > 1:
         begun = [each for each in outcome.states if each is not None]
         values = ", ".join(number(each.best_objective, 6) for each in begun)
-        rows.append(
-            ["starts", f"{len(begun)} of {len(outcome.states)}; best is {outcome.best_start + 1}: {values}"]
-        )
+        rows.append(["starts", f"{len(begun)} of {len(outcome.states)}; best is {outcome.best_start + 1}: {values}"])
     rows += [[name, sentence] for name, sentence in _material(outcome)]
     rows.append(["integrator", f"{outcome.integrator}: {outcome.integrator_reason}"])
     rows.append(
@@ -154,16 +148,12 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
         if isinstance(row, VolumeRow):
             used = float(row.coefficients @ outcome.alpha)
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
-            lines.append(
-                (f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}")
-            )
+            lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower
     share = np.divide(outcome.alpha - case.lower, width, out=np.zeros(case.n_design), where=width > 0.0)
     grey = int(np.count_nonzero((share > _GREY[0]) & (share < _GREY[1])))
     full = int(np.count_nonzero(share >= _GREY[1]))
-    lines.append(
-        ("members", f"{full} present, {grey} grey, {case.n_design - full - grey} absent of {case.n_design}")
-    )
+    lines.append(("members", f"{full} present, {grey} grey, {case.n_design - full - grey} absent of {case.n_design}"))
     return lines
 
 
@@ -175,9 +165,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "reason": outcome.reason,
         "objectives": outcome.objectives,
         "initial_objectives": outcome.initial_objectives,
-        "peaks": {
-            name: [{"time": t, "value": value} for t, value in found] for name, found in outcome.peaks.items()
-        },
+        "peaks": {name: [{"time": t, "value": value} for t, value in found] for name, found in outcome.peaks.items()},
         "evaluations": outcome.evaluations,
         "iterations": outcome.iterations,
         "starts": [

@@ -17,9 +17,7 @@ _ROWS = 12  # iterates that a condensed history shows
 
 @click.command("show")
 @click.argument("result_path", metavar="RESULT", type=FILE)
-@click.option(
-    "--members", "count", type=click.IntRange(0), default=10, show_default=True, help="How many members."
-)
+@click.option("--members", "count", type=click.IntRange(0), default=10, show_default=True, help="How many members.")
 @output_options
 def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     """Say in words what a result file holds."""
@@ -28,9 +26,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     output = Output(json=as_json, quiet=quiet)
     view = read_result(result_path, leave_out=("optimizer",))
     output.say(f"{view.title or view.name}: {view.status.replace('_', ' ')} - {view.reason}")
-    output.say(
-        f"made by `{view.provenance.get('command') or view.kind}` on {view.provenance.get('created', '?')}"
-    )
+    output.say(f"made by `{view.provenance.get('command') or view.kind}` on {view.provenance.get('created', '?')}")
     if view.kind == "run":
         _say_iterations(output, view)
         _say_starts(output, view)
@@ -77,11 +73,7 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     output.say(f"{total - 1} iterations, {int(columns['evaluations'][-1])} evaluations")
     rows = [["iterate", *names, "constraint", "change", "evaluations", "time"]]
     for k in condensed(total):
-        worst = (
-            columns["constraints"][k].max(initial=float("-inf"))
-            if columns["constraints"].size
-            else float("nan")
-        )
+        worst = columns["constraints"][k].max(initial=float("-inf")) if columns["constraints"].size else float("nan")
         rows.append(
             [
                 str(k),
@@ -152,7 +144,5 @@ def _document(view: "ResultView") -> dict[str, Any]:
         columns = view.under("iterations")
         content["iterations"] = len(columns["combined"]) - 1
         content["evaluations"] = int(columns["evaluations"][-1])
-        content["objectives"] = {
-            name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))
-        }
+        content["objectives"] = {name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))}
     return content

@@ -55,9 +55,7 @@ def command(
     command_line = shlex.join(["mdstopo", *sys.argv[1:]])
     from mdstopo.store.output import output_file
 
-    with output_file(
-        path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line
-    ) as file:
+    with output_file(path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line) as file:
         announce_compilation(output)
         from mdstopo.engine import Evaluator
         from mdstopo.status import RunStatus, Status
@@ -108,16 +106,12 @@ def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
     known = [load_case.name for load_case in case.load_cases]
     for name in names:
         if name not in known:
-            raise click.BadParameter(
-                f"no load case {name!r}; there are {', '.join(known)}", param_hint="--load-case"
-            )
+            raise click.BadParameter(f"no load case {name!r}; there are {', '.join(known)}", param_hint="--load-case")
     return list(names) or known
 
 
 def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> None:
-    output.say(
-        f"load case {name}: {len(motion.t) - 1} steps from {number(motion.t[0])} to {number(motion.t[-1])} s"
-    )
+    output.say(f"load case {name}: {len(motion.t) - 1} steps from {number(motion.t[0])} to {number(motion.t[-1])} s")
     rows = [["body", "x, m", "y, m", "angle, rad", "vx, m/s", "vy, m/s", "rate, rad/s"]]
     for index, body in enumerate(case.bodies):
         part = slice(3 * index, 3 * index + 3)

@@ -1,7 +1,8 @@
 """Elimination of banded systems with partial pivoting: the effective matrix of an implicit step.
 
-Bodies that members do not connect do not meet in the matrix: a chain of bodies, declared in its order, costs what its
-length costs. For two bodies it is plain dense elimination. Row i holds column j at place j - i + half; pivoting fills up to 2 half places right of the diagonal.
+Bodies that members do not connect do not meet in the matrix: a chain of bodies, declared in its order, costs what
+its length costs. For two bodies it is plain dense elimination. Row i holds column j at place j - i + half; pivoting
+fills up to 2 half places right of the diagonal.
 """
 
 from mdstopo.jit import kernel
@@ -9,7 +10,7 @@ from mdstopo.jit import kernel
 
 @kernel
 def half_width(pair, inv_mass):  # type: ignore[no-untyped-def]
-    """Places between the diagonal and the farthest entry; what is held fixed (infinite mass) connects nothing."""
+    """Places between the diagonal and the farthest entry; bodies that are held (infinite mass) connect nothing."""
     gap = 0
     for p in range(pair.shape[0]):
         a = pair[p, 0]

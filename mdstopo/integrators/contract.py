@@ -2,23 +2,25 @@
 
 An integrator is a NamedTuple of steps and these compiled functions; `implement` enters them in the table below.
 
-1. `integrate(model, tables, strength, damped, ...)` fills the steps and returns (code, count). It lands on every entry of
-   `model.times`, leaves the equations of each step solved to rounding, and keeps at each stage what the force balance
-   saw (see `steps`).
+1. `simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work) -> (code,
+   count, time reached)`, the entry that fills the steps (see `driver`). It lands on every entry of `model.times`, leaves
+   the equations of each step solved to rounding, and keeps at each stage what the force balance saw (see `steps`).
 2. `point_of(model, tables, strength, steps, count, k, c, damped, q, v, work) -> (w, c_w)`: the state at fraction c of
    step k, to the order of the method, and where the reverse sweep has to start for it: step w at its fraction c_w (-1:
-   at its end). `reach`, with the same arguments, also leaves what the reverse sweep needs: a method whose interpolation
-   is a partial step keeps that step behind the others. May be left out where `point_of` does it all.
+   at its end). `reach`, with the same arguments, also leaves what the reverse sweep needs: a method whose
+   interpolation is a partial step keeps that step behind the others. May be left out where `point_of` does it all.
 3. `parent_of(steps, w)`: the step before step w, -1 where w begins at the start.
 4. `stage_weights(tables, steps, w, out)`: weights (s,) of the stages in the integral over step w.
-5. `reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work)`: pulls
-   cotangents back through step w, from its end (lam) and from its point (mu, zero where c_point < 0), explicit ones
-   of the stage positions added (no rows: none); leaves z (s, n), the virtual displacement of each stage's force balance. lam_x (n_carried, n)
-   belongs to whatever else the method carries from step to step (zero rows for one-step methods).
-6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: pushes changes forward
-   through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
-7. `carried(steps) -> int`: rows of lam_x and dx.
-8. `sample(steps, count, damped, t, g, d) -> m`: times, energies and their rates (NaN where unknown) by rising time,
+5. `reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped,
+   turning, work)`: pulls cotangents back through step w, from its end (lam) and from its point (mu, zero where
+   c_point < 0), explicit ones of the stage positions added (no rows: none); leaves z (s, n), the virtual displacement
+   of each stage's force balance. lam_x (n_carried, n) belongs to whatever else the method carries from step to step.
+6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: pushes
+   changes forward through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
+7. `carried(steps) -> int`: rows of lam_x and dx; none for one-step methods.
+8. `steps_of(tag, arrays)`: the steps' tuple from the arrays of `steps.carve`, chosen by the type of a tag, a NamedTuple
+   of one number, because what Python hands over are flat arrays.
+9. `sample(steps, count, damped, t, g, d) -> m`: times, energies and their rates (NaN where unknown) by rising time,
    without the first and the last state. May be left out where the stages are ordered and exact.
 """
 
@@ -32,7 +34,7 @@ from mdstopo.jit import kernel
 
 Implementation = Callable[..., Any]
 
-_DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}}
+_DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}, "steps_of": {}}
 
 
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
@@ -46,7 +48,7 @@ def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # t
 
 
 def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
-    """Duty 8."""
+    """Duty 9."""
     raise NotImplementedError
 
 
@@ -60,7 +62,9 @@ def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work):  # type: ignore[no-untyped-def]
+def reverse_step(  # type: ignore[no-untyped-def]
+    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work
+):
     """Duty 5."""
     raise NotImplementedError
 
@@ -75,19 +79,25 @@ def carried(steps):  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def implement(steps_type: type, **duties: Implementation) -> None:
-    """Enter an integrator's compiled functions for its type of steps."""
+def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+    """Duty 8."""
+    raise NotImplementedError
+
+
+def implement(steps_type: type, tag: type | None = None, **duties: Implementation) -> None:
+    """Enter an integrator's compiled functions for its type of steps, and for its tag."""
     for name, function in duties.items():
-        _DUTIES.setdefault(name, {})[steps_type] = function
+        _DUTIES.setdefault(name, {})[tag if tag is not None and name == "steps_of" else steps_type] = function
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
     """The Python function to be compiled for this type of steps; its parameters are named as the duty's."""
-    if not isinstance(steps, types.NamedTuple):
+    if not isinstance(steps, types.BaseNamedTuple):
         return None
-    chosen = _DUTIES[name].get(steps.instance_class)
+    by_type = getattr(steps, "instance_class")  # noqa: B009  (absent from Numba's annotations)
+    chosen = _DUTIES[name].get(by_type)
     if chosen is None and name == "reach":
-        chosen = _DUTIES["point_of"].get(steps.instance_class)
+        chosen = _DUTIES["point_of"].get(by_type)
     if chosen is None and name == "sample":
         chosen = sample_stages
     return getattr(chosen, "py_func", chosen)
@@ -120,9 +130,9 @@ def _stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
 
 
 @overload(reverse_step)
-def _reverse_step(
+def _reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work
-):  # type: ignore[no-untyped-def]
+):
     return _implementation("reverse_step", steps)
 
 
@@ -144,3 +154,8 @@ def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # 
 @overload(sample)
 def _sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
     return _implementation("sample", steps)
+
+
+@overload(steps_of)
+def _steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+    return _implementation("steps_of", tag)

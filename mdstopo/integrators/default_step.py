@@ -1,8 +1,8 @@
 """The step of a method with fixed steps that keeps a tolerance: measured, not guessed.
 
-The steps are halved until the objectives and their gradients settle at the method's second order; Richardson's
-estimate of the error then gives the step. It is handed on in radians of the scene's fastest vibration, so that it
-fits other designs as well.
+The steps are halved until the objectives and their gradients settle at the method's second order; Richardson's estimate
+of the error then gives the step. It is handed on in radians of the scene's fastest vibration, so that
+it fits other designs as well.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ FEWEST = 16
 
 @dataclass(frozen=True)
 class _Run:
-    """One try. rows: per objective the peak times, values and gradients; states: (T, n) at the times t (T,)."""
+    """One try. rows: per objective the peak times, values and gradients; states: (T, n) at times t (T,)."""
 
     t: FloatArray
     states: FloatArray
@@ -37,10 +37,10 @@ class _Run:
 
 
 def default_step(driver: "Driver", alpha: FloatArray) -> float:
-    """What to put into `driver.settings[2]` so that errors stay below some tolerances (settings[0]) at alpha (N,).
+    """What to put into `driver.settings[2]` so that errors are about `AIM` tolerances (settings[0]) at alpha (N,).
 
-    Negative: radians of the fastest vibration a step (`generalized_alpha.longest_step`). The error meant is that of the
-    objectives and of the largest entry of their gradients, relative; without objectives that of the motion.
+    Negative: radians of the fastest vibration a step (`generalized_alpha.longest_step`). The error meant is that
+    of the objectives and of the largest entry of their gradients, relative; without objectives that of the motion.
     """
     times = driver.scene.model.times
     span = float(times[-1] - times[0])

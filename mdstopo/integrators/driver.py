@@ -16,6 +16,7 @@ from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.packing import pack
 from mdstopo.status import Status
+from mdstopo.warm import Beside
 
 #: how near to the highest a peak competes, and how many are kept
 CLOSENESS = 0.15
@@ -41,8 +42,8 @@ class Method:
 class Looked:
     """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
 
-    rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N); meeting:
-    padded index of a member whose ends meet, or -1.
+    rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
+    meeting: padded index of a member whose ends meet, or -1.
     """
 
     status: Status
@@ -57,11 +58,19 @@ class Driver:
     """One scene, one method, ready to run."""
 
     def __init__(
-        self, scene: Scene, method: Method, tolerance: float, step: float, reductions: IndexArray, n_design: int
+        self,
+        scene: Scene,
+        method: Method,
+        tolerance: float,
+        step: float,
+        reductions: IndexArray,
+        n_design: int,
+        beside: Beside | None = None,
     ) -> None:
         self.scene = scene
         self.method = method
         self._entry: Any = None
+        self._beside = beside
         self.packed = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         self._shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
@@ -84,7 +93,23 @@ class Driver:
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
             self._entry = self.method.load()
+            if self._beside is not None and self._beside.due:
+                self._entry.simulate.compile(_types(self._simulate_arguments(False)))
         return self._entry
+
+    @property
+    def looking(self) -> Any:
+        """The entries that look at steps; where they have never been compiled, another process is doing it."""
+        if self._beside is not None:
+            self._beside.wait()
+            self._beside = None
+        return self.entry
+
+    def compile_looking(self) -> None:
+        """Compile what looks at the steps, without running it."""
+        self.entry.look.compile(_types(self._look_arguments(0, True)))
+        room = self.limits, self.room, self.room_ints, self.strength
+        self.entry.dense.compile(_types(self._dense_arguments(0, *room)))
 
     def _make_room(self, steps: int, stages: int) -> None:
         n, n_pair, damped, turning = self._shape
@@ -97,11 +122,7 @@ class Driver:
         """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call."""
         code, count, time = self.run(alpha, gradient)
         if code == OK:
-            self.entry.look(
-                self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped,
-                self.settings, self.limits, count, self.reductions, gradient, self.room, self.room_ints,
-                self.strength, self.padded, self.rows, self.found, self.gradients, self.meeting, self.work,
-            )  # fmt: skip
+            self.looking.look(*self._look_arguments(count, gradient))
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.meeting[0]))
 
     def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
@@ -109,18 +130,50 @@ class Driver:
         self._alpha[:] = alpha
         while True:
             self.work[:] = 0
-            code, count, time = self.entry.simulate(
-                self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped, tangent,
-                self.settings, self.limits, self.room, self.room_ints, self.strength, self.work,
-            )  # fmt: skip
+            code, count, time = self.entry.simulate(*self._simulate_arguments(tangent))
             if code != NEEDS_ROOM:
                 return code, count, time
             self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
+
+    def _simulate_arguments(self, tangent: bool) -> tuple[Any, ...]:
+        return (
+            self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped, tangent,
+            self.settings, self.limits, self.room, self.room_ints, self.strength, self.work,
+        )  # fmt: skip
+
+    def _look_arguments(self, count: int, gradient: bool) -> tuple[Any, ...]:
+        return (
+            self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped, self.settings,
+            self.limits, count, self.reductions, gradient, self.room, self.room_ints, self.strength, self.padded,
+            self.rows, self.found, self.gradients, self.meeting, self.work,
+        )  # fmt: skip
 
     def simulate(self, alpha: FloatArray) -> tuple[Status, "DenseSteps"]:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
         code, count, _ = self.run(alpha, False)
         return status_of(code), DenseSteps(self, count, status_code=code)
+
+    def _dense_arguments(
+        self,
+        count: int,
+        limits: IndexArray,
+        room: FloatArray,
+        room_ints: IndexArray,
+        strength: FloatArray,
+        times: FloatArray | None = None,
+    ) -> tuple[Any, ...]:
+        asked = np.zeros(0) if times is None else times
+        return (
+            self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self.scene.damped, limits,
+            count, room, room_ints, strength, asked, np.zeros((3, len(asked), self._shape[0])),
+            np.zeros(WORK, dtype=np.int64),
+        )  # fmt: skip
+
+
+def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    from numba import typeof
+
+    return tuple(typeof(argument) for argument in arguments)
 
 
 class DenseSteps:
@@ -142,15 +195,13 @@ class DenseSteps:
 
     def at(self, times: FloatArray) -> FloatArray:
         """q, v, a (3, T, n) at times (T,) within what was simulated."""
-        driver = self._driver
-        out = np.zeros((3, len(times), driver._shape[0]))
         if self.count == 0:
             raise ValueError("no step was completed")
-        driver.entry.dense(
-            driver.packed.ints, driver.packed.floats, driver.method.tables, driver.scene.damped, self._limits,
-            self.count, self._room, self._ints, self._strength, np.ascontiguousarray(times, dtype=np.float64), out,
-            np.zeros(WORK, dtype=np.int64),
-        )  # fmt: skip
+        arguments = self._driver._dense_arguments(
+            self.count, self._limits, self._room, self._ints, self._strength, np.array(times, dtype=np.float64)
+        )
+        self._driver.looking.dense(*arguments)
+        out: FloatArray = arguments[-2]
         return out
 
 

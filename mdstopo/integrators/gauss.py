@@ -30,6 +30,7 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     SWEEPS,
     TANGENTS,
+    carve,
     copy_rows,
     copy_tangents,
     deflection,
@@ -38,11 +39,13 @@ from mdstopo.integrators.steps import (
     largest_difference,
     motion_weights,
 )
-from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import SUMS, add_loads, add_turning, forces, subtract_products
+from mdstopo.jit import entry, kernel
+from mdstopo.mechanics.assembly import SUMS, add_loads, add_turning, forces, scale_members, subtract_products
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.scene.packing import unpack
 
-GaussSteps = namedtuple("GaussSteps", FIELDS)
+GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
+GaussTag = namedtuple("GaussTag", ("method",))
 
 COUNTS = LEVELS
 MOST = max(LEVELS)
@@ -64,7 +67,9 @@ def integrate_to_nodes(matrix, s, factor, start, slope, c, a, out):  # type: ign
 
 
 @kernel
-def _balance(pair, inv_mass, table, s, q0, v0, hv0, h, f, k, c, turn, damped, turning, weight, ref, a, q, v, room, work):  # type: ignore[no-untyped-def]
+def _balance(  # type: ignore[no-untyped-def]
+    pair, inv_mass, table, s, q0, v0, hv0, h, f, k, c, turn, damped, turning, weight, ref, a, q, v, room, work
+):
     """Solve the linearised balance for a (s, n) by sweeps; q, v become the states that belong to it.
 
     In: forces f and tangents at ref (2, s, n); a as a first guess; weight (n,) of `motion_weights`; room (3, s, n).
@@ -152,17 +157,25 @@ def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
     return rate
 
 
-@kernel
-def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixed_step, max_steps, steps, work):  # type: ignore[no-untyped-def]
-    """Integrate from the first to the last of model.times into steps; returns (code, number of windows).
+@entry
+def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
+    """Integrate alpha (N,) over model.times; returns (code, number of windows, time reached).
 
-    strength: (3, M_padded). tolerance: error of the interpolated motion relative to the motion itself; ignored with
-    fixed_step > 0 (windows of that length, seven nodes). work: counts, added to. NEEDS_ROOM asks for larger `steps`.
+    In: the packed model; settings: tolerance, the error of the interpolated motion relative to the motion itself;
+    Newton tolerance; fixed step (> 0: windows of that length, seven nodes, no error control); limits: windows allowed,
+    room for windows, for stages. Room: room, room_ints, where the steps stay; strength (3, M_padded). work: counts, added to.
+    Tangents are always kept. NEEDS_ROOM asks for more room.
     """
+    model = unpack(ints, floats)
+    tolerance = settings[0]
+    newton_tolerance = settings[1]
+    fixed_step = settings[2]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     n_level = tables.shape[0]
     turning = model.load_body.shape[0] > 0
+    steps = GaussSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
+    scale_members(model.block, model.power, model.member, alpha, strength)
     pair = model.pair
     inv_mass = model.inv_mass
     times = model.times
@@ -239,13 +252,13 @@ def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixe
     for segment in range(times.shape[0] - 1):
         end = times[segment + 1]
         while t < end:
-            if count >= max_steps:
-                return STEP_LIMIT, count
+            if count >= limits[0]:
+                return STEP_LIMIT, count, t
             pieces = np.ceil((end - t) / wanted - 1e-9)
             h = (end - t) / max(pieces, 1.0)
             lands = pieces <= 1.0
             if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
-                return STEP_TOO_SMALL, count
+                return STEP_TOO_SMALL, count, t
 
             # predict with the balance linearised at the window's start (the last stage before it)
             level = FIXED_LEVEL if fixed_step > 0.0 else 0
@@ -284,7 +297,9 @@ def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixe
                         for d in range(n):
                             ref[0, i, d] = q[i, d]
                             ref[1, i, d] = v[i, d]
-                    forces(model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
+                    forces(
+                        model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn
+                    )
                     work[FORCES] += s
                     work[TANGENTS] += s
                     work[NEWTON] += 1
@@ -347,12 +362,12 @@ def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixe
             if not accepted:
                 work[REJECTED] += 1
                 if fixed_step > 0.0:
-                    return (STEP_TOO_SMALL if np.isfinite(e) else NON_FINITE), count
+                    return (STEP_TOO_SMALL if np.isfinite(e) else NON_FINITE), count, t
                 wanted = 0.5 * h
                 continue
 
             if count + 2 > steps.t.shape[0] or stages + s > steps.scalar.shape[0]:
-                return NEEDS_ROOM, count
+                return NEEDS_ROOM, count, t
             for i in range(s):
                 keep_stage(
                     stages + i, t_node[i], q[i], v[i], coef[i], rel[i], sums[i], k[i], c[i if damped else 0],
@@ -381,7 +396,7 @@ def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixe
                 v0[d] = speed
                 finite = finite and np.isfinite(position) and np.isfinite(speed)
             if not finite:
-                return NON_FINITE, count
+                return NON_FINITE, count, t
             t = end if lands else t + h
             steps.index[count, 1] = level
             steps.index[count, 2] = segment
@@ -393,7 +408,7 @@ def integrate(model, tables, strength, damped, tolerance, newton_tolerance, fixe
             if fixed_step <= 0.0:
                 change = 0.9 * (tolerance / max(estimate, 1e-30)) ** (1.0 / (s + 1)) * 11.0 / s
                 wanted = h * min(max(change, 0.4), 2.0)
-    return OK, count
+    return OK, count, t
 
 
 @kernel

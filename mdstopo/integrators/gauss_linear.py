@@ -7,7 +7,7 @@ window, transposed or not, by sweeps that contract as the forward ones did.
 import numpy as np
 
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.gauss import COUNTS, GaussSteps, integrate_to_nodes
+from mdstopo.integrators.gauss import COUNTS, GaussSteps, GaussTag, integrate_to_nodes
 from mdstopo.integrators.steps import REVERSE, SWEEPS
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
@@ -237,8 +237,16 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
             dv[d] += h * beta_v[j] * da[j, d]
 
 
+@kernel
+def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+    """The arrays as this method's steps."""
+    return GaussSteps(*arrays)
+
+
 implement(
     GaussSteps,
+    GaussTag,
+    steps_of=steps_of,
     point_of=point_of,
     parent_of=parent_of,
     stage_weights=stage_weights,

@@ -9,10 +9,14 @@ Gauss Runge-Kutta method (v = v_0 + h A a, q = q_0 + h c v_0 + h^2 A A a: order 
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.scene.model import FloatArray
+
+AnyFloats = NDArray[np.floating[Any]]
 
 #: numbers of nodes a window may have, in the order in which they are tried
 LEVELS = (4, 7, 9, 11, 14)
@@ -23,7 +27,7 @@ LEVELS = (4, 7, 9, 11, 14)
 NODES, A, AA, LEGENDRE, FIRST, SECOND, VALUES = range(7)
 
 
-def _legendre(x: FloatArray, degree: int) -> list[FloatArray]:
+def _legendre(x: AnyFloats, degree: int) -> list[AnyFloats]:
     """P_0 .. P_degree at x in [-1, 1], in the precision of x."""
     values = [np.ones_like(x), x.copy()]
     for k in range(1, degree):
@@ -31,7 +35,7 @@ def _legendre(x: FloatArray, degree: int) -> list[FloatArray]:
     return values[: degree + 1]
 
 
-def _nodes(s: int) -> tuple[FloatArray, FloatArray]:
+def _nodes(s: int) -> tuple[AnyFloats, AnyFloats]:
     """Gauss nodes and weights on [0, 1], polished by Newton in extended precision."""
     x = np.polynomial.legendre.leggauss(s)[0].astype(np.longdouble)
     for _ in range(3):
@@ -43,7 +47,7 @@ def _nodes(s: int) -> tuple[FloatArray, FloatArray]:
     return (x + 1) / 2, 1 / ((1 - x * x) * slope * slope)
 
 
-def integrals(c: FloatArray, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+def integrals(c: AnyFloats, count: int) -> tuple[AnyFloats, AnyFloats, AnyFloats]:
     """P_k, I1_k, I2_k for k < count at c in [0, 1]: three arrays (len(c), count)."""
     p = _legendre(2 * c - 1, count + 2)
     first = [c] + [(p[k + 1] - p[k - 1]) / (2 * (2 * k + 1)) for k in range(1, count + 1)]
@@ -53,8 +57,11 @@ def integrals(c: FloatArray, count: int) -> tuple[FloatArray, FloatArray, FloatA
 
 @cache
 def gauss_tables() -> FloatArray:
-    """All tables (n_level, 7, s_max, s_max), padded with zeros; computed once a process (about a millisecond). Not to be written to;
-    not flagged so, because the flag is part of an array's type and would have kernels compiled twice."""
+    """All tables (n_level, 7, s_max, s_max), padded with zeros; computed once a process (about a millisecond).
+
+    Not to be written to; not flagged so, because the flag is part of an array's type and would have every kernel
+    compiled twice.
+    """
     most = max(LEVELS)
     tables = np.zeros((len(LEVELS), 7, most, most))
     for level, s in enumerate(LEVELS):
@@ -64,8 +71,7 @@ def gauss_tables() -> FloatArray:
         matrix = first @ transform
         out = tables[level]
         out[NODES, :3, :s] = c, b, b * (1 - c)
-        for plane, value in (
-            (A, matrix), (AA, matrix @ matrix), (LEGENDRE, transform), (FIRST, first), (SECOND, second), (VALUES, values),
-        ):  # fmt: skip
+        planes = {A: matrix, AA: matrix @ matrix, LEGENDRE: transform, FIRST: first, SECOND: second, VALUES: values}
+        for plane, value in planes.items():
             out[plane, :s, :s] = value
     return tables

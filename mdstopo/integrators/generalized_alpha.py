@@ -1,17 +1,18 @@
-"""The generalized-alpha method in the form of Arnold and Bruels, in which accelerations too are of second order.
+"""Generalized-alpha in the form of Arnold and Bruels, in which accelerations too are of second order.
 
 The accelerations a obey the equations of motion at every step's end; an auxiliary x carries the filter,
 
     (1 - alpha_m) x' + alpha_m x = (1 - alpha_f) a' + alpha_f a
-    q' = q + h v + h^2 ((1/2 - beta) x + beta x'),     v' = v + h ((1 - gamma) x + gamma x'),     M a' = F(q', v', t')
+    q' = q + h v + h^2 ((1/2 - beta) x + beta x'),   v' = v + h ((1 - gamma) x + gamma x'),   M a' = F(q', v', t')
 
 with the weights that follow from the spectral radius r (Eq. 15 to 20 in this notation). x lags a by
 (alpha_f - alpha_m) h, so at the start of every segment of the loads it is set to a - (a(lag) - a), a(lag) the
 acceleration at the state which that acceleration alone would reach after the lag: second order at once, no
-transient. These two evaluations are stages of the step like its end, so that their derivatives are exact too.
+transient (a vibration that the steps do not resolve is left with x = a). These evaluations are stages of the step
+like its end, so that their derivatives are exact too.
 
-Newton's iteration takes the exact tangent and begins with x extrapolated from the steps before; with small steps
-its first correction is rounding, and a step costs one pass over the members.
+Newton's iteration takes the exact tangent and begins with x extrapolated from the steps before; with small
+steps its first correction is rounding, and a step costs one pass over the members.
 """
 
 from collections import namedtuple
@@ -41,17 +42,20 @@ from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import SUMS, forces
 from mdstopo.mechanics.geometry import POSE
 
-AlphaSteps = namedtuple("AlphaSteps", FIELDS)
+AlphaSteps = namedtuple("AlphaSteps", FIELDS)  # type: ignore[misc]
+AlphaTag = namedtuple("AlphaTag", ("method",))
 
 #: steps that an automatic choice takes at least
 FEWEST = 16
+#: radians of the fastest vibration a step up to which the start looks for the slope of the acceleration
+RESOLVED = 2.0
 #: Newton corrections before the extrapolated start is given up, and before the step is
 RESTART, MOST = 8, 30
 
 
 @kernel
 def weights_of(radius):  # type: ignore[no-untyped-def]
-    """Return e1, e2, e3, beta, gamma, lag for a spectral radius 0..1: x' = e1 a' + e2 a - e3 x, lag in steps."""
+    """Return e1, e2, e3, beta, gamma, lag (in steps) for a spectral radius 0..1; x' = e1 a' + e2 a - e3 x."""
     lag = (1.0 - radius) / (1.0 + radius)
     e1 = 1.0 / (2.0 - radius)
     return e1, radius * e1, (2.0 * radius - 1.0) * e1, 0.25 * (1.0 + lag) ** 2, 0.5 + lag, lag
@@ -92,9 +96,9 @@ def effective_matrix(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning, tran
 def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps, steps, work):  # type: ignore[no-untyped-def]
     """Integrate from the first to the last of model.times; returns (code, number of steps).
 
-    tables: (1,) spectral radius. strength: (3, M_padded). step: longest step, s; every segment is divided equally.
-    newton_tolerance: correction relative to the motion after which the next would be rounding. work: counts, added to.
-    Where `steps` is too small NEEDS_ROOM comes with the number of steps to be taken (two more stages a segment).
+    tables: (1,) spectral radius. strength: (3, M_padded). step: longest step, s; segments are divided equally.
+    newton_tolerance: correction relative to the motion after which the next would be rounding. work: counts, added
+    to. Where `steps` is too small NEEDS_ROOM comes with the number of steps (two more stages a segment).
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -155,8 +159,8 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
         h = length / pieces
         if not h > 1e-15 * max(abs(times[segment]), abs(times[segment + 1])):
             return STEP_TOO_SMALL, count
-        known = 0
         for piece in range(pieces):
+            known = min(piece, 3)
             t_end = times[segment] + h * (piece + 1) if piece + 1 < pieces else times[segment + 1]
             starting = (2 if lag > 0.0 else 1) if piece == 0 else 0
             # the stages of the start (counting down), then Newton's iterations of the end
@@ -181,20 +185,22 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                             x_now[d] = 2.0 * x[0, d] - x[1, d]
                         elif newton == 0 and known == 2:
                             x_now[d] = 3.0 * (x[0, d] - x[1, d]) + x[2, d]
-                        elif newton == 0 and known >= 3:
+                        elif newton == 0 and known == 3:
                             x_now[d] = 4.0 * (x[0, d] + x[2, d]) - 6.0 * x[1, d] - x[3, d]
                         a_now[d] = (x_now[d] - e2 * a[d] + e3 * x[0, d]) / e1
                         q_now[0, d] = q[d] + h * (v[d] + h * ((0.5 - beta) * x[0, d] + beta * x_now[d]))
                         v_now[0, d] = v[d] + h * ((1.0 - gamma) * x[0, d] + gamma * x_now[d])
                     previous = np.inf
-                forces(model, strength, segment, one, t_now, q_now, v_now, yes, damped, rel, sums, f, k, c, turn)
+                forces(
+                    model, strength, segment, one, t_now, q_now, v_now, yes, damped, rel, sums, f, k, c, turn
+                )
                 work[FORCES] += 1
                 work[TANGENTS] += 1
                 if count == 0 and newton == -starting:
                     for p in range(n_pair):
                         stiffness = sums[0, p, 7] + sums[0, p, 11]
                         if sums[0, p, 3] > 0.0 and stiffness > 0.0:
-                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # a pair that starts strained
+                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # it starts strained
                         size = np.sqrt(rel[0, p, 0] ** 2 + rel[0, p, 1] ** 2) + model.reach[p]
                         noise[p] = 1e-15 * size + 1e-300
                         for j in range(POSE):
@@ -205,8 +211,8 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                     for d in range(n):
                         delta[d] = inv_mass[d] * f[0, d] - a_now[d]
                     if not effective_matrix(
-                        pair, inv_mass, k[0], c[0], turn[0], h * h * beta * e1, h * gamma * e1, damped, turning,
-                        no, half, band, pivots,
+                        pair, inv_mass, k[0], c[0], turn[0], h * h * beta * e1, h * gamma * e1, damped,
+                        turning, no, half, band, pivots,
                     ):  # fmt: skip
                         return NEWTON_FAILED, count
                     solve(band, half, pivots, delta)
@@ -225,7 +231,10 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                         if not size <= e and not np.isnan(e):
                             e = size
                     # the last clause: rounding is all that is left
-                    accepted = e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-8)
+                    rounding = 1e-8
+                    for p in range(n_pair):
+                        rounding = max(rounding, 100.0 * noise[p] / scale[p])
+                    accepted = e <= newton_tolerance or (e >= 0.5 * previous and e < rounding)
                     previous = e
                     if not accepted and (newton >= MOST or (newton >= RESTART and not e < np.inf)):
                         return (NEWTON_FAILED if e < np.inf else NON_FINITE), count
@@ -250,6 +259,8 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                             x[0, d] = a_now[d]
                         else:
                             x[0, d] = 2.0 * a[d] - a_now[d]
+                    if newton == -2 and not h * fastest_rate(pair, inv_mass, k, c, damped) < RESOLVED:
+                        newton = -1  # the lagged state would be far off the motion
                 newton += 1
             finite = True
             for d in range(n):
@@ -263,7 +274,6 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                 finite = finite and np.isfinite(q[d]) and np.isfinite(v[d])
             if not finite:
                 return NON_FINITE, count
-            known += 1
             steps.index[count, 1] = starting
             steps.index[count, 2] = segment
             count += 1
@@ -291,17 +301,17 @@ def rate_at_start(model, strength, damped):  # type: ignore[no-untyped-def]
     t = np.empty(1)
     t[0] = model.times[0]
     forces(
-        model, strength, np.int64(0), np.int64(1), t, state[0], state[1], np.bool_(True), damped, rel, sums, state[2],
-        k, c, turn,
+        model, strength, np.int64(0), np.int64(1), t, state[0], state[1], np.bool_(True), damped, rel, sums,
+        state[2], k, c, turn,
     )  # fmt: skip
     return fastest_rate(model.pair, model.inv_mass, k, c, damped)
 
 
 @kernel
 def longest_step(model, strength, damped, wanted):  # type: ignore[no-untyped-def]
-    """The step in s: `wanted` itself, or, where that is negative, so many radians of the fastest vibration at the start.
+    """The step in s: `wanted`, or, where that is negative, so many radians of the fastest vibration at the start.
 
-    So a step that was once found good enough (`default_step`) keeps its accuracy when the design becomes stiffer.
+    So a step that was found good enough (`default_step`) keeps its accuracy when the design becomes stiffer.
     """
     if wanted > 0.0:
         return wanted

@@ -1,23 +1,27 @@
-"""Compiled entries of the generalized-alpha method: what Python calls (`driver`), with everything in few arrays.
+"""Compiled entries of generalized-alpha: what Python calls (`driver`), with everything in few arrays.
 
-In all of them: the packed model; tables (1,) the spectral radius; settings (tolerance, not used here; Newton tolerance;
-step, see `generalized_alpha.longest_step`; closeness); limits (steps allowed, room for steps, room for stages); room,
-room_ints for the steps; strength (3, M_padded); work counts, added to.
+In all of them: the packed model; tables (1,) the spectral radius; settings (tolerance, not used here; Newton
+tolerance; step, see `generalized_alpha.longest_step`; closeness); limits (steps allowed, room for steps, room for
+stages); room, room_ints for the steps; strength (3, M_padded); work counts, added to.
 """
 
 import mdstopo.integrators.generalized_alpha_linear  # noqa: F401  (enters the contract's table)
-from mdstopo.integrators.generalized_alpha import AlphaSteps, integrate, longest_step
+from mdstopo.integrators.generalized_alpha import AlphaSteps, AlphaTag, integrate, longest_step
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start
 from mdstopo.integrators.steps import carve
 from mdstopo.jit import entry
 from mdstopo.mechanics.assembly import scale_members
 from mdstopo.scene.packing import unpack
-from mdstopo.sensitivity.look import dense_states, look_at
+from mdstopo.sensitivity.look import dense, look
+
+TAG = AlphaTag(0)
+
+__all__ = ["TAG", "dense", "look", "rate_at_start", "simulate"]
 
 
 @entry
 def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
-    """Simulate alpha (N,) once; the steps stay in room, always with tangents. Returns (code, steps, time reached)."""
+    """Simulate alpha (N,) once; the steps stay in room, with tangents. Returns (code, steps, time reached)."""
     model = unpack(ints, floats)
     turning = model.load_body.shape[0] > 0
     steps = AlphaSteps(
@@ -30,34 +34,6 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
 
 
 @entry
-def look(  # type: ignore[no-untyped-def]
-    ints, floats, tables, alpha, damped, settings, limits, count, reductions, gradient, room, room_ints, strength,
-    padded, rows, found, gradients, meeting, work,
-):
-    """Look at the steps that `simulate` left in room (`look.look_at`)."""
-    model = unpack(ints, floats)
-    turning = model.load_body.shape[0] > 0
-    steps = AlphaSteps(
-        *carve(room, room_ints, model.q0.shape[0], model.pair.shape[0], limits[1], limits[2], damped, turning)
-    )
-    look_at(
-        model, tables, strength, alpha, steps, count, damped, reductions, settings[3], gradient, padded, rows, found,
-        gradients, meeting, work,
-    )  # fmt: skip
-
-
-@entry
-def dense(ints, floats, tables, damped, limits, count, room, room_ints, strength, times, out, work):  # type: ignore[no-untyped-def]
-    """q, v, a at times (T,) from the steps that `simulate` left in room: out (3, T, n)."""
-    model = unpack(ints, floats)
-    turning = model.load_body.shape[0] > 0
-    steps = AlphaSteps(
-        *carve(room, room_ints, model.q0.shape[0], model.pair.shape[0], limits[1], limits[2], damped, turning)
-    )
-    dense_states(model, tables, strength, steps, count, damped, times, out, work)
-
-
-@entry
 def rate_at_start(ints, floats, strength, damped):  # type: ignore[no-untyped-def]
-    """Angular frequency of the fastest vibration at the start, rad/s, with strength (3, M_padded) as left by a run."""
+    """Angular frequency of the fastest vibration at the start, rad/s; strength (3, M_padded) as left by a run."""
     return _rate_at_start(unpack(ints, floats), strength, damped)

@@ -10,7 +10,7 @@ import numpy as np
 
 from mdstopo.integrators.banded import half_width, solve
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.generalized_alpha import AlphaSteps, effective_matrix, weights_of
+from mdstopo.integrators.generalized_alpha import AlphaSteps, AlphaTag, effective_matrix, weights_of
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
@@ -120,8 +120,8 @@ def reverse_step(  # type: ignore[no-untyped-def]
             bar_v[0, d] += h * v1 * mu_q[d] + dv1 * mu_v[d]
     effective_matrix(
         pair, inv_mass, steps.K[o + last], steps.C[o + last] if damped else steps.K[o + last],
-        steps.turn[o + last] if turning else start_q, h * h * beta * e1, h * gamma * e1, damped, turning, np.bool_(True), half,
-        band, pivots,
+        steps.turn[o + last] if turning else start_q, h * h * beta * e1, h * gamma * e1, damped, turning,
+        np.bool_(True), half, band, pivots,
     )  # fmt: skip
     # stages from the last to the first: what pulls on a stage's acceleration, its z, and on to its state
     for j in range(last, -1, -1):
@@ -187,8 +187,8 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
     aux = dx[1]
     effective_matrix(
         pair, inv_mass, steps.K[o + last], steps.C[o + last] if damped else steps.K[o + last],
-        steps.turn[o + last] if turning else da, h * h * beta * e1, h * gamma * e1, damped, turning, np.bool_(False), half,
-        band, pivots,
+        steps.turn[o + last] if turning else da, h * h * beta * e1, h * gamma * e1, damped, turning,
+        np.bool_(False), half, band, pivots,
     )  # fmt: skip
     for j in range(last + 1):
         x = dq_stage[j]
@@ -233,8 +233,16 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
         dv[d] = (dq0 * start + dq1 * end) / h + dv0 * dv[d] + dv1 * speed[0, d]
 
 
+@kernel
+def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+    """The arrays as this method's steps."""
+    return AlphaSteps(*arrays)
+
+
 implement(
     AlphaSteps,
+    AlphaTag,
+    steps_of=steps_of,
     point_of=point_of,
     sample=sample,
     parent_of=parent_of,

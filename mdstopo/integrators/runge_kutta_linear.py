@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.runge_kutta import MOST, RungeKuttaSteps, advance
+from mdstopo.integrators.runge_kutta import MOST, RungeKuttaSteps, RungeKuttaTag, advance
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
@@ -79,9 +79,9 @@ def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
             best = -1
             for i in range(1, s):
                 time = steps.scalar[o + i, 0]
-                if time > last + 1e-3 * h and time < steps.t[w + 1] - 1e-3 * h:
-                    if best < 0 or time <= steps.scalar[o + best, 0]:
-                        best = i
+                inside = time > last + 1e-3 * h and time < steps.t[w + 1] - 1e-3 * h
+                if inside and (best < 0 or time <= steps.scalar[o + best, 0]):
+                    best = i
             if best < 0:
                 break
             last = steps.scalar[o + best, 0]
@@ -188,8 +188,16 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
             dv[d] += h * table[2, 2, j] * da[j, d]
 
 
+@kernel
+def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+    """The arrays as this method's steps."""
+    return RungeKuttaSteps(*arrays)
+
+
 implement(
     RungeKuttaSteps,
+    RungeKuttaTag,
+    steps_of=steps_of,
     point_of=point_of,
     reach=reach,
     sample=sample,

@@ -71,8 +71,17 @@ def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-
     highest = -np.inf
     for i in range(samples):
         highest = max(highest, g[i])
+    size = 0.0
+    for i in range(samples):
+        size = max(size, abs(g[i]))
     found = 0
-    if d[0] < 0.0 or (d[0] == 0.0 and g[0] >= g[1] and d[1] <= 0.0):
+    falls = d[0] < 0.0
+    if d[0] == 0.0:  # from rest: the first sample that differs by more than rounding tells
+        i = 1
+        while i < samples - 1 and abs(g[i] - g[0]) <= 1e-13 * size:
+            i += 1
+        falls = g[i] <= g[0]
+    if falls:
         found = keep_peak(peaks, found, t[0], g[0])
     if d[samples - 1] > 0.0:
         found = keep_peak(peaks, found, t[samples - 1], g[samples - 1])
@@ -150,18 +159,26 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
         b = t[i + 1]
         crossing = d[i] > 0.0 and d[i + 1] <= 0.0
         time = a + bracket[j, 1] * (b - a)
+        # a side is certain where the rate there is known; a guessed one is moved out until it is
         rises = not guessed[i]
         falls = not guessed[i + 1]
+        left = i
+        right = i + 1
         if not rises:
-            a = t[i - 1]
+            left -= 1
+            a = t[left]
+            rises = not guessed[left] and d[left] > 0.0
         if not falls:
-            b = t[i + 2]
+            right += 1
+            b = t[right]
+            falls = not guessed[right] and d[right] <= 0.0
         # the secant begins with the end that is nearer in rate
         nearer = i if abs(d[i]) < abs(d[i + 1]) else i + 1
         x0 = t[nearer]
         d0 = d[nearer]
         value = g[i]
-        for _ in range(60):
+        turns = False  # the last secant was one of true rates, falling, and its root is where we are
+        for visit in range(60):
             k = step_at(steps.t, count, time)
             c = (time - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
@@ -171,13 +188,8 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
             rate *= sign
             if not crossing and not (d[i] > 0.0 and rate < 0.0) and not (d[i] < 0.0 and rate > 0.0):
                 break  # the dip of the cubic was none of the motion's
-            if not crossing:
-                crossing = rises = falls = True
-                if rate < 0.0:
-                    b = time
-                else:
-                    a = time
-            elif rate > 0.0:
+            crossing = True
+            if rate > 0.0:
                 a = time
                 rises = True
             else:
@@ -186,16 +198,30 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
             if rate == 0.0 or b - a <= 4e-16 * span:
                 break
             step = -rate * (time - x0) / (rate - d0) if rate != d0 else 0.0
+            turns = (visit > 0 or not guessed[nearer]) and (rate - d0) * (time - x0) < 0.0
             x0 = time
             d0 = rate
             following = time + step
+            if not rises and following <= a and left > 0:
+                left -= 1
+                a = t[left]
+                rises = not guessed[left] and d[left] > 0.0
+            if not falls and following >= b and right < samples - 1:
+                right += 1
+                b = t[right]
+                falls = not guessed[right] and d[right] <= 0.0
             if step == 0.0 or not (following > a and following < b):
                 following = 0.5 * (a + b)
+                turns = False
             if abs(following - time) <= 1e-14 * span:
                 break
             time = following
-        if crossing and rises and falls:
-            found = keep_peak(peaks, found, time, value)
+        if crossing and ((rises and falls) or turns):
+            known = False  # brackets that were widened may share a peak
+            for r in range(found):
+                known = known or abs(peaks[r, 0] - time) <= 1e-10 * span
+            if not known:
+                found = keep_peak(peaks, found, time, value)
     if found == 0:
         best = 0
         for i in range(samples):

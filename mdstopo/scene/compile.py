@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, MemberGroup, SpringLaw
-from mdstopo.scene.model import VECTOR, FloatArray, Model
+from mdstopo.scene.model import VECTOR, FloatArray, IndexArray, Model
 from mdstopo.scene.signals import breakpoints, segment_values
 
 ELASTIC, VISCOUS = 0, 1
@@ -45,8 +45,20 @@ class Scene:
         return self.load_case.end
 
 
-def compile_members(case: Case, index: dict[str, int]) -> dict[str, FloatArray]:
-    """Blocks, pairs and member arrays: what all load cases share. index: body name to its place in the state."""
+@dataclass(frozen=True)
+class Members:
+    """What all load cases share, as in `Model`: pairs (n, 2), blocks, powers, member arrays; and the shortest initial
+    length of each block."""
+
+    pairs: IndexArray
+    block: IndexArray
+    power: FloatArray
+    member: FloatArray
+    shortest: FloatArray
+
+
+def compile_members(case: Case, index: dict[str, int]) -> Members:
+    """Blocks, pairs and member arrays. index: body name to its place in the state."""
     pairs: dict[tuple[int, int], int] = {}
     blocks, powers, first = [], [], 0
     total = sum(-(-len(group) // VECTOR) * VECTOR for group in case.members)
@@ -67,13 +79,13 @@ def compile_members(case: Case, index: dict[str, int]) -> dict[str, FloatArray]:
         powers.append(group.power)
         first += count if group.design else 0
         start = stop
-    return {
-        "pairs": np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
-        "block": np.array(blocks, dtype=np.int64).reshape(-1, 6),
-        "power": np.array(powers, dtype=np.float64),
-        "member": member,
-        "shortest": np.array([float(group.length.min()) for group in case.members]),
-    }
+    return Members(
+        pairs=np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
+        block=np.array(blocks, dtype=np.int64).reshape(-1, 6),
+        power=np.array(powers, dtype=np.float64),
+        member=member,
+        shortest=np.array([float(group.length.min()) for group in case.members]),
+    )
 
 
 def _spring(group: MemberGroup) -> SpringLaw:
@@ -91,7 +103,7 @@ def state_order(case: Case) -> tuple[str, ...]:
     return (*names, GROUND) if GROUND in held or set(names) - held else names
 
 
-def compile_scene(case: Case, load_case: LoadCase, shared: dict[str, FloatArray]) -> Scene:
+def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
     """The arrays of one load case; `shared` are those of `compile_members`."""
     names = state_order(case)
     index = {name: i for i, name in enumerate(names)}
@@ -125,7 +137,7 @@ def compile_scene(case: Case, load_case: LoadCase, shared: dict[str, FloatArray]
         load_force[:, k, 0] = segment_values(load.force[0], times)
         load_force[:, k, 1] = segment_values(load.force[1], times)
 
-    block, member = shared["block"], shared["member"]
+    block, member = shared.block, shared.member
     damped = bool(np.any(member[6] > 0.0))
     model = Model(
         inv_mass=inv_mass,
@@ -135,7 +147,7 @@ def compile_scene(case: Case, load_case: LoadCase, shared: dict[str, FloatArray]
         reach=reach,
         shortest=shortest,
         block=block,
-        power=shared["power"],
+        power=shared.power,
         member=member,
         times=times,
         force=force,
@@ -150,16 +162,16 @@ def compile_scene(case: Case, load_case: LoadCase, shared: dict[str, FloatArray]
 
 
 def _watched_pairs(
-    names: tuple[str, ...], shared: dict[str, FloatArray]
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+    names: tuple[str, ...], shared: Members
+) -> tuple[IndexArray, FloatArray, FloatArray]:
     """Pairs that members connect, then each body without members against ground: errors are measured on pairs."""
-    pairs = [tuple(pair) for pair in shared["pairs"].tolist()]
+    pairs = [tuple(pair) for pair in shared.pairs.tolist()]
     held = {body for pair in pairs for body in pair}
     ground = len(names) - 1
     pairs += [(ground, i) for i in range(len(names)) if i not in held and i != ground]
     reach, shortest = np.zeros(len(pairs)), np.full(len(pairs), np.inf)
-    for (pair, start, stop, *_), length in zip(shared["block"].tolist(), shared["shortest"], strict=True):
-        q = shared["member"][2:4, start:stop]
+    for (pair, start, stop, *_), length in zip(shared.block.tolist(), shared.shortest, strict=True):
+        q = shared.member[2:4, start:stop]
         shortest[pair] = min(shortest[pair], length)
         reach[pair] = max(reach[pair], float(np.sqrt(np.max(np.einsum("ij,ij->j", q, q)))))
     reach[reach == 0.0] = 1.0
@@ -172,7 +184,7 @@ def _skipped(
     damped: bool,
     times: FloatArray,
     turning: list[Load],
-    block: FloatArray,
+    block: IndexArray,
 ) -> tuple[str, ...]:
     notes = []
     if not damped:

@@ -41,8 +41,8 @@ def pack(model: Model) -> Packed:
         + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows)]
     ).astype(np.int64)
     parts: list[Any] = [
-        model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power, model.member, model.times, model.force,
-        model.load_arm, model.load_force,
+        model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power, model.member, model.times,
+        model.force, model.load_arm, model.load_force,
     ]  # fmt: skip
     floats = np.concatenate([np.asarray(a, dtype=np.float64).ravel() for a in parts])
     return Packed(ints, floats)

@@ -63,7 +63,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
     n_pair = model.pair.shape[0]
     pair = model.pair
     turning = model.load_body.shape[0] > 0
-    integral = reduction == MEAN or reduction == INTEGRAL
+    integral = reduction in (MEAN, INTEGRAL)
     unit = model.member[5:8]
     stages = steps.index[count, 0]
     point = np.empty((1, 3, n))

@@ -1,19 +1,24 @@
 """The sensitivities of the motion carried forward with it (the paper's time integration incorporated method).
 
-Works on steps that are there already, of any integrator: the state's derivatives by every alpha^mu go through each step's
-own linear map (`propagation`), and every objective is differentiated where the sweep passes its time. O(N) memory; with
-the histories of the response, dg/dalpha at every step's end, O(N) a step.
+Works on steps that are there already, of any integrator: the state's derivatives by every alpha^mu go through
+each step's own linear map (`propagation`), and every objective is differentiated where the sweep passes its
+time. O(N) memory; with the histories of the response, dg/dalpha at every step's end, O(N) a step.
 """
 
 import numpy as np
 
-from mdstopo.integrators.contract import carried, parent_of, reach, stage_weights
-from mdstopo.jit import kernel
+from mdstopo.integrators.contract import carried, parent_of, reach, stage_weights, steps_of
+from mdstopo.integrators.steps import carve
+from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import SUMS, energy_gradient, unscale_gradient
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.responses.energy import energy_at, energy_slope
+from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.propagation import apply_matrix, step_matrix
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
+
+#: the step before one that the motion never takes
+NOWHERE = -2
 
 
 @kernel
@@ -29,7 +34,9 @@ def slope_at(model, strength, q, v, rel, sums, out):  # type: ignore[no-untyped-
 
 
 @kernel
-def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work):  # type: ignore[no-untyped-def]
+def look_at_row(  # type: ignore[no-untyped-def]
+    model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work
+):
     """Step and fraction (-1: its end) of a found row (4,), the state there, and the slope dg/dq into mu_q (n,)."""
     k = int(row[2])
     c = row[3]
@@ -61,11 +68,13 @@ def integral_weights(model, tables, steps, count, weight, bar):  # type: ignore[
 
 
 @kernel
-def finish_rows(model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients):  # type: ignore[no-untyped-def]
+def finish_rows(  # type: ignore[no-untyped-def]
+    model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients
+):
     """Add the explicit parts and turn derivatives by alpha^mu into those by alpha: gradients (n_obj, R, N).
 
-    In: states (n_obj, R, 3, n) of the rows, padded (n_obj, R, M_padded) their implicit parts, total (1, M_padded) that
-    of the integral over time with its weights (S,).
+    In: states (n_obj, R, 3, n) of the rows, padded (n_obj, R, M_padded) their implicit parts, total (1, M_padded)
+    that of the integral over time with its weights (S,).
     """
     unit = model.member[5:8]
     one = np.ones(1)
@@ -86,19 +95,22 @@ def finish_rows(model, alpha, steps, count, reductions, found, weight, states, p
             unscale_gradient(model.block, model.power, alpha, out, gradients[j, r])
 
 
-@kernel
-def direct_rows(  # type: ignore[no-untyped-def]
-    model, tables, strength, alpha, steps, count, damped, reductions, rows, found, gradients, history, work
+@entry
+def direct(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, alpha, damped, limits, count, reductions, room, room_ints, strength, rows, found,
+    gradients, history, work,
 ):
-    """Gradients of the rows that `look` found, by one forward sweep.
+    """Gradients of the rows that `look` found, by one forward sweep over the steps left in room, with tangents.
 
-    In: reductions (n_obj,), rows (n_obj, R, 4), found (n_obj,) as from `look`. Out: gradients (n_obj, R, N); history
-    (count + 1, N) = dg/dalpha at the times of the steps, or no rows.
+    Arguments as `look`'s. In: reductions (n_obj,), rows (n_obj, R, 4), found (n_obj,). Out: gradients
+    (n_obj, R, N); history (count + 1, N) = dg/dalpha at the times of the steps, or no rows.
     """
+    model = unpack(ints, floats)
+    turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     pair = model.pair
-    turning = model.load_body.shape[0] > 0
+    steps = steps_of(tag, carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
     n_obj = rows.shape[0]
     n_row = rows.shape[1]
     padded_size = model.member.shape[1]
@@ -112,8 +124,7 @@ def direct_rows(  # type: ignore[no-untyped-def]
     line = np.zeros((1, padded_size))
     mu = np.zeros((n_obj, n_row, n))
     states = np.zeros((n_obj, n_row, 3, n))
-    place = np.zeros((n_obj, n_row), np.int64)
-    fraction = np.zeros((n_obj, n_row))
+    before = np.empty((n_obj, n_row), np.int64)
     spread = np.zeros(n_obj, np.bool_)
     integral = False
     most = 0
@@ -123,11 +134,11 @@ def direct_rows(  # type: ignore[no-untyped-def]
             integral = True
             continue
         for r in range(found[j]):
-            place[j, r], fraction[j, r] = look_at_row(
+            w, _ = look_at_row(
                 model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                 rel, sums, mu[j, r], work,
             )  # fmt: skip
-            w = place[j, r]
+            before[j, r] = parent_of(steps, w) if w >= 0 else NOWHERE
             if w >= 0:
                 most = max(most, steps.index[w + 1, 0] - steps.index[w, 0])
     weight = np.zeros(stages if integral else 0)
@@ -144,14 +155,16 @@ def direct_rows(  # type: ignore[no-untyped-def]
     for k in range(count + 1):
         if history.shape[0] > 0:
             state = steps.state[k]
-            matrix[:] = 0.0
-            slope_at(model, strength, state[0], state[1], rel, sums, matrix[0, :n])
-            line[:] = 0.0
+            top = matrix[0]
+            top[:] = 0.0
+            slope_at(model, strength, state[0], state[1], rel, sums, top[:n])
+            total_line = line[0]
+            total_line[:] = 0.0
             apply_matrix(pair, model.block, model.member, steps.stage, 0, matrix, 0, 1, True, S, line)
             energy_gradient(
-                pair, model.block, model.member, model.member[5:8], steps.state[k : k + 1], one, line[0]
+                pair, model.block, model.member, model.member[5:8], steps.state[k : k + 1], one, total_line
             )
-            unscale_gradient(model.block, model.power, alpha, line[0], history[k])
+            unscale_gradient(model.block, model.power, alpha, total_line, history[k])
         if k == count:
             break
         # the rows whose look begins where this step does, then the step itself
@@ -160,12 +173,15 @@ def direct_rows(  # type: ignore[no-untyped-def]
             w = k
             c = -1.0
             if row:
-                if job % n_row >= found[job // n_row] or spread[job // n_row]:
+                j = job // n_row
+                r = job % n_row
+                if r >= found[j] or spread[j] or before[j, r] != k - 1:
                     continue
-                w = place[job // n_row, job % n_row]
-                if w < 0 or parent_of(steps, w) != k - 1:
-                    continue
-                c = fraction[job // n_row, job % n_row]
+                # again, because one that is kept behind the steps gives way to the next
+                w, c = look_at_row(
+                    model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
+                    rel, sums, mu[j, r], work,
+                )  # fmt: skip
             o = steps.index[w, 0]
             end = steps.index[w + 1, 0]
             step_matrix(
@@ -175,7 +191,7 @@ def direct_rows(  # type: ignore[no-untyped-def]
             work[5] += 1
             for out in range(2):
                 # out = 0: what the last row of the matrix looks at; out = 1: the changes at the end
-                if row and out == 1 or (not row and out == 0 and not integral):
+                if (row and out == 1) or (not row and out == 0 and not integral):
                     continue
                 target = padded[job // n_row, job % n_row : job % n_row + 1] if row else total
                 first = width if out == 0 else 0

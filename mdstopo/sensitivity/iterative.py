@@ -1,20 +1,23 @@
 """The iterative method: the linearised equations of generalized-alpha, solved by fixed-point sweeps.
 
-Works on the steps that are there already. In every step the acceleration sensitivities follow from the factorised mass
-matrix (diagonal here), with the C and K terms of the sweep before and the q and v sensitivities that the integrator's own
-update gives for it; the last step's are the first guess. The sweeps end when they change nothing by 1e-12 of the
-largest. They contract where beta h^2 rho(M^-1 K) < 1; where not, that is said, and `direct` is the method to take.
+Works on the steps that are there already. In every step the acceleration sensitivities follow from the factorised
+mass matrix (diagonal here), with the C and K terms of the sweep before and the q and v sensitivities that the
+integrator's own update gives for it; the last step's are the first guess. The sweeps end when they change nothing
+by 1e-12 of the largest. They contract where beta h^2 rho(M^-1 K) < 1 (here times e1 <= 1, and with the damping);
+where not, that is said, and `direct` is the method to take.
 """
 
 import numpy as np
 
+from mdstopo.integrators.contract import steps_of
 from mdstopo.integrators.generalized_alpha import weights_of
 from mdstopo.integrators.generalized_alpha_linear import hermite
-from mdstopo.integrators.steps import SWEEPS, copy_rows
-from mdstopo.jit import kernel, member_kernel
+from mdstopo.integrators.steps import SWEEPS, carve, copy_rows
+from mdstopo.jit import entry, kernel, member_kernel
 from mdstopo.mechanics.assembly import SUMS, add_turning, subtract_products
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
+from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.direct import finish_rows, integral_weights, look_at_row
 from mdstopo.sensitivity.propagation import STRIP, add_three
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
@@ -27,7 +30,10 @@ MOST_SWEEPS = 200
 
 @kernel
 def contraction(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning):  # type: ignore[no-untyped-def]
-    """Estimate of the spectral radius of M^-1 (w_q K + w_v C) by power iteration; k, c (1, n_pair, 6, 6), turn (1, n)."""
+    """Estimate of the spectral radius of M^-1 (w_q K + w_v C), by power iteration.
+
+    k, c: (1, n_pair, 6, 6). turn: (1, n).
+    """
     n = inv_mass.shape[0]
     x = np.empty((1, n))
     y = np.empty((1, n))
@@ -79,14 +85,11 @@ def _balance_rows(pair, k, c, turn, damped, turning, x, y, out, wide):  # type: 
             for side in range(2):
                 b = 3 * pair[p, side]
                 j = 3 * side
-                add_three(
-                    -k[p, i, j], -k[p, i, j + 1], -k[p, i, j + 2], x[b, :wide], x[b + 1, :wide], x[b + 2, :wide], o
-                )
+                x0, x1, x2 = x[b, :wide], x[b + 1, :wide], x[b + 2, :wide]
+                add_three(-k[p, i, j], -k[p, i, j + 1], -k[p, i, j + 2], x0, x1, x2, o)
                 if damped:
-                    add_three(
-                        -c[p, i, j], -c[p, i, j + 1], -c[p, i, j + 2], y[b, :wide], y[b + 1, :wide], y[b + 2, :wide],
-                        o,
-                    )  # fmt: skip
+                    y0, y1, y2 = y[b, :wide], y[b + 1, :wide], y[b + 2, :wide]
+                    add_three(-c[p, i, j], -c[p, i, j + 1], -c[p, i, j + 2], y0, y1, y2, o)
     if turning:
         for d in range(out.shape[0]):
             angle = x[d - d % 3 + 2]
@@ -137,20 +140,23 @@ def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):  # type: ignore[no-untyp
             out[i] += a * sq[d, i] + b * sv[d, i]
 
 
-@kernel
-def iterative_rows(  # type: ignore[no-untyped-def]
-    model, tables, strength, alpha, steps, count, damped, reductions, rows, found, gradients, work
+@entry
+def iterative(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, alpha, damped, limits, count, reductions, room, room_ints, strength, rows, found,
+    gradients, work,
 ):
-    """Gradients (n_obj, R, N) of the rows that `look` found; arguments as those of `direct.direct_rows`.
+    """Gradients (n_obj, R, N) of the rows that `look` found; arguments as those of `direct.direct`.
 
     Returns the step at which the sweeps do not contract, or -1: then the gradients hold.
     """
+    model = unpack(ints, floats)
+    turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     pair = model.pair
     block = model.block
     inv_mass = model.inv_mass
-    turning = model.load_body.shape[0] > 0
+    steps = steps_of(tag, carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
     n_obj = rows.shape[0]
     n_row = rows.shape[1]
     padded_size = model.member.shape[1]
@@ -217,7 +223,7 @@ def iterative_rows(  # type: ignore[no-untyped-def]
                 for j in range(n_obj):
                     for r in range(found[j]):
                         if place[j, r] == w and fraction[j, r] >= 0.0:
-                            q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(fraction[j, r])
+                            q0, v0, _, _, _, _, _, _ = hermite(fraction[j, r])
                             _look(mu[j, r], q0, h * v0, sq, sv, lo, hi, padded[j, r])
                 for j in range(last + 1):
                     k = steps.K[o + j]
@@ -237,7 +243,8 @@ def iterative_rows(  # type: ignore[no-untyped-def]
                             else:
                                 carry = e2 * sa[d, g] - e3 * sx[d, g]
                                 aux = sx[d, g]
-                                base_q[d, i] = sq[d, g] + h * (sv[d, g] + h * ((0.5 - beta) * aux + beta * carry))
+                                base_q[d, i] = sq[d, g] + h * sv[d, g]
+                                base_q[d, i] += h * h * ((0.5 - beta) * aux + beta * carry)
                                 base_v[d, i] = sv[d, g] + h * ((1.0 - gamma) * aux + gamma * carry)
                                 guess[d, i] = sa[d, g]
                     sweep = 0
@@ -287,7 +294,7 @@ def iterative_rows(  # type: ignore[no-untyped-def]
                     for r in range(found[j]):
                         if place[j, r] == w:
                             at = fraction[j, r]
-                            q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(at if at >= 0.0 else 1.0)
+                            _, _, q1, v1, _, _, _, _ = hermite(at if at >= 0.0 else 1.0)
                             _look(mu[j, r], q1, h * v1, sq, sv, lo, hi, padded[j, r])
     finish_rows(model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients)
     return -1

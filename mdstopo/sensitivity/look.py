@@ -1,30 +1,39 @@
-"""What is done with finished steps, whatever integrator made them: objectives, gradients, dense output."""
+"""What is done with finished steps, whatever integrator made them: objectives, gradients, dense output.
+
+`look` and `dense` are compiled entries (see `integrators.driver`): the packed model; tables, room and limits of the
+method; its tag.
+"""
 
 import numpy as np
 
-from mdstopo.integrators.contract import point_of
-from mdstopo.integrators.steps import copy_rows, deflection, step_at
-from mdstopo.jit import kernel
+from mdstopo.integrators.contract import point_of, steps_of
+from mdstopo.integrators.steps import carve, copy_rows, deflection, step_at
+from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import SUMS, add_loads, member_sums, unscale_gradient
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in
+from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
 
-@kernel
-def look_at(  # type: ignore[no-untyped-def]
-    model, tables, strength, alpha, steps, count, damped, reductions, closeness, gradient, padded, rows, found, gradients,
-    meeting, work,
+@entry
+def look(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, alpha, damped, settings, limits, count, reductions, gradient, room, room_ints, strength,
+    padded, rows, found, gradients, meeting, work,
 ):
-    """Every objective of the load case.
+    """Every objective of the load case, from the steps that `simulate` left in room.
 
     In: reductions (n_obj,); room: padded (R, M_padded). Out: rows (n_obj, R, 4) time, value, step, fraction; found
     (n_obj,); gradients (n_obj, R, N); meeting (2,), see `find_meeting`.
     """
+    model = unpack(ints, floats)
+    turning = model.load_body.shape[0] > 0
+    n = model.q0.shape[0]
+    steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
     find_meeting(model, strength, steps, count, meeting)
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
-            model, tables, strength, steps, count, damped, reductions[j], closeness, gradient, rows[j], padded, work
+            model, tables, strength, steps, count, damped, reductions[j], settings[3], gradient, rows[j], padded, work
         )
         if gradient:
             for r in range(found[j]):
@@ -73,11 +82,14 @@ def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-unt
         copy_rows(rel, rel0)
 
 
-@kernel
-def dense_states(model, tables, strength, steps, count, damped, times, out, work):  # type: ignore[no-untyped-def]
+@entry
+def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, strength, times, out, work):  # type: ignore[no-untyped-def]
     """out (3, T, n) = q, v, a at times (T,), a by the equations of motion (right-continuous at kinks)."""
+    model = unpack(ints, floats)
+    turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
+    steps = steps_of(tag, carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
     rel = np.empty((1, n_pair, POSE))
     sums = np.empty((1, n_pair, SUMS))
     f = np.empty(n)

@@ -24,8 +24,9 @@ STRIP = 128
 def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):  # type: ignore[no-untyped-def]
     """Fill matrix (D + 1, D + 3 n_pair s) of step w, to its end (c < 0) or its fraction c.
 
-    Columns: changes of the start; then for each stage and pair the three entries of b f of a member there. Rows: changes
-    of the end; last the change of mu_q . q at the end plus that of bar_s . q_s at the stages, mu_q (n,), bar (s, n).
+    Columns: changes of the start; then for each stage and pair the three entries of b f of a member there. Rows:
+    changes of the end; last the change of mu_q . q at the end plus that of bar_s . q_s at the stages; mu_q (n,),
+    bar (s, n).
     """
     n = inv_mass.shape[0]
     n_pair = pair.shape[0]
@@ -43,7 +44,8 @@ def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning,
         stage = 0
         if j < width:
             if inv_mass[j % n] == 0.0:
-                matrix[:, j] = 0.0
+                for i in range(width + 1):
+                    matrix[i, j] = 0.0
                 continue
             y[j] = 1.0
         else:
@@ -69,7 +71,8 @@ def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning,
         for i in range(width):
             matrix[i, j] = y[i]
         matrix[width, j] = value
-        force[stage] = 0.0
+        for d in range(n):
+            force[stage, d] = 0.0
 
 
 @member_kernel

@@ -14,9 +14,7 @@ _USED = 0.9  # share of a volume limit below which it is far from active
 _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
 
 
-def advise(
-    case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]
-) -> tuple[str, ...]:
+def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
     """Warnings about the final design `alpha`.
 
     before, after: the motion by load case with the starting and the final design. Both warnings are signs of

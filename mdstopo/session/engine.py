@@ -58,7 +58,7 @@ def compilation_due() -> bool:
     """Whether the kernels of this version have never been compiled here."""
     from mdstopo.jit import cache_folder
 
-    return not cache_folder().exists()
+    return next(cache_folder().rglob("*.nbi"), None) is None
 
 
 def make_engine(case: Case) -> Engine:

@@ -28,9 +28,7 @@ def iteration_columns(case: Case, state: State) -> dict[str, Array]:
     rows = len(state.history)
     constraints = columns.get("info/constraints")
     if constraints is None:
-        signs = [
-            -1.0 if row.sense == "at_least" else 1.0 for row in case.constraints if isinstance(row, VolumeRow)
-        ]
+        signs = [-1.0 if row.sense == "at_least" else 1.0 for row in case.constraints if isinstance(row, VolumeRow)]
         constraints = columns["constraints"].reshape(rows, len(signs)) * np.array(signs)
     # Where even the first evaluation failed, the engine has reported nothing.
     unknown = np.full((rows, len(case.objectives)), np.nan)

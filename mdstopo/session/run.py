@@ -1,7 +1,7 @@
 """The run itself, each step a verb: admit, restore, iterate, conclude, save."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,18 +13,18 @@ from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.state import State
 from mdstopo.session.advice import advise
-from mdstopo.session.engine import COMPILING, Engine, MakeEngine, compilation_due, make_engine
+from mdstopo.session.engine import Engine, MakeEngine, make_engine
 from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
-from mdstopo.session.starts import first_design, run_start, warm_up
+from mdstopo.session.starts import run_start
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
 from mdstopo.store.checkpoint import Checkpointer
 from mdstopo.store.contents import (
     Datasets,
-    Motion,
     case_part,
     result_image,
     sensitivity_part,
@@ -39,7 +39,6 @@ Floats = NDArray[np.float64]
 Notify = Callable[[str], None]
 
 _DISK_SPEED = 2e8  # bytes a second: a first guess of what a checkpoint costs, until one has been timed
-_SMALL = 100_000  # members up to which an evaluation costs nothing beside loading its kernels
 _STATE_ARRAYS = 16  # arrays of N numbers that a checkpoint holds for each start, roughly
 
 
@@ -137,11 +136,12 @@ class _Run:
         if previous is not None:
             self.restore(previous)
         began = time.perf_counter()
-        if make is make_engine and compilation_due():
-            self.notify(COMPILING)
         engine = make(self.case)
         problem = engine.problem()
-        self.warm_up(engine, problem, self.project(problem))
+        if make is make_engine:
+            compile_apart(self.case, self.notify)
+        stated, begin, self.before = get_ready(self.case, engine, problem, self.initial)
+        self.compare(stated, begin)
         compiled = time.perf_counter()
         if path is not None:
             self.open(path, engine)
@@ -161,13 +161,6 @@ class _Run:
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - compiled, compiled - began)
-
-    def warm_up(self, engine: Engine, problem: Problem, begin: Floats) -> None:
-        """Load or compile every kernel, so that the iterations are timed for themselves."""
-        warm_up(self.case)
-        self.before = self.motions(engine, begin)
-        if self.case.n_members <= _SMALL:
-            problem.evaluate(begin)
 
     def restore(self, view: ResultView) -> None:
         """Take up the states of an earlier process."""
@@ -201,16 +194,14 @@ class _Run:
         }
         self.settings |= {f"set {key}": value for key, value in self.case.overrides.items()}
 
-    def project(self, problem: Problem) -> Floats:
-        """The first start's first design, with a notice where it is not the stated one."""
-        stated, nearest = first_design(self.case, problem, self.initial)
-        if not np.array_equal(stated, nearest) and self.states[0] is None:
+    def compare(self, stated: Floats, nearest: Floats) -> None:
+        """A notice where the first design is not the stated one."""
+        if self.states[0] is None and not np.array_equal(stated, nearest):
             moved = float(np.abs(nearest - stated).max())
             self.notify(
                 "the initial design violates bounds or volume rows: it is replaced by the nearest one that "
                 f"does not (largest change of alpha {moved:.3g})"
             )
-        return nearest
 
     def iterate(self, make: MakeEngine, problem: Problem, path: Path | None, workers: int) -> None:
         """Advance every start, checkpointing as time goes by."""
@@ -235,9 +226,7 @@ class _Run:
             if self.stop_requested():
                 break
             state = self.states[index]
-            self.states[index] = run_start(
-                self.case, problem, index, state, self.initial, keep, self.stop_requested
-            )
+            self.states[index] = run_start(self.case, problem, index, state, self.initial, keep, self.stop_requested)
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""
@@ -257,15 +246,12 @@ class _Run:
         self.peaks = {
             name: tuple((peak.time, peak.value) for peak in found) for name, found in evaluation.peaks.items()
         }
-        after = self.motions(engine, state.best_alpha)
+        after = motions(self.case, engine, state.best_alpha)
         for name, motion in after.items():
             if not motion.status.ok:
                 self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
         self.warnings += advise(self.case, state.best_alpha, self.before, after)
         self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients)
-
-    def motions(self, engine: Engine, alpha: Floats) -> Mapping[str, Motion]:
-        return {each.name: engine.trajectory(alpha, each.name) for each in self.case.load_cases}
 
     def checkpoint(self, path: Path) -> None:
         """Save in mid-run; a full disk then is no reason to lose the run, it may have room at the end."""

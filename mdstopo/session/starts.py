@@ -9,7 +9,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.optimizer.driver import Gsao, run
 from mdstopo.optimizer.presets import settings
-from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.projection import InfeasibleRows, project
 from mdstopo.optimizer.starts import random_feasible
 from mdstopo.optimizer.state import State
@@ -33,33 +33,6 @@ def make_optimizer(case: Case, problem: Problem) -> Gsao:
     )
 
 
-class _Toy:
-    """A problem of three variables: enough to meet every kernel."""
-
-    def __init__(self) -> None:
-        self.initial = np.full(3, 0.5)
-        self.lower = np.full(3, 0.001)
-        self.upper = np.ones(3)
-        self.linear = LinearRows(np.ones((1, 3)), np.array([1.5]), np.array([True]))
-
-    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
-        """Two competing rows."""
-        slopes = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
-        values = np.sum(slopes / x, axis=1)
-        order = np.argsort(-values, kind="stable")
-        return Sample(
-            float(values.max()), values[order], (-slopes / x**2)[order], np.zeros(0), np.zeros((0, 3))
-        )
-
-
-def warm_up(case: Case) -> None:
-    """Load (at first: compile) the optimiser's kernels, so that iterations are timed for themselves."""
-    optimizer = make_optimizer(case, _Toy())
-    state = optimizer.start()
-    if state.running:
-        optimizer.step(state)
-
-
 def first_design(case: Case, problem: Problem, initial: Floats | None) -> tuple[Floats, Floats]:
     """Where the first start begins, and the nearest design to it that keeps bounds and volume rows.
 
@@ -69,9 +42,7 @@ def first_design(case: Case, problem: Problem, initial: Floats | None) -> tuple[
     try:
         return stated, project(stated, problem.lower, problem.upper, problem.linear)
     except InfeasibleRows as error:
-        raise CaseError(
-            [case.marks.mistake("constraints", str(error))], str(case.path or case.name)
-        ) from error
+        raise CaseError([case.marks.mistake("constraints", str(error))], str(case.path or case.name)) from error
 
 
 def run_start(

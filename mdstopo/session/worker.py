@@ -9,6 +9,7 @@ import threading
 from typing import IO, Any
 
 from mdstopo.optimizer.state import State
+from mdstopo.session.ready import get_ready
 from mdstopo.session.starts import run_start
 from mdstopo.store.checkpoint import Checkpointer
 
@@ -25,7 +26,9 @@ def main() -> None:
     inbox: queue.Queue[Any] = queue.Queue()
     stopped = threading.Event()
     threading.Thread(target=_listen, args=(source, inbox, stopped), daemon=True).start()
-    problem = make_engine(case).problem()
+    engine = make_engine(case)
+    problem = engine.problem()
+    get_ready(case, engine, problem, initial)
     while (task := inbox.get()) is not None:
         index, arrays = task
         sender = _Sender(output)

@@ -24,13 +24,9 @@ def read_design(path: Path | str, count: int) -> NDArray[np.float64]:
         if the file cannot be read, does not hold `count` numbers, or holds negative or non-finite ones.
     """
     path = Path(path)
-    reader = {".npy": _read_npy, ".txt": _read_text, ".h5": _read_h5, ".hdf5": _read_h5}.get(
-        path.suffix.lower()
-    )
+    reader = {".npy": _read_npy, ".txt": _read_text, ".h5": _read_h5, ".hdf5": _read_h5}.get(path.suffix.lower())
     if reader is None:
-        raise StoreError(
-            f"{path}: a design is read from {_SUFFIXES}, not from {path.suffix or 'a bare name'!r}"
-        )
+        raise StoreError(f"{path}: a design is read from {_SUFFIXES}, not from {path.suffix or 'a bare name'!r}")
     alpha = np.squeeze(reader(path))
     if alpha.ndim == 0 and count == 1:
         alpha = alpha.reshape(1)

@@ -73,9 +73,7 @@ class Lock:
         try:
             return os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
-            raise StoreError(
-                f"{self._result}: no file can be made in {self._path.parent}: {error.strerror}"
-            ) from error
+            raise StoreError(f"{self._result}: no file can be made in {self._path.parent}: {error.strerror}") from error
 
     def _in_use(self) -> InUseError:
         pid, host = self._holder()

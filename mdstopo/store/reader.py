@@ -150,8 +150,7 @@ def _check_format(path: Path, root: Mapping[str, object]) -> None:
         raise DamagedError(f"{path}: damaged: its format is {number!r}")
     if number > FORMAT:
         raise DamagedError(
-            f"{path}: written in format {number} by mdstopo {root['mdstopo']}; "
-            f"this version reads up to format {FORMAT}"
+            f"{path}: written in format {number} by mdstopo {root['mdstopo']}; this version reads up to format {FORMAT}"
         )
 
 

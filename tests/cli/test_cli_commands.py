@@ -102,6 +102,22 @@ def test_run_for_machines_and_in_silence(capsys: pytest.CaptureFixture[str]) -> 
     assert (status, out, err) == (0, "", "")
 
 
+def test_a_run_computes_nothing_with_code_that_its_process_has_just_compiled(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    # Such code may differ in the last bits from the same kernels out of the cache, and with it a resumed run.
+    script = (
+        "import sys\n"
+        "from numba.core import event\n"
+        "recorder = event.RecordingListener()\n"
+        "event.register('numba:compile', recorder)\n"
+        "from mdstopo.cli.group import run_group\n"
+        "assert run_group(['run', 'probe.yaml', '--quiet']) == 0\n"
+        "sys.exit(len(recorder.buffer))\n"
+    )
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
 def test_a_finished_file_is_replaced_with_a_notice_and_an_unfinished_one_refused(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -162,9 +178,7 @@ def test_check_says_what_is_in_the_case(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_check_describes_what_cannot_be_computed_and_refuses_it(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("joint.yaml").write_text(
-        CASE + "joints:\n  - {type: revolute, bodies: [torso, ground], at: [0, 0]}\n"
-    )
+    Path("joint.yaml").write_text(CASE + "joints:\n  - {type: revolute, bodies: [torso, ground], at: [0, 0]}\n")
     status, out, err = call(capsys, "check", "joint.yaml")
     assert status == 2
     assert "2 bodies" in out
@@ -190,6 +204,29 @@ def test_gradient_compares_with_differences(capsys: pytest.CaptureFixture[str]) 
     with h5py.File("results/probe.gradient.h5", "r") as file:
         assert file["sensitivities/adjoint/G"].shape == (12,)
         assert file["differences/G"].shape == (4,)
+
+
+def test_gradient_stores_histories_of_the_direct_method(capsys: pytest.CaptureFixture[str]) -> None:
+    found = answer(capsys, "gradient", "probe.yaml", "--history")
+    assert list(found["methods"]) == ["adjoint", "direct"]
+    assert found["methods"]["direct"]["disagreement"]["G"] < 1e-9
+    with h5py.File("results/probe.gradient.h5", "r") as file:
+        t = file["trajectories/default/t"][()]
+        history = file["sensitivities/direct/history/G"][()]
+        assert history.shape == (len(t), 12)
+        assert not history[0].any()
+    status, _, err = call(capsys, "gradient", "probe.yaml", "--method", "adjoint", "--history")
+    assert status == 2
+    assert "--history needs --method direct" in err
+
+
+def test_a_method_that_does_not_go_with_the_integrator_is_a_mistake(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    words = ("gradient", "probe.yaml", "--method", "iterative", "--set", "solver.integrator=gauss")
+    status, _, err = call(capsys, *words)
+    assert status == 2
+    assert err.startswith("--set solver.integrator: solver.integrator: the iterative method")
 
 
 def test_show_says_what_a_file_holds(capsys: pytest.CaptureFixture[str]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from mdstopo.integrators.driver import CLOSENESS, NEWTON_TOLERANCE, ROWS
 from mdstopo.integrators.gauss_tables import gauss_tables
+from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for
 from mdstopo.scene.model import VECTOR, Model
 from mdstopo.scene.packing import pack
@@ -38,9 +39,9 @@ class Scene:
 
 
 def random_scene(
-    groups, masses, seed=3, times=(0.0, 0.3), turning=0, jumps=False, ground=False, spin=0.0, span=1.0
+    groups, masses, seed=3, times=(0.0, 0.3), turning=0, jumps=False, ground=False, spin=0.0, load=1.0
 ) -> Scene:
-    """Bodies 1.3 m apart with members between random points; loads linear in each segment, `turning` of them off-centre."""
+    """Bodies 1.3 m apart, members between random points; loads linear in each segment, `turning` of them off-centre."""
     rng = np.random.default_rng(seed)
     n_bodies = len(masses) + ground
     n = 3 * n_bodies
@@ -79,6 +80,7 @@ def random_scene(
     times = np.array(times, dtype=float)
     n_segment = len(times) - 1
     values = rng.standard_normal((n_segment + 1, n)) * np.where(inv_mass > 0, 15.0 / np.maximum(inv_mass, 1e-9), 0.0)
+    values *= load
     force = np.zeros((n_segment, n, 2))
     load_force = np.zeros((n_segment, turning, 2, 2))
     extra = rng.standard_normal((n_segment + 1, turning, 2)) * 20.0
@@ -102,14 +104,15 @@ def figure_3(acceleration=(9.8, 0.0), turn=20.0, end=0.2) -> Scene:
     """The paper's scene: 20 points on a square, 51 on a U, 1020 members."""
     side = np.linspace(0.0, 2.0, 20, endpoint=False)
     edge, r = (side // 0.5).astype(int), side % 0.5
-    square = np.array([[-0.25 + r, 0.25 + 0 * r, 0.25 - r, -0.25 + 0 * r], [-0.25 + 0 * r, -0.25 + r, 0.25 + 0 * r, 0.25 - r]])
+    there, back, near, far = r - 0.25, 0.25 - r, 0 * r - 0.25, 0 * r + 0.25
+    square = np.array([[there, far, back, near], [near, there, far, back]])
     P = square[:, edge, np.arange(20)].T
     t, one = np.linspace(-0.8, 0.8, 17), np.ones(17)
     Q = np.concatenate([np.c_[-one, t], np.c_[t, -one], np.c_[one, t]]) - (0.0, -1.0)
     p, q = np.repeat(P, 51, axis=0), np.tile(Q, (20, 1))
     member = np.zeros((8, 1024))
     member[0:2, :1020], member[2:4, :1020] = p.T, q.T
-    member[4, :1020] = np.hypot(*(q + (0.0, -1.0) - p).T)
+    member[4, :1020] = np.hypot(*(q - p - np.array([0.0, 1.0])).T)
     member[5, :1020] = 225.0
     inv_mass = 1 / np.array([60.0, 60.0, 10.0, 2000.0, 2000.0, 6000.0])
     force = np.zeros((1, 6, 2))
@@ -130,12 +133,16 @@ class Bench:
     def __init__(self, scene: Scene, method="generalized_alpha", radius=0.8, reductions=(MAX,)) -> None:
         self.scene, self.method = scene, method
         self.entry = import_module(f"mdstopo.integrators.{method}_entry")
-        self.tables: Any = np.array([radius]) if method == "generalized_alpha" else gauss_tables()
+        self.tables: Any = {
+            "generalized_alpha": lambda: np.array([radius]),
+            "gauss": gauss_tables,
+            "runge_kutta": runge_kutta_tables,
+        }[method]()
         self.packed = pack(scene.model)
         self.reductions = np.array(reductions)
         self.size = 64
 
-    def run(self, alpha, step=0.0, tolerance=1e-10, gradient=True):
+    def run(self, alpha, step=0.0, tolerance=1e-10, gradient=True, newton=NEWTON_TOLERANCE):
         """Status code, times of the steps; rows, found, gradients are kept."""
         m = self.scene.model
         n, pairs, turning = len(m.inv_mass), len(m.pair), len(m.load_body) > 0
@@ -146,11 +153,11 @@ class Bench:
         self.found = np.zeros(count, dtype=np.int64)
         self.gradients = np.zeros((count, ROWS, self.scene.n_design))
         while True:
-            self.limits = np.array([200_000, self.size, 12 * self.size])
-            floats, ints = room_for(n, pairs, self.size, 12 * self.size, self.scene.damped, turning)
+            self.limits = np.array([200_000, self.size, 20 * self.size])
+            floats, ints = room_for(n, pairs, self.size, 20 * self.size, self.scene.damped, turning)
             self.room, self.room_ints = np.zeros(floats), np.zeros(ints, dtype=np.int64)
             self.work = np.zeros(WORK, dtype=np.int64)
-            settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
+            settings = np.array([tolerance, newton, step, CLOSENESS])
             code, self.count, _ = self.entry.simulate(
                 *self.packed, self.tables, self.alpha, self.scene.damped, True, settings, self.limits, self.room,
                 self.room_ints, self.strength, self.work,
@@ -160,11 +167,13 @@ class Bench:
             self.size *= 2
         if code == OK:
             self.entry.look(
-                *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits, self.count,
-                self.reductions, gradient, self.room, self.room_ints, self.strength, np.zeros((ROWS, padded)),
-                self.rows, self.found, self.gradients, np.zeros(2, dtype=np.int64), self.work,
+                self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits,
+                self.count, self.reductions, gradient, self.room, self.room_ints, self.strength,
+                np.zeros((ROWS, padded)), self.rows, self.found, self.gradients, np.zeros(2, dtype=np.int64), self.work,
             )  # fmt: skip
-        arrays = carve.py_func(self.room, self.room_ints, n, pairs, self.size, 12 * self.size, self.scene.damped, turning)
+        arrays = carve.py_func(
+            self.room, self.room_ints, n, pairs, self.size, 20 * self.size, self.scene.damped, turning
+        )
         self.t, self.state = arrays[0][: self.count + 1], arrays[1][: self.count + 1]
         self.scalar = arrays[3]
         return code
@@ -179,24 +188,24 @@ class Bench:
 
     def direct(self, history=False):
         """Gradients (n_obj, R, N) by `direct`; with history also dg/dalpha at the steps' ends (count + 1, N)."""
-        from mdstopo.sensitivity import direct_entry
+        from mdstopo.sensitivity.direct import direct
 
         out = np.zeros_like(self.gradients)
         lines = np.zeros((self.count + 1 if history else 0, self.scene.n_design))
-        getattr(direct_entry, self.method)(
-            *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count, self.reductions,
-            self.room, self.room_ints, self.strength, self.rows, self.found, out, lines, self.work,
+        direct(
+            self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count,
+            self.reductions, self.room, self.room_ints, self.strength, self.rows, self.found, out, lines, self.work,
         )  # fmt: skip
         return (out, lines) if history else out
 
     def iterative(self):
         """Gradients by `iterative`, and the step at which it gave up, or -1."""
-        from mdstopo.sensitivity import iterative_entry
+        from mdstopo.sensitivity.iterative import iterative
 
         out = np.zeros_like(self.gradients)
-        step = iterative_entry.generalized_alpha(
-            *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count, self.reductions,
-            self.room, self.room_ints, self.strength, self.rows, self.found, out, self.work,
+        step = iterative(
+            self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, self.limits, self.count,
+            self.reductions, self.room, self.room_ints, self.strength, self.rows, self.found, out, self.work,
         )  # fmt: skip
         return out, step
 
@@ -205,10 +214,39 @@ class Bench:
         times = np.atleast_1d(np.asarray(times, dtype=float))
         out = np.zeros((3, len(times), len(self.scene.model.inv_mass)))
         self.entry.dense(
-            *self.packed, self.tables, self.scene.damped, self.limits, self.count, self.room, self.room_ints,
-            self.strength, times, out, self.work,
+            self.entry.TAG, *self.packed, self.tables, self.scene.damped, self.limits, self.count, self.room,
+            self.room_ints, self.strength, times, out, self.work,
         )  # fmt: skip
         return out
+
+
+def energies(scene: Scene, q):
+    """Stored energy of every design member (N,) at unit strength in the pose q (n,), and mu (N,)."""
+    m = scene.model
+    out, power = np.zeros(scene.n_design), np.zeros(scene.n_design)
+    for (pair, start, _, _, first, count), mu in zip(m.block.tolist(), m.power.tolist(), strict=True):
+        if first < 0:
+            continue
+        ends = []
+        for row, body in zip((0, 2), m.pair[pair], strict=True):
+            x, y, psi = q[3 * body : 3 * body + 3]
+            local = m.member[row : row + 2, start : start + count]
+            ends.append(
+                [
+                    x + np.cos(psi) * local[0] - np.sin(psi) * local[1],
+                    y + np.sin(psi) * local[0] + np.cos(psi) * local[1],
+                ]
+            )
+        stretch = np.hypot(*np.subtract(ends[1], ends[0])) - m.member[4, start : start + count]
+        out[first : first + count] = 0.5 * m.member[5, start : start + count] * stretch**2
+        power[first : first + count] = mu
+    return out, power
+
+
+def energy_at(bench, time):
+    """g at a time of the last run."""
+    unit, power = energies(bench.scene, bench.at(time)[0, 0])
+    return float(np.sum(bench.alpha**power * unit))
 
 
 def solved(scene, alpha, **options) -> Bench:

@@ -38,9 +38,7 @@ def make_result(tmp_path: Path) -> Callable[..., Path]:
         path = tmp_path / name
         replace_file(
             path,
-            result_image(
-                case, kind, status, "a reason", datasets, Provenance.collect("mdstopo run"), {"seed": 3}
-            ),
+            result_image(case, kind, status, "a reason", datasets, Provenance.collect("mdstopo run"), {"seed": 3}),
         )
         return path
 

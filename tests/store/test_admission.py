@@ -15,9 +15,7 @@ from mdstopo.store.errors import DamagedError, DifferentCaseError, StoreError, U
 MakeResult = Callable[..., Path]
 
 
-def test_a_finished_file_is_replaced_with_a_notice(
-    make_result: MakeResult, case: Case, notices: list[str]
-) -> None:
+def test_a_finished_file_is_replaced_with_a_notice(make_result: MakeResult, case: Case, notices: list[str]) -> None:
     admit(make_result("max_iterations"), case, "run", False, notices.append)
     assert len(notices) == 1
     assert "is replaced" in notices[0]
@@ -84,16 +82,12 @@ def test_a_run_is_resumed_with_other_limits(make_result: MakeResult, case: Case,
     assert notices == []
 
 
-def test_text_that_means_the_same_is_the_same_case(
-    make_result: MakeResult, case: Case, notices: list[str]
-) -> None:
+def test_text_that_means_the_same_is_the_same_case(make_result: MakeResult, case: Case, notices: list[str]) -> None:
     rewritten = replace(case, text="# a remark\n" + case.text, sha256="0" * 64, path=Path("elsewhere.yaml"))
     assert admit_resume(make_result("running"), rewritten, notices.append) is not None
 
 
-def test_a_run_of_another_command_is_not_resumed(
-    make_result: MakeResult, case: Case, notices: list[str]
-) -> None:
+def test_a_run_of_another_command_is_not_resumed(make_result: MakeResult, case: Case, notices: list[str]) -> None:
     with pytest.raises(StoreError, match="cannot be resumed"):
         admit_resume(make_result(kind="gradient"), case, notices.append)
 
@@ -134,8 +128,7 @@ def test_a_changed_case_is_refused_by_the_keys_that_differ(
 def test_a_key_that_is_gone_counts_as_a_difference(case: Case) -> None:
     smaller = replace(case, members=case.members[:1])
     assert all(
-        key.startswith("members.gürtel.") or key.startswith("design.")
-        for key in differences(describe(case), smaller)
+        key.startswith("members.gürtel.") or key.startswith("design.") for key in differences(describe(case), smaller)
     )
     assert differences(describe(case), smaller)
     assert not differences(describe(case), case)

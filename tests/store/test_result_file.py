@@ -82,12 +82,8 @@ def test_groups_can_be_left_unread(make_result: MakeResult) -> None:
     assert view.alpha.shape == (6,)
 
 
-@pytest.mark.parametrize(
-    ("status", "finished"), [("running", False), ("interrupted", False), ("failed", True)]
-)
-def test_only_running_and_interrupted_runs_are_unfinished(
-    status: str, finished: bool, make_result: MakeResult
-) -> None:
+@pytest.mark.parametrize(("status", "finished"), [("running", False), ("interrupted", False), ("failed", True)])
+def test_only_running_and_interrupted_runs_are_unfinished(status: str, finished: bool, make_result: MakeResult) -> None:
     assert read_result(make_result(status)).finished is finished
 
 
@@ -108,9 +104,7 @@ def attempt(path: Path) -> tuple[str, bytes]:
         return str(error), b""
 
 
-def test_flipped_bytes_are_refused_or_harmless_never_a_traceback(
-    make_result: MakeResult, tmp_path: Path
-) -> None:
+def test_flipped_bytes_are_refused_or_harmless_never_a_traceback(make_result: MakeResult, tmp_path: Path) -> None:
     path = make_result()
     whole, good = path.read_bytes(), read_result(path)
     rng = np.random.default_rng(5)

@@ -132,9 +132,7 @@ def test_the_first_design_can_be_given_and_is_remembered(case: Case, tmp_path: P
         go(case, tmp_path / "resumed.h5", resume=True, initial=initial[::-1])
 
 
-def test_a_first_design_that_breaks_the_rows_is_replaced_with_a_notice(
-    case: Case, notices: list[str]
-) -> None:
+def test_a_first_design_that_breaks_the_rows_is_replaced_with_a_notice(case: Case, notices: list[str]) -> None:
     outcome = go(limited(case, 1), None, initial=np.full(6, 0.2), notify=notices.append)
     assert len(notices) == 1
     assert "replaced by the nearest one" in notices[0]

@@ -16,9 +16,7 @@ from mdstopo.store.errors import InUseError, StoreError, WriteError
 from mdstopo.store.lock import Lock
 
 
-def test_a_write_that_fails_leaves_the_old_file_and_no_other(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "a.h5"
     replace_file(path, b"old")
 
@@ -32,9 +30,7 @@ def test_a_write_that_fails_leaves_the_old_file_and_no_other(
     assert os.listdir(tmp_path) == ["a.h5"]
 
 
-def test_a_file_is_flushed_before_it_replaces_the_old_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_is_flushed_before_it_replaces_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     order = []
     fsync, move = os.fsync, os.replace
     monkeypatch.setattr(atomic.os, "fsync", lambda fd: (order.append("flush"), fsync(fd))[1])
@@ -132,9 +128,7 @@ class Clock:
         return self.now
 
 
-def run_for(
-    seconds: float, iteration: float, cost: float, expected: float = 0.0
-) -> tuple[Checkpointer, float]:
+def run_for(seconds: float, iteration: float, cost: float, expected: float = 0.0) -> tuple[Checkpointer, float]:
     """Iterate on a made-up clock; the checkpointer and the most work that a kill could have lost."""
     clock, lost, saved_at = Clock(), 0.0, [0.0]
 

@@ -1,0 +1,69 @@
+# Everything here works from a fresh clone with Python 3.11, make and git; no compiler is needed.
+#
+#   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
+#   make test                     set up .venv with the tools of development, run the tests
+#   make lint, make types         ruff; mypy
+#   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
+#   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
+#   make readme                   measure everything and put the numbers into the README
+#   make clean                    remove the environment and whatever was made; results stay
+
+PYTHON ?= $(or $(shell command -v python3.11),python3)
+VENV ?= .venv
+BIN := $(VENV)/bin
+CASE ?= cases/fig6.yaml
+RESULT := results/$(basename $(notdir $(CASE))).h5
+# options of `mdstopo run`, e.g. ARGS=--overwrite
+ARGS ?=
+# options of pytest, e.g. TESTS="tests/case -x"
+TESTS ?=
+SECTIONS ?=
+PEERS ?=
+PEERS_PYTHON ?= $(BIN)/python
+
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.DELETE_ON_ERROR:
+.PHONY: help run test lint types bench readme clean
+
+help:
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,9p
+
+# Installed in place, so that the sources are current; anew only when the project's requirements change.
+$(VENV)/.ready: pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed: make PYTHON=...")'
+	@$(BIN)/python -m pip --version >/dev/null 2>&1 || $(PYTHON) -m venv --clear $(VENV)
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+$(VENV)/.ready-dev: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $@
+
+# An unfinished run goes on where it stopped; a finished one is replaced, with a notice.
+run: $(VENV)/.ready
+	@args='$(ARGS)'; \
+	if [ -z "$$args" ] && [ -f $(RESULT) ] && \
+	   $(BIN)/mdstopo show --json $(RESULT) 2>/dev/null | grep -Eq '"status": "(running|interrupted)"'; then \
+	  args=--resume; fi; \
+	echo mdstopo run $(CASE) $$args; \
+	exec $(BIN)/mdstopo run $(CASE) $$args
+
+test: $(VENV)/.ready-dev
+	$(BIN)/python -m pytest $(TESTS)
+
+lint: $(VENV)/.ready-dev
+	$(BIN)/ruff check .
+
+types: $(VENV)/.ready-dev
+	$(BIN)/mypy
+
+bench: $(VENV)/.ready
+	$(BIN)/python -m benchmarks $(SECTIONS) $(if $(PEERS),--peers '$(PEERS)' --peers-python '$(PEERS_PYTHON)')
+
+readme: $(VENV)/.ready
+	$(BIN)/python -m benchmarks --readme
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,1 @@
+"""What the README says about accuracy and speed, measured: `python -m benchmarks` or `make bench`."""

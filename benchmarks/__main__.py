@@ -1,0 +1,64 @@
+"""The command: `python -m benchmarks [SECTION ...]`."""
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+
+from benchmarks.machine import description
+from benchmarks.readme import replace_block
+from benchmarks.tables import Table
+
+#: each section is a module with a function of the same name that yields tables
+SECTIONS = {
+    "speed": "objective and exact gradient: error against time",
+    "process": "the whole process: start, 50 iterations, file; help; the first run",
+    "bars": "what the optimiser reaches within how many evaluations",
+    "orders": "orders of convergence, agreement of methods, drift",
+    "peers": "the same beside other programs (needs --peers)",
+}
+
+
+def main() -> int:
+    """Measure, print, and on demand put the tables into the README."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks",
+        description="Measure what the README says about accuracy and speed.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="sections:\n" + "\n".join(f"  {name:8} {what}" for name, what in SECTIONS.items()),
+    )
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but peers")
+    parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
+    parser.add_argument("--peers", metavar="DIR", help="folder of the programs to compare with")
+    parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
+    chosen = parser.parse_args()
+    unknown = [name for name in chosen.sections if name not in SECTIONS]
+    if unknown:
+        parser.error(f"no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}")
+    sections = chosen.sections or (["peers"] if chosen.peers else [name for name in SECTIONS if name != "peers"])
+    if "peers" in sections and not chosen.peers:
+        parser.error("the section peers needs --peers DIR")
+    machine = f"Measured on: {description()}."
+    print(machine + "\n", flush=True)
+    for name in sections:
+        began = time.perf_counter()
+        printed = []
+        for table in _tables(name, chosen.peers, chosen.peers_python):
+            text = table.markdown()
+            printed.append(text)
+            print(text, flush=True)
+        print(f"({name}: {time.perf_counter() - began:.0f} s)\n", flush=True)
+        if chosen.readme and name != "peers":
+            replace_block(Path("README.md"), name, "\n".join([*printed, machine]))
+    return 0
+
+
+def _tables(name: str, peers: str | None, python: str) -> Iterator[Table]:
+    section: Callable[..., Iterator[Table]] = getattr(import_module(f"benchmarks.{name}"), name)
+    return section(peers, python) if name == "peers" else section()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

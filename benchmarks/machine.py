@@ -1,0 +1,29 @@
+"""On what machine, and with what versions, the numbers were measured."""
+
+import os
+import platform
+from pathlib import Path
+
+
+def description() -> str:
+    """One sentence: processor, cores, system, versions, how busy the machine was."""
+    import numba
+    import numpy
+
+    from mdstopo import __version__
+
+    load = os.getloadavg()[0]
+    return (
+        f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; "
+        f"Python {platform.python_version()}, NumPy {numpy.__version__}, Numba {numba.__version__}, "
+        f"mdstopo {__version__}; load before the run {load:.1f}"
+    )
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return " ".join(line.partition(":")[2].split())
+    return platform.processor() or "an unknown processor"

@@ -1,0 +1,115 @@
+"""Getting ready: the kernels compiled, loaded, and loaded in one order.
+
+Machine code that a process has just compiled can differ in the last bits from the same kernels loaded from the cache
+(functions inside it exist in several copies, and which one is linked depends on who came first). A run that is resumed,
+or spread over workers, must not depend on that. So nothing that counts is computed by freshly compiled code: where the
+kernels are not known to be cached, another process compiles them first, and every process then loads them alike.
+"""
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.session.engine import COMPILING, Engine, make_engine
+from mdstopo.session.starts import first_design, make_optimizer
+from mdstopo.store.contents import Motion
+
+Floats = NDArray[np.float64]
+
+_SMALL = 100_000  # members up to which an evaluation costs nothing beside loading its kernels
+
+
+def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
+    """Have another process compile what the case needs, unless that is known to be cached."""
+    marker = _marker(case)
+    if marker.exists():
+        return
+    try:
+        marker.parent.mkdir(parents=True, exist_ok=True)
+        writable = os.access(marker.parent, os.W_OK)
+    except OSError:
+        writable = False
+    notify(COMPILING)
+    if not writable:
+        notify(f"{marker.parent} cannot be written: kernels are compiled anew in every run, which is slow")
+        return
+    # What it complains of, this process will find as well, and say better.
+    subprocess.run(
+        [sys.executable, "-m", "mdstopo.session.ready"],
+        input=pickle.dumps(case),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        check=False,
+    )
+
+
+def get_ready(
+    case: Case, engine: Engine, problem: Problem, initial: Floats | None
+) -> tuple[Floats, Floats, dict[str, Motion]]:
+    """Load every kernel, always in this order, so that iterations are timed for themselves and repeat to the bit.
+
+    Returns the stated first design (N,), the nearest one that keeps bounds and volume rows, and that one's motion in
+    each load case. Raises CaseError where no design keeps the rows.
+    """
+    optimizer = make_optimizer(case, _Toy())
+    state = optimizer.start()
+    if state.running:
+        optimizer.step(state)
+    stated, begin = first_design(case, problem, initial)
+    before = motions(case, engine, begin)
+    if case.n_members <= _SMALL:
+        problem.evaluate(begin)
+    return stated, begin, before
+
+
+def motions(case: Case, engine: Engine, alpha: Floats) -> dict[str, Motion]:
+    """The motion of a design in each load case."""
+    return {each.name: engine.trajectory(alpha, each.name) for each in case.load_cases}
+
+
+class _Toy:
+    """A problem of three variables: enough to meet every kernel."""
+
+    def __init__(self) -> None:
+        self.initial = np.full(3, 0.5)
+        self.lower = np.full(3, 0.001)
+        self.upper = np.ones(3)
+        self.linear = LinearRows(np.ones((1, 3)), np.array([1.5]), np.array([True]))
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        """Two competing rows."""
+        slopes = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
+        values = np.sum(slopes / x, axis=1)
+        order = np.argsort(-values, kind="stable")
+        return Sample(float(values.max()), values[order], (-slopes / x**2)[order], np.zeros(0), np.zeros((0, 3)))
+
+
+def _marker(case: Case) -> Path:
+    """An empty file that says that the kernels for such cases are cached."""
+    from mdstopo.jit import cache_folder
+
+    return cache_folder() / f"ready-{case.solver.integrator}-{case.solver.sensitivity}"
+
+
+def _main() -> None:
+    import signal
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
+    case: Case = pickle.load(sys.stdin.buffer)
+    engine = make_engine(case)
+    problem = engine.problem()
+    _, begin, _ = get_ready(case, engine, problem, None)
+    engine.evaluate(begin, gradient=True)
+    _marker(case).touch()
+
+
+if __name__ == "__main__":
+    _main()

@@ -1,0 +1,92 @@
+"""First use on a machine: the kernels are compiled side by side, in two processes.
+
+Compiled kernels are kept on disk (`jit`), and their argument types are the same for every case. So while this process
+compiles an integrator and the optimiser, another one compiles what looks at the steps, on a case of its own: a body on
+a spring. Afterwards everything is read from the disk. If the other process fails, nothing is lost but time: what is
+missing is compiled here when it is called.
+"""
+
+import contextlib
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mdstopo.jit import cache_folder
+
+if TYPE_CHECKING:
+    from mdstopo.case.model import Case
+
+_CASE = """
+format: 1
+time: {{end: 0.1}}
+bodies: {{mass: {{mass: 1, inertia: 1, position: [0, 1]}}}}
+members:
+  spring: {{from: {{body: ground, at: [0, 0]}}, to: {{body: mass, at: [0, 1]}}, law: {{type: spring, stiffness: 1}}}}
+objectives: {{G: {{response: energy}}}}
+solver: {{integrator: {integrator}}}
+"""
+
+
+def _marker(integrator: str) -> Path:
+    return cache_folder() / f"{integrator}.compiled"
+
+
+def is_compiled(integrator: str) -> bool:
+    """Whether an integrator and what looks at its steps have been compiled for this source on this machine."""
+    return _marker(integrator).exists()
+
+
+def mark_compiled(integrator: str) -> None:
+    """Remember that they are on the disk. A disk that cannot be written to is no reason to stop."""
+    with contextlib.suppress(OSError):
+        _marker(integrator).parent.mkdir(parents=True, exist_ok=True)
+        _marker(integrator).touch()
+
+
+class Beside:
+    """Another process that compiles what looks at an integrator's steps, if that has never been compiled here."""
+
+    def __init__(self, integrator: str) -> None:
+        self.integrator = integrator
+        self._child: subprocess.Popen[bytes] | None = None
+        self.due = not is_compiled(integrator)
+        if self.due:
+            with contextlib.suppress(OSError):
+                self._child = subprocess.Popen(
+                    [sys.executable, "-m", "mdstopo.warm", integrator],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+
+    def wait(self) -> None:
+        """Let it finish; stop it where this process is interrupted meanwhile."""
+        child, self._child = self._child, None
+        if child is not None:
+            try:
+                child.wait()
+            except BaseException:
+                child.kill()
+                child.wait()
+                raise
+        if self.due:
+            self.due = False
+            mark_compiled(self.integrator)
+
+
+def compile_looking(integrator: str) -> None:
+    """Compile here what looks at the steps of an integrator: the work of the other process."""
+    from mdstopo.engine import Evaluator
+
+    Evaluator(_tiny(integrator), beside=False).driver("default").compile_looking()
+
+
+def _tiny(integrator: str) -> "Case":
+    from mdstopo.case.reader import read_case
+
+    return read_case(_CASE.format(integrator=integrator))
+
+
+if __name__ == "__main__":
+    compile_looking(sys.argv[1])
