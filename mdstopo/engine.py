@@ -93,9 +93,10 @@ class Evaluator:
                 continue
             driver = self.driver(name)
             result = driver.evaluate(design, exact)
-            _count(work, driver)
-            status, message = self._verdict(name, design, result)
+            status, culprit = self._verdict(name, design, result)
             if not status.ok:
+                message = culprit
+                _count(work, driver)
                 break
             for j, objective in enumerate(objectives):
                 looked[objective.name] = _peaks(result, j, exact)
@@ -103,12 +104,13 @@ class Evaluator:
                 from mdstopo.sensitivity.methods import differentiate
 
                 found = differentiate(method, driver, design, result)
-                status, message = found.status, found.message
+                status, message = found.status, found.message or message
                 for j, objective in enumerate(objectives):
                     looked[objective.name] = tuple(
                         Peak(peak.time, peak.value, found.gradients[j][r])
                         for r, peak in enumerate(looked[objective.name])
                     )
+            _count(work, driver)
         for key, value in work.items():
             self.work[key] += value
         return self._evaluation(design, looked, gradient, work, status, message)

@@ -5,8 +5,10 @@ Here the cache folder is named by a hash over every source file of the package t
 versions that the machine code depends on: a changed line anywhere means a fresh folder, never a stale kernel.
 """
 
+import contextlib
 import hashlib
 import os
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,11 +23,16 @@ _VECTOR = {"reassoc", "contract", "nsz"}
 
 
 def _cache_root() -> Path:
+    """The first of the stated, the user's and the temporary folder that can be written to."""
     stated = os.environ.get("MDSTOPO_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
-    if stated:
-        return Path(stated)
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    return Path(base) / "mdstopo"
+    last = Path(tempfile.gettempdir()) / f"mdstopo-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
+    for folder in ([Path(stated)] if stated else []) + [Path(base) / "mdstopo"]:
+        with contextlib.suppress(OSError):
+            folder.mkdir(parents=True, exist_ok=True)
+            if os.access(folder, os.W_OK):
+                return folder
+    return last
 
 
 def cache_folder() -> Path:

@@ -143,9 +143,9 @@ class Driver:
 
     def _look_arguments(self, count: int, gradient: bool) -> tuple[Any, ...]:
         return (
-            self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped, self.settings,
-            self.limits, count, self.reductions, gradient, self.room, self.room_ints, self.strength, self.padded,
-            self.rows, self.found, self.gradients, self.meeting, self.work,
+            self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped,
+            self.settings, self.limits, count, self.reductions, gradient, self.room, self.room_ints, self.strength,
+            self.padded, self.rows, self.found, self.gradients, self.meeting, self.work,
         )  # fmt: skip
 
     def simulate(self, alpha: FloatArray) -> tuple[Status, "DenseSteps"]:

@@ -163,8 +163,8 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
 
     In: the packed model; settings: tolerance, the error of the interpolated motion relative to the motion itself;
     Newton tolerance; fixed step (> 0: windows of that length, seven nodes, no error control); limits: windows allowed,
-    room for windows, for stages. Room: room, room_ints, where the steps stay; strength (3, M_padded). work: counts, added to.
-    Tangents are always kept. NEEDS_ROOM asks for more room.
+    room for windows, for stages. Room: room, room_ints, where the steps stay; strength (3, M_padded). work: counts,
+    added to. Tangents are always kept. NEEDS_ROOM asks for more room.
     """
     model = unpack(ints, floats)
     tolerance = settings[0]

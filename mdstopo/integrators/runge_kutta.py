@@ -108,10 +108,10 @@ def _error(vectors, s, h, a, weight):  # type: ignore[no-untyped-def]
             fv += vectors[6, j] * a[j, d]
         value = h * h * weight[d] * max(abs(eq), abs(ev))
         other = h * h * weight[d] * max(abs(fq), abs(fv))
-        if not value <= worst:
-            worst = value
-        if not other <= coarse:
-            coarse = other
+        if not np.isfinite(value):
+            return np.nan
+        worst = max(worst, value)
+        coarse = max(coarse, other)
     if coarse > 0.0 and worst > 0.0:  # two estimates of low order make one of high order
         worst = worst * worst / np.sqrt(worst * worst + 0.01 * coarse * coarse)
     return worst

@@ -186,6 +186,7 @@ def largest_difference(x, y, weight, count):  # type: ignore[no-untyped-def]
     for i in range(count):
         for d in range(weight.shape[0]):
             e = weight[d] * abs(x[i, d] - y[i, d])
-            if not e <= worst:
-                worst = e
+            if not np.isfinite(e):
+                return np.nan
+            worst = max(worst, e)
     return worst
