@@ -16,7 +16,7 @@ from mdstopo.case.model import Case, VolumeRow
 from mdstopo.evaluation import Evaluation, FloatArray, Peak
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.driver import Driver, Looked
-from mdstopo.integrators.steps import WORK_NAMES
+from mdstopo.integrators.steps import WORK, WORK_NAMES
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.culprit import Culprits
@@ -28,8 +28,9 @@ from mdstopo.warm import Beside
 if TYPE_CHECKING:
     from mdstopo.optimizer.problem import Problem
 
-#: tolerance of the motion that the integrators get for a tolerance of the objective and its gradient
-MOTION = 1.0
+#: the motion is computed to the tolerance of what is looked at, and never looser than this: at 1e-4 a gradient may
+#: exceed ten tolerances on scenes whose members turn fast
+LOOSEST = 5e-5
 
 
 class Evaluator:
@@ -64,9 +65,14 @@ class Evaluator:
             name: tuple(objective for objective in case.objectives if objective.load_case == name)
             for name in self.scenes
         }
-        self.work: dict[str, int] = dict.fromkeys(WORK_NAMES, 0)
+        self._work = np.zeros(WORK, dtype=np.int64)
 
     # -- what a run asks
+
+    @property
+    def work(self) -> dict[str, int]:
+        """Counts of everything evaluated so far, by name."""
+        return dict(zip(WORK_NAMES, self._work.tolist(), strict=True))
 
     @property
     def skipped(self) -> list[str]:
@@ -87,7 +93,7 @@ class Evaluator:
         exact = gradient and method == "adjoint"
         status, message = Status.OK, ""
         looked: dict[str, tuple[Peak, ...]] = {}
-        work = dict.fromkeys(WORK_NAMES, 0)
+        counts = np.zeros(WORK, dtype=np.int64)
         for name, objectives in self._by_load_case.items():
             if not objectives:
                 continue
@@ -96,7 +102,7 @@ class Evaluator:
             status, culprit = self._verdict(name, design, result)
             if not status.ok:
                 message = culprit
-                _count(work, driver)
+                counts += driver.work
                 break
             for j, objective in enumerate(objectives):
                 looked[objective.name] = _peaks(result, j, exact)
@@ -110,9 +116,9 @@ class Evaluator:
                         Peak(peak.time, peak.value, found.gradients[j][r])
                         for r, peak in enumerate(looked[objective.name])
                     )
-            _count(work, driver)
-        for key, value in work.items():
-            self.work[key] += value
+            counts += driver.work
+        self._work += counts
+        work = dict(zip(WORK_NAMES, counts.tolist(), strict=True))
         return self._evaluation(design, looked, gradient, work, status, message)
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
@@ -123,8 +129,7 @@ class Evaluator:
         message = ""
         if not status.ok:
             status, message = self._culprit(load_case).explain(design, status, float(steps.t[-1]), steps.state[-1])
-        work = dict.fromkeys(WORK_NAMES, 0)
-        _count(work, driver)
+        work = dict(zip(WORK_NAMES, driver.work.tolist(), strict=True))
         return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
 
     def problem(self) -> "Problem":
@@ -144,11 +149,13 @@ class Evaluator:
         design = np.ascontiguousarray(alpha, dtype=np.float64)
         if design.shape != (self._n,):
             raise ValueError(f"alpha must have shape ({self._n},), one value a design member, not {design.shape}")
-        if self._n and not (design.min() >= 0.0 and design.max() < np.inf):
-            worst = int(np.flatnonzero(~((design >= 0.0) & (design < np.inf)))[0])
-            raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
-        if self._n and design.min() == 0.0:
-            self._refuse_zero(design)
+        if self._n:
+            lowest = design.min()
+            if not (lowest >= 0.0 and design.max() < np.inf):
+                worst = int(np.flatnonzero(~((design >= 0.0) & (design < np.inf)))[0])
+                raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
+            if lowest == 0.0:
+                self._refuse_zero(design)
         return design
 
     def _refuse_zero(self, design: FloatArray) -> None:
@@ -165,7 +172,7 @@ class Evaluator:
             driver = Driver(
                 self.scenes[name],
                 self._method,
-                MOTION * solver.tolerance,
+                min(solver.tolerance, LOOSEST),
                 solver.step or 0.0,
                 np.array([REDUCTIONS[objective.over_time] for objective in looked], dtype=np.int64),
                 self._n,
@@ -242,8 +249,3 @@ def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:
         )
         for r in range(count)
     )
-
-
-def _count(work: dict[str, int], driver: Driver) -> None:
-    for key, value in zip(WORK_NAMES, driver.work.tolist(), strict=True):
-        work[key] += value

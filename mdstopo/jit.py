@@ -7,7 +7,9 @@ versions that the machine code depends on: a changed line anywhere means a fresh
 
 import contextlib
 import hashlib
+import importlib
 import os
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +22,24 @@ F = TypeVar("F", bound=Callable[..., Any])
 _ROOMS = ("mechanics", "integrators", "responses", "sensitivity", "optimizer", "scene")
 # Sums may be reordered for the vector units and products fused; NaN and infinity keep their meaning.
 _VECTOR = {"reassoc", "contract", "nsz"}
+
+
+def _without_scipy() -> None:
+    """Keep numba from loading scipy.linalg at its first dispatch: 0.1 to 0.2 s for linear algebra no kernel here uses.
+
+    Only in the command line's own process: elsewhere numba and scipy may serve others.
+    """
+    if "mdstopo.cli" not in sys.modules or "scipy" in sys.modules or "numba.np.arraymath" in sys.modules:
+        return
+    # an import of it now fails, and numba takes that for a machine without scipy
+    sys.modules["scipy"] = None  # type: ignore[assignment]
+    try:
+        importlib.import_module("numba.np.arraymath")
+    finally:
+        del sys.modules["scipy"]
+
+
+_without_scipy()
 
 
 def _cache_root() -> Path:

@@ -19,13 +19,12 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: pushes
    changes forward through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
 7. `carried(steps) -> int`: rows of lam_x and dx; none for one-step methods.
-8. `steps_of(tag, arrays)`: the steps' tuple from the arrays of `steps.carve`, chosen by the type of a tag, a NamedTuple
-   of one number, because what Python hands over are flat arrays.
+8. `steps_of(tag, arrays)`: the steps' tuple from the arrays of `steps.carve`, because what Python hands over are flat
+   arrays. The tag is a tuple of zeros; its length, which is part of its type, says which method is meant.
 9. `sample(steps, count, damped, t, g, d) -> m`: times, energies and their rates (NaN where unknown) by rising time,
    without the first and the last state. May be left out where the stages are ordered and exact.
 """
 
-from collections.abc import Callable
 from typing import Any
 
 from numba import types
@@ -33,9 +32,10 @@ from numba.extending import overload
 
 from mdstopo.jit import kernel
 
-Implementation = Callable[..., Any]
+Implementation = Any  # a compiled function
 
-_DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}, "steps_of": {}}
+_DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}}
+_MAKERS: dict[int, Implementation] = {}
 
 
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
@@ -85,10 +85,11 @@ def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def implement(steps_type: type, tag: type | None = None, **duties: Implementation) -> None:
-    """Enter an integrator's compiled functions for its type of steps, and for its tag."""
+def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, **duties: Implementation) -> None:
+    """Enter an integrator's compiled functions for its type of steps, and the one that makes them for its tag."""
+    _MAKERS[len(tag)] = steps_of
     for name, function in duties.items():
-        _DUTIES.setdefault(name, {})[tag if tag is not None and name == "steps_of" else steps_type] = function
+        _DUTIES.setdefault(name, {})[steps_type] = function
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
@@ -101,7 +102,7 @@ def _implementation(name: str, steps: Any) -> Implementation | None:
         chosen = _DUTIES["point_of"].get(by_type)
     if chosen is None and name == "sample":
         chosen = sample_stages
-    return getattr(chosen, "py_func", chosen)
+    return None if chosen is None else chosen.py_func
 
 
 @kernel
@@ -159,4 +160,4 @@ def _sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
 
 @overload(steps_of)
 def _steps_of(tag, arrays):  # type: ignore[no-untyped-def]
-    return _implementation("steps_of", tag)
+    return _MAKERS[len(tag)].py_func

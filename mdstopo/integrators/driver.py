@@ -74,7 +74,8 @@ class Driver:
         self.packed = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         self._shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
-        self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
+        newton = NEWTON_TOLERANCE if step > 0.0 else min(max(tolerance, NEWTON_TOLERANCE), 1e-6)
+        self.settings = np.array([tolerance, newton, step, CLOSENESS])
         self.reductions = reductions
         self.work = np.zeros(WORK, dtype=np.int64)
         padded = scene.model.member.shape[1]
@@ -207,5 +208,6 @@ class DenseSteps:
 
 #: steps an integration may take before it is given up
 MAX_STEPS = 1_000_000
-#: Newton corrections relative to the motion at which an implicit step counts as solved; the next would be rounding
+#: Newton corrections relative to the motion at which a fixed implicit step counts as solved: the next would be
+#: rounding. Adaptive ones need no better than their tolerance; the tangents are then off by no more than that.
 NEWTON_TOLERANCE = 1e-10

@@ -45,12 +45,14 @@ from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.scene.packing import unpack
 
 GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
-GaussTag = namedtuple("GaussTag", ("method",))
+TAG = (0,)
 
 COUNTS = LEVELS
 MOST = max(LEVELS)
 #: level of the windows of a fixed step: seven nodes, order 14
 FIXED_LEVEL = 1
+#: radians of the fastest vibration that the first window may span, so that the sweeps contract
+LONGEST = 6.0
 
 
 @kernel
@@ -96,7 +98,8 @@ def _balance(  # type: ignore[no-untyped-def]
         if sweep > 0:
             work[SWEEPS] += 1
             change = largest_difference(q, before, weight, s)
-            correction = largest_difference(q, q_ref, weight, s)
+            if sweep == 1:
+                correction = largest_difference(q, q_ref, weight, s)
             if not change <= 1e8:
                 return -1.0
             if change <= max(1e-3 * correction * correction, 1e-15):
@@ -125,7 +128,7 @@ def _balance(  # type: ignore[no-untyped-def]
                 a[i, d] = inv_mass[d] * rhs[i, d]
     if not damped:
         integrate_to_nodes(first, s, h, v0, none, nodes, a, v)
-    return correction
+    return largest_difference(q, q_ref, weight, s)
 
 
 @kernel
@@ -241,7 +244,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     rate = fastest_rate(pair, inv_mass, k, c, damped)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
-    wanted = span if rate * span <= 5.0 else 5.0 / rate
+    wanted = span if rate * span <= LONGEST else LONGEST / rate
     if fixed_step > 0.0:
         wanted = fixed_step
     keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)

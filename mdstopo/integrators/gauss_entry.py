@@ -1,9 +1,7 @@
 """What the driver calls of the Gauss method."""
 
 import mdstopo.integrators.gauss_linear  # noqa: F401  (enters the method's functions in the contract's table)
-from mdstopo.integrators.gauss import GaussTag, simulate
+from mdstopo.integrators.gauss import TAG, simulate
 from mdstopo.sensitivity.look import dense, look
-
-TAG = GaussTag(0)
 
 __all__ = ["TAG", "dense", "look", "simulate"]

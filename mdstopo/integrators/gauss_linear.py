@@ -7,7 +7,7 @@ window, transposed or not, by sweeps that contract as the forward ones did.
 import numpy as np
 
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.gauss import COUNTS, GaussSteps, GaussTag, integrate_to_nodes
+from mdstopo.integrators.gauss import COUNTS, TAG, GaussSteps, integrate_to_nodes
 from mdstopo.integrators.steps import REVERSE, SWEEPS
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
@@ -245,7 +245,7 @@ def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
 
 implement(
     GaussSteps,
-    GaussTag,
+    TAG,
     steps_of=steps_of,
     point_of=point_of,
     parent_of=parent_of,

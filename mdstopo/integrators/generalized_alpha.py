@@ -43,7 +43,7 @@ from mdstopo.mechanics.assembly import SUMS, forces
 from mdstopo.mechanics.geometry import POSE
 
 AlphaSteps = namedtuple("AlphaSteps", FIELDS)  # type: ignore[misc]
-AlphaTag = namedtuple("AlphaTag", ("method",))
+TAG = (0, 0, 0)
 
 #: steps that an automatic choice takes at least
 FEWEST = 16

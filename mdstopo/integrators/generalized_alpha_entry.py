@@ -6,15 +6,13 @@ stages); room, room_ints for the steps; strength (3, M_padded); work counts, add
 """
 
 import mdstopo.integrators.generalized_alpha_linear  # noqa: F401  (enters the contract's table)
-from mdstopo.integrators.generalized_alpha import AlphaSteps, AlphaTag, integrate, longest_step
+from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, integrate, longest_step
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start
 from mdstopo.integrators.steps import carve
 from mdstopo.jit import entry
 from mdstopo.mechanics.assembly import scale_members
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.look import dense, look
-
-TAG = AlphaTag(0)
 
 __all__ = ["TAG", "dense", "look", "rate_at_start", "simulate"]
 

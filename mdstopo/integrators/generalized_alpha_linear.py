@@ -10,7 +10,7 @@ import numpy as np
 
 from mdstopo.integrators.banded import half_width, solve
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.generalized_alpha import AlphaSteps, AlphaTag, effective_matrix, weights_of
+from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, effective_matrix, weights_of
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
@@ -241,7 +241,7 @@ def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
 
 implement(
     AlphaSteps,
-    AlphaTag,
+    TAG,
     steps_of=steps_of,
     point_of=point_of,
     sample=sample,

@@ -34,7 +34,7 @@ from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.scene.packing import unpack
 
 RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)  # type: ignore[misc]
-RungeKuttaTag = namedtuple("RungeKuttaTag", ("method",))
+TAG = (0, 0)
 
 MOST = max(STAGES)
 #: error of a step relative to the tolerance of the motion: the errors of many steps add up, and a gradient's error is

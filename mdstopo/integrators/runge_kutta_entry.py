@@ -1,9 +1,7 @@
 """What the driver calls of the explicit Runge-Kutta methods."""
 
 import mdstopo.integrators.runge_kutta_linear  # noqa: F401  (enters the method's functions in the contract's table)
-from mdstopo.integrators.runge_kutta import RungeKuttaTag, simulate
+from mdstopo.integrators.runge_kutta import TAG, simulate
 from mdstopo.sensitivity.look import dense, look
-
-TAG = RungeKuttaTag(0)
 
 __all__ = ["TAG", "dense", "look", "simulate"]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.runge_kutta import MOST, RungeKuttaSteps, RungeKuttaTag, advance
+from mdstopo.integrators.runge_kutta import MOST, TAG, RungeKuttaSteps, advance
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
@@ -196,7 +196,7 @@ def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
 
 implement(
     RungeKuttaSteps,
-    RungeKuttaTag,
+    TAG,
     steps_of=steps_of,
     point_of=point_of,
     reach=reach,

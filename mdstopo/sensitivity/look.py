@@ -11,7 +11,7 @@ from mdstopo.integrators.steps import carve, copy_rows, deflection, step_at
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import SUMS, add_loads, member_sums, unscale_gradient
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
-from mdstopo.mechanics.laws.spring import meeting_in
+from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -44,42 +44,55 @@ def look(  # type: ignore[no-untyped-def]
 def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-untyped-def]
     """meeting (2,): padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
-    No member can, and nothing is looked at, while no pair moves as far as its shortest member is long.
+    A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
+    they were last known could have used up the shortest, and single members only where it could have done so within
+    one stretch between stages.
     """
     meeting[0] = -1
-    n_pair = model.pair.shape[0]
+    pair = model.pair
+    block = model.block
+    m = model.member
+    n_pair = pair.shape[0]
     stages = steps.index[count, 0]
-    rel0 = np.empty((n_pair, POSE))
+    before = np.empty((n_pair, POSE))
     rel = np.empty((n_pair, POSE))
-    relative_pose(model.pair, model.q0, model.v0, rel0)
-    possible = False
+    spare = np.empty(n_pair)
+    for p in range(n_pair):
+        spare[p] = model.shortest[p]
+    relative_pose(pair, model.q0, model.v0, before)
     for i in range(stages + 1):
-        last = i == stages
-        state = steps.state[count] if last else steps.stage[i]
-        relative_pose(model.pair, state[0], state[1], rel)
+        state = steps.state[count] if i == stages else steps.stage[i]
+        relative_pose(pair, state[0], state[1], rel)
         for p in range(n_pair):
-            possible = possible or not deflection(rel, rel0, model.reach, p) < model.shortest[p]
-    if not possible:
-        return
-    for i in range(stages + 1):
-        last = i == stages
-        state = steps.state[count] if last else steps.stage[i]
-        relative_pose(model.pair, state[0], state[1], rel)
-        for k in range(model.block.shape[0]):
-            p = model.block[k, 0]
-            lo = model.block[k, 1]
-            hi = lo + model.block[k, 5]
-            m = model.member
-            j = meeting_in(
-                m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
-                strength[2, lo:hi], rel0[p, 0], rel0[p, 1], rel0[p, 2], rel0[p, 3], rel[p, 0], rel[p, 1],
-                rel[p, 2], rel[p, 3],
-            )  # fmt: skip
-            if j >= 0:
-                meeting[0] = lo + j
-                meeting[1] = i
-                return
-        copy_rows(rel, rel0)
+            moved = deflection(rel, before, model.reach, p)
+            spare[p] -= moved
+            if spare[p] > 0.0:
+                continue
+            shortest = np.inf
+            for k in range(block.shape[0]):
+                lo = block[k, 1]
+                hi = lo + block[k, 5]
+                if block[k, 0] == p:
+                    r = rel[p]
+                    shortest = min(
+                        shortest,
+                        shortest_in(m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], r[0], r[1], r[2], r[3]),
+                    )
+            spare[p] = shortest
+            for k in range(block.shape[0]):
+                if shortest > moved or block[k, 0] != p:
+                    continue
+                lo = block[k, 1]
+                hi = lo + block[k, 5]
+                j = meeting_in(
+                    m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
+                    strength[2, lo:hi], before[p], rel[p],
+                )  # fmt: skip
+                if j >= 0:
+                    meeting[0] = lo + j
+                    meeting[1] = i
+                    return
+        copy_rows(rel, before)
 
 
 @entry

@@ -287,16 +287,27 @@ def stored_energy(px, py, qx, qy, l0, k, dx, dy, c, s, weight, out):  # type: ig
         out[i] += weight * 0.5 * k[i] * stretch * stretch
 
 
+@member_kernel
+def shortest_in(px, py, qx, qy, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """Smallest length in the tile, m."""
+    best = np.inf
+    for i in range(px.shape[0]):
+        rx = dx + c * qx[i] - s * qy[i] - px[i]
+        ry = dy + s * qx[i] + c * qy[i] - py[i]
+        best = min(best, rx * rx + ry * ry)
+    return math.sqrt(best)
+
+
 @kernel
-def meeting_in(px, py, qx, qy, l0, k, preload, dx, dy, c, s, dx1, dy1, c1, s1):  # type: ignore[no-untyped-def]
-    """First member that carries a force and whose ends meet while the pose goes straight to a second one; else -1."""
+def meeting_in(px, py, qx, qy, l0, k, preload, before, after):  # type: ignore[no-untyped-def]
+    """First member that carries a force and whose ends meet between two relative poses; else -1."""
     for i in range(px.shape[0]):
         if k[i] * l0[i] == preload[i]:
             continue  # at zero length it carries nothing
-        rx = dx + c * qx[i] - s * qy[i] - px[i]
-        ry = dy + s * qx[i] + c * qy[i] - py[i]
-        ux = dx1 + c1 * qx[i] - s1 * qy[i] - px[i] - rx
-        uy = dy1 + s1 * qx[i] + c1 * qy[i] - py[i] - ry
+        rx = before[0] + before[2] * qx[i] - before[3] * qy[i] - px[i]
+        ry = before[1] + before[3] * qx[i] + before[2] * qy[i] - py[i]
+        ux = after[0] + after[2] * qx[i] - after[3] * qy[i] - px[i] - rx
+        uy = after[1] + after[3] * qx[i] + after[2] * qy[i] - py[i] - ry
         u2 = ux * ux + uy * uy
         along = -(rx * ux + ry * uy)
         across = rx * uy - ry * ux
