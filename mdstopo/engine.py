@@ -6,6 +6,7 @@ simulation.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -90,6 +91,10 @@ class Evaluator:
         """
         design = self.design(alpha)
         method = sensitivity or self.sensitivity
+        if method == "iterative" and self.integrator != "generalized_alpha" and self.case.solver.integrator == "auto":
+            return self._on_generalized_alpha.evaluate(design, gradient, method)
+        edge = self._without_slope(design) if gradient else ""
+        gradient = gradient and not edge
         exact = gradient and method == "adjoint"
         status, message = Status.OK, ""
         looked: dict[str, tuple[Peak, ...]] = {}
@@ -111,6 +116,9 @@ class Evaluator:
 
                 found = differentiate(method, driver, design, result)
                 status, message = found.status, found.message or message
+                if not status.ok:
+                    counts += driver.work
+                    break
                 for j, objective in enumerate(objectives):
                     looked[objective.name] = tuple(
                         Peak(peak.time, peak.value, found.gradients[j][r])
@@ -119,7 +127,15 @@ class Evaluator:
             counts += driver.work
         self._work += counts
         work = dict(zip(WORK_NAMES, counts.tolist(), strict=True))
+        if edge and status.ok:
+            status, message = Status.NO_GRADIENT, edge
         return self._evaluation(design, looked, gradient, work, status, message)
+
+    @cached_property
+    def _on_generalized_alpha(self) -> "Evaluator":
+        """The same case on the steps that the iterative method is defined on."""
+        solver = replace(self.case.solver, sensitivity="iterative")
+        return Evaluator(replace(self.case, solver=solver))
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
         """The motion of one load case with the design alpha (N,)."""
@@ -154,15 +170,14 @@ class Evaluator:
             if not (lowest >= 0.0 and design.max() < np.inf):
                 worst = int(np.flatnonzero(~((design >= 0.0) & (design < np.inf)))[0])
                 raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
-            if lowest == 0.0:
-                self._refuse_zero(design)
         return design
 
-    def _refuse_zero(self, design: FloatArray) -> None:
-        for name, part in self.case.group_slices.items():
-            power = next(group.power for group in self.case.design_groups if group.name == name)
-            if power < 1.0 and np.any(design[part] == 0.0):
-                raise ValueError(f"alpha = 0 in group {name} has no derivative: its power {power:g} is below 1")
+    def _without_slope(self, design: FloatArray) -> str:
+        """Why there is no gradient at this design, or nothing: alpha^mu has no slope at 0 where mu < 1."""
+        for group, part in zip(self.case.design_groups, self.case.group_slices.values(), strict=True):
+            if group.power < 1.0 and np.any(design[part] == 0.0):
+                return f"alpha = 0 in group {group.name}, whose power {group.power:g} is below 1"
+        return ""
 
     def driver(self, name: str) -> Driver:
         """The buffers and compiled entries of one load case, made at their first use."""
@@ -229,11 +244,6 @@ class Evaluator:
             status=status,
             message=message,
         )
-
-    @cached_property
-    def objective_names(self) -> tuple[str, ...]:
-        """Names of the objectives, in the case's order."""
-        return tuple(objective.name for objective in self.case.objectives)
 
 
 def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:

@@ -1,7 +1,7 @@
 """What an evaluation gives back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,4 +43,3 @@ class Evaluation:
     work: Mapping[str, int]
     status: Status
     message: str = ""
-    histories: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)

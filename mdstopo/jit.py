@@ -15,7 +15,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+import llvmlite.binding
 import numba
+import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -58,7 +60,9 @@ def _cache_root() -> Path:
 def cache_folder() -> Path:
     """Folder of the compiled kernels that belong to exactly this source and these versions."""
     package = Path(__file__).parent
-    digest = hashlib.sha256(f"{numba.__version__} {Path(__file__).read_bytes()!r}".encode())
+    versions = sys.version, numba.__version__, llvmlite.__version__, np.__version__
+    machine = (*versions, llvmlite.binding.get_host_cpu_name())
+    digest = hashlib.sha256(f"{machine} {Path(__file__).read_bytes()!r}".encode())
     for room in _ROOMS:
         for source in sorted((package / room).glob("**/*.py")):
             digest.update(source.read_bytes())

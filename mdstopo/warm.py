@@ -63,16 +63,18 @@ class Beside:
     def wait(self) -> None:
         """Let it finish; stop it where this process is interrupted meanwhile."""
         child, self._child = self._child, None
+        compiled = False
         if child is not None:
             try:
-                child.wait()
+                compiled = child.wait() == 0
             except BaseException:
                 child.kill()
                 child.wait()
                 raise
         if self.due:
             self.due = False
-            mark_compiled(self.integrator)
+            if compiled:
+                mark_compiled(self.integrator)
 
 
 def compile_looking(integrator: str) -> None:

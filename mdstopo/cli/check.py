@@ -62,7 +62,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         announce_compilation(output)
         from mdstopo.engine import Evaluator
 
-        engine = Evaluator(case)
+        engine = Evaluator(case, beside=False)
         found = frequencies(case, engine)
         _say_frequencies(output, found)
         output.say("left out, because nothing asks for it")

@@ -4,8 +4,8 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 
 1. `simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work) ->
    (code, count, time reached)`, the entry that fills the steps (see `driver`). It lands on every entry of
-   `model.times`, leaves the equations of each step solved to rounding, and keeps at each stage what the force balance
-   saw (see `steps`).
+   `model.times`, solves the equations of each fixed step to rounding (of an adaptive one to the tolerance), and keeps
+   at each stage what the force balance saw (see `steps`).
 2. `point_of(model, tables, strength, steps, count, k, c, damped, q, v, work) -> (w, c_w)`: the state at fraction c of
    step k, to the order of the method, and where the reverse sweep has to start for it: step w at its fraction c_w (-1:
    at its end). `reach`, with the same arguments, also leaves what the reverse sweep needs: a method whose

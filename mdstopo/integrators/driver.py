@@ -1,7 +1,7 @@
 """From Python to the compiled entries of an integrator: buffers, room, results.
 
 A `Driver` belongs to one scene and one method. It keeps every buffer between calls, so that an evaluation allocates
-nothing, and gives the steps more room when the kernel asks for it.
+little, and gives the steps more room when the kernel asks for it.
 """
 
 from collections.abc import Callable
@@ -74,7 +74,8 @@ class Driver:
         self.packed = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         self._shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
-        newton = NEWTON_TOLERANCE if step > 0.0 else min(max(tolerance, NEWTON_TOLERANCE), 1e-6)
+        fixed = step > 0.0 or method.name == "generalized_alpha"
+        newton = NEWTON_TOLERANCE if fixed else min(max(tolerance, NEWTON_TOLERANCE), 1e-6)
         self.settings = np.array([tolerance, newton, step, CLOSENESS])
         self.reductions = reductions
         self.work = np.zeros(WORK, dtype=np.int64)
@@ -152,7 +153,7 @@ class Driver:
     def simulate(self, alpha: FloatArray) -> tuple[Status, "DenseSteps"]:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
         code, count, _ = self.run(alpha, False)
-        return status_of(code), DenseSteps(self, count, status_code=code)
+        return status_of(code), DenseSteps(self, count)
 
     def _dense_arguments(
         self,
@@ -180,12 +181,11 @@ def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
 class DenseSteps:
     """The steps of one simulation, and the motion between them."""
 
-    def __init__(self, driver: Driver, count: int, status_code: int) -> None:
+    def __init__(self, driver: Driver, count: int) -> None:
         self._driver = driver
         self._room, self._ints = driver.room.copy(), driver.room_ints.copy()
         self._limits, self._strength = driver.limits, driver.strength.copy()
         self.count = count
-        self.complete = status_code == OK
         n, n_pair, damped, turning = driver._shape
         arrays = carve.py_func(  # type: ignore[attr-defined]
             self._room, self._ints, n, n_pair, int(self._limits[1]), int(self._limits[2]), damped, turning

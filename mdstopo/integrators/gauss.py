@@ -7,9 +7,10 @@ On a window the accelerations at the nodes obey a_j = M^-1 F(q_j, v_j, t_j), wit
 
 is solved by sweeps that touch no member (they contract quickly because h^2 |K/M| |A|^2 is small on the windows chosen
 here). The first pass uses few nodes; every further one takes more, until the Legendre coefficients of a have decayed
-below the tolerance, and goes on at that number until the Newton correction is at rounding level. So the corrections
-and the tail of the coefficients are the error estimate, at no cost, and the discrete equations hold to rounding,
-which is what makes the discrete adjoint exact (`gauss_linear`).
+below the tolerance, and goes on at that number until the Newton correction is. So the corrections and the tail of the
+coefficients are the error estimate, at no cost. The last correction is solved for but not passed over once more, so
+the kept tangents belong to states that are off by it: by at most the tolerance (and 1e-6) on adaptive windows, by
+1e-10 on fixed ones, where the discrete adjoint (`gauss_linear`) is the exact derivative of what was computed.
 """
 
 from collections import namedtuple
@@ -23,6 +24,7 @@ from mdstopo.integrators.steps import (
     FORCES,
     NEEDS_ROOM,
     NEWTON,
+    NEWTON_FAILED,
     NON_FINITE,
     OK,
     REJECTED,
@@ -365,7 +367,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             if not accepted:
                 work[REJECTED] += 1
                 if fixed_step > 0.0:
-                    return (STEP_TOO_SMALL if np.isfinite(e) else NON_FINITE), count, t
+                    return NEWTON_FAILED, count, t
                 wanted = 0.5 * h
                 continue
 

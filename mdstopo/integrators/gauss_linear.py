@@ -1,6 +1,6 @@
 """Gauss collocation, linearised: dense output, the reverse step, the tangent step (`contract`).
 
-All three work on the stages that `gauss.integrate` kept. Reverse and tangent steps solve the same linear balance of a
+All three work on the stages that `gauss.simulate` kept. Reverse and tangent steps solve the same linear balance of a
 window, transposed or not, by sweeps that contract as the forward ones did.
 """
 

@@ -137,6 +137,11 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
     one = np.int64(1)
     yes = np.bool_(True)
     no = np.bool_(False)
+    steps.index[0, 0] = 0
+    for d in range(n):
+        q[d] = model.q0[d]
+        v[d] = model.v0[d]
+    keep_state(steps.t, steps.state, 0, times[0], q, v)
     wanted = 0.0
     for segment in range(n_segment):
         wanted += max(np.ceil((times[segment + 1] - times[segment]) / step - 1e-9), 1.0)
@@ -146,11 +151,6 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
     if total + 1 > steps.t.shape[0] or total + 2 * n_segment > steps.scalar.shape[0]:
         return NEEDS_ROOM, total
 
-    steps.index[0, 0] = 0
-    for d in range(n):
-        q[d] = model.q0[d]
-        v[d] = model.v0[d]
-    keep_state(steps.t, steps.state, 0, times[0], q, v)
     count = 0
     stages = 0
     for segment in range(n_segment):

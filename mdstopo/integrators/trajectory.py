@@ -1,7 +1,6 @@
 """The motion of a scene as the user sees it: steps, and any time between them."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -63,8 +62,3 @@ class Trajectory:
         n = self.q.shape[1]
         q, v, a = self.steps.at(asked)[:, :, :n]
         return States(q, v, a, np.zeros((len(asked), 0)))
-
-    @cached_property
-    def duration(self) -> float:
-        """Simulated time in s."""
-        return float(self.t[-1] - self.t[0])

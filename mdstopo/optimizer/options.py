@@ -62,11 +62,11 @@ OPTIONS: dict[str, Option] = {
         "factor on that weight when it alone held a step back (decrease 1.5 times the predicted)",
     ),
     # The rows.
-    "peaks": Option(int, 1, 64, 4, "how many competing peaks may become rows of the bound formulation"),
+    "peaks": Option(int, 1, 4, 4, "how many competing peaks may become rows of the bound formulation"),
     "peak_window": Option(
         float,
         0.0,
-        1.0,
+        0.15,
         0.15,
         "how far below the highest a peak may lie to become a row, relative to the highest",
     ),

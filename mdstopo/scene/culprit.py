@@ -80,6 +80,7 @@ class Culprits:
                 strength[:, part] *= design[first : first + block[COUNT]] ** group.power
         from mdstopo.mechanics.start_entry import start_tangents
 
+        strength[1] = 0.0  # undamped
         k, turn = np.zeros((1, pairs, 6, 6)), np.zeros((1, n))
         packed = pack(model)
         start_tangents(packed.ints, packed.floats, strength, self.scene.damped, k, turn)
@@ -90,6 +91,7 @@ class Culprits:
         for body in range(0, n, 3):
             matrix[body : body + 3, body + 2] -= turn[0, body : body + 3]
         root = np.sqrt(model.inv_mass)
-        values = np.linalg.eigvals(root[:, None] * matrix * root[None, :])[: len(root)].real
-        frequencies: FloatArray = np.sort(np.sqrt(values[values > 0.0]))
+        values = np.linalg.eigvals(root[:, None] * matrix * root[None, :]).real
+        rounding = 1e-12 * np.abs(values).max(initial=0.0)  # bodies that move freely
+        frequencies: FloatArray = np.sort(np.sqrt(values[values > rounding]))
         return frequencies

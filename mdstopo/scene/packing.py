@@ -11,9 +11,6 @@ import numpy as np
 from mdstopo.jit import kernel
 from mdstopo.scene.model import FloatArray, IndexArray, Model
 
-#: bodies' coordinates, pairs, blocks, padded members, segments, turning loads
-SIZES = 6
-
 
 class Packed(NamedTuple):
     """ints: sizes, pair, block, load_body, load_follows; floats: the rest, in the order of `Model`."""

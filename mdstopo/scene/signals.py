@@ -7,13 +7,26 @@ from mdstopo.scene.model import FloatArray
 
 
 def breakpoints(load_case: LoadCase) -> FloatArray:
-    """Start, every row of a load's table that lies inside the simulated time, end: ascending, without repeats."""
+    """Start, every row of a load's table that lies inside the simulated time, end: ascending.
+
+    Rows that differ by rounding (another program's 0.30000000000000004) are one.
+    """
     inside: set[float] = set()
     for load in load_case.loads:
         for signal in (*load.force, load.moment):
             if isinstance(signal, Table):
-                inside.update(t for t in signal.times.tolist() if load_case.start < t < load_case.end)
-    return np.array([load_case.start, *sorted(inside), load_case.end])
+                inside.update(signal.times.tolist())
+    near = _nearness(load_case.start, load_case.end)
+    times = [load_case.start]
+    for t in sorted(inside):
+        if t - times[-1] > near and load_case.end - t > near:
+            times.append(t)
+    return np.array([*times, load_case.end])
+
+
+def _nearness(start: float, end: float) -> float:
+    """Times nearer to each other than this are the same, s."""
+    return 1e-12 * (end - start) + 4e-15 * max(abs(start), abs(end))
 
 
 def segment_values(signal: Signal, times: FloatArray) -> FloatArray:
@@ -23,9 +36,10 @@ def segment_values(signal: Signal, times: FloatArray) -> FloatArray:
         out[:, 0] = signal
         return out
     t, y = signal.times, signal.values.reshape(-1)
+    near = _nearness(times[0], times[-1])
     for k in range(len(times) - 1):
         # the row at or before the start; of two rows at one time the later one (right-continuous)
-        i = int(np.searchsorted(t, times[k], side="right")) - 1
+        i = int(np.searchsorted(t, times[k] + near, side="right")) - 1
         if i < 0:
             out[k] = y[0], 0.0
         elif i >= len(t) - 1:

@@ -136,10 +136,10 @@ class _Run:
         if previous is not None:
             self.restore(previous)
         began = time.perf_counter()
-        engine = make(self.case)
-        problem = engine.problem()
         if make is make_engine:
             compile_apart(self.case, self.notify)
+        engine = make(self.case)
+        problem = engine.problem()
         stated, begin, self.before = get_ready(self.case, engine, problem, self.initial)
         self.compare(stated, begin)
         compiled = time.perf_counter()
@@ -243,6 +243,8 @@ class _Run:
         evaluation = engine.evaluate(state.best_alpha, gradient=True)
         if not evaluation.status.ok:
             self.warnings += (f"the final design has no sensitivities: {evaluation.status.value}",)
+        if message := getattr(evaluation, "message", ""):
+            self.warnings += (message,)
         self.peaks = {
             name: tuple((peak.time, peak.value) for peak in found) for name, found in evaluation.peaks.items()
         }

@@ -119,11 +119,13 @@ def test_order_on_the_papers_scene(integrator, order):
     case = paper("fig6")
     alpha = random_design(case, 7)
     exact = evaluate(with_solver(case, integrator="gauss", tolerance=1e-13), alpha)
+    # a single gauss window spans seven radians, which is before its order shows; with four errors are near rounding
+    least, most = (1e-11, 1e-4) if integrator == "runge_kutta" else (1e-13, 1e-6)
     errors, used = [], []
     for steps in (1, 2, 3, 4, 5, 6):
         found = evaluate(with_solver(case, integrator=integrator, step=0.2 / steps), alpha)
         error = abs(found.objectives["G"] / exact.objectives["G"] - 1.0)
-        if 1e-11 < error < 1e-4:
+        if least < error < most:
             errors.append(error)
             used.append(steps)
     assert len(used) >= 2
