@@ -80,9 +80,7 @@ def simulate(case: Case, alpha: ArrayLike | None = None, load_case: str | None =
     return _evaluator(case).trajectory(_design(case, alpha), load_case)
 
 
-def evaluate(
-    case: Case, alpha: ArrayLike | None = None, *, method: str = "auto", gradient: bool = True
-) -> Evaluation:
+def evaluate(case: Case, alpha: ArrayLike | None = None, *, method: str = "auto", gradient: bool = True) -> Evaluation:
     """Compute objectives and constraints of one design, and their gradients with respect to alpha.
 
     alpha (N,): default the case's initial design; any finite alpha >= 0 is evaluated, bounds and rows do not matter.

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import Case, VolumeRow
+from mdstopo.case.model import Case, Objective, ResponseRow, VolumeRow
 from mdstopo.evaluation import Evaluation, FloatArray, Peak
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.driver import Driver, Looked
@@ -21,13 +21,19 @@ from mdstopo.integrators.steps import WORK, WORK_NAMES
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.culprit import Culprits
+from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.refusals import refusals
 from mdstopo.sensitivity.reductions import REDUCTIONS
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
 if TYPE_CHECKING:
+    from mdstopo.general.compile import GeneralScene
+    from mdstopo.general.driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
+
+    AnyScene = Scene | GeneralScene
+    AnyDriver = Driver | GeneralDriver
 
 #: the motion is computed to the tolerance of what is looked at, and never looser than this: at 1e-4 a gradient may
 #: exceed ten tolerances on scenes whose members turn fast
@@ -46,24 +52,27 @@ class Evaluator:
         if refused:
             raise CaseError(refused, str(case.path or case.name))
         self.case = case
-        self.integrator, self.integrator_reason = choose(case.solver)
+        self.beyond = beyond_springs(case)
+        self.integrator, self.integrator_reason = choose(case.solver, self.beyond)
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         self._method = method_of(self.integrator, case.solver)
-        self._beside = Beside(self.integrator) if beside else None
-        order = state_order(case)
-        shared = compile_members(case, {name: i for i, name in enumerate(order)})
-        self.scenes: dict[str, Scene] = {
-            load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases
-        }
-        self._drivers: dict[str, Driver] = {}
+        self._beside = Beside(self.integrator) if beside and not self.beyond else None
+        self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
+        self._drivers: dict[str, AnyDriver] = {}
         self._culprits: dict[str, Culprits] = {}
         self._n = case.n_design
-        self._volumes = tuple(row for row in case.constraints if isinstance(row, VolumeRow))
-        self._rows = np.array([row.coefficients for row in self._volumes]).reshape(len(self._volumes), self._n)
+        self._rows = np.zeros((len(case.constraints), self._n))
+        for i, row in enumerate(case.constraints):
+            if isinstance(row, VolumeRow):
+                self._rows[i] = row.coefficients
         self._rows.flags.writeable = False
-        self._bounds = np.array([row.bound for row in self._volumes])
-        self._by_load_case = {
-            name: tuple(objective for objective in case.objectives if objective.load_case == name)
+        self._bounds = np.array([row.bound for row in case.constraints], dtype=np.float64)
+        # what is looked at in each load case: objectives, then constraints on a response
+        limited = {f"constraints[{i}]": row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
+        self._limited = tuple(limited)
+        self._by_load_case: dict[str, dict[str, Objective | ResponseRow]] = {
+            name: {o.name: o for o in case.objectives if o.load_case == name}
+            | {key: row for key, row in limited.items() if row.load_case == name}
             for name in self.scenes
         }
         self._work = np.zeros(WORK, dtype=np.int64)
@@ -82,7 +91,7 @@ class Evaluator:
         for scene in self.scenes.values():
             notes += [note for note in scene.skipped if note not in notes]
         unused = [name for name, looked in self._by_load_case.items() if not looked and self.case.objectives]
-        return notes + [f"load case {name}: no objective looks at it" for name in unused]
+        return notes + [f"load case {name}: nothing looks at it" for name in unused]
 
     def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
         """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
@@ -109,20 +118,20 @@ class Evaluator:
                 message = culprit
                 counts += driver.work
                 break
-            for j, objective in enumerate(objectives):
-                looked[objective.name] = _peaks(result, j, exact)
+            for j, key in enumerate(objectives):
+                looked[key] = _peaks(result, j, exact)
             if gradient and not exact:
                 from mdstopo.sensitivity.methods import differentiate
 
+                assert isinstance(driver, Driver)  # the general kernels know the adjoint only (`refusals`)
                 found = differentiate(method, driver, design, result)
                 status, message = found.status, found.message or message
                 if not status.ok:
                     counts += driver.work
                     break
-                for j, objective in enumerate(objectives):
-                    looked[objective.name] = tuple(
-                        Peak(peak.time, peak.value, found.gradients[j][r])
-                        for r, peak in enumerate(looked[objective.name])
+                for j, key in enumerate(objectives):
+                    looked[key] = tuple(
+                        Peak(peak.time, peak.value, found.gradients[j][r]) for r, peak in enumerate(looked[key])
                     )
             counts += driver.work
         self._work += counts
@@ -144,7 +153,7 @@ class Evaluator:
         status, steps = driver.simulate(design)
         message = ""
         if not status.ok:
-            status, message = self._culprit(load_case).explain(design, status, float(steps.t[-1]), steps.state[-1])
+            status, message = self._explain(load_case, design, status, float(steps.t[-1]), steps.state[-1])
         work = dict(zip(WORK_NAMES, driver.work.tolist(), strict=True))
         return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
 
@@ -156,6 +165,12 @@ class Evaluator:
 
     def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
         """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
+        if self.beyond:
+            from mdstopo.general.vibration import natural_frequencies
+
+            driver = self.driver(load_case)
+            assert not isinstance(driver, Driver)
+            return natural_frequencies(driver, self.design(alpha))
         return self._culprit(load_case).natural_frequencies(self.design(alpha))
 
     # -- how
@@ -179,20 +194,20 @@ class Evaluator:
                 return f"alpha = 0 in group {group.name}, whose power {group.power:g} is below 1"
         return ""
 
-    def driver(self, name: str) -> Driver:
+    def driver(self, name: str) -> "AnyDriver":
         """The buffers and compiled entries of one load case, made at their first use."""
         if name not in self._drivers:
-            looked = self._by_load_case[name]
+            looked = self._by_load_case[name].values()
             solver = self.case.solver
-            driver = Driver(
-                self.scenes[name],
-                self._method,
-                min(solver.tolerance, LOOSEST),
-                solver.step or 0.0,
-                np.array([REDUCTIONS[objective.over_time] for objective in looked], dtype=np.int64),
-                self._n,
-                self._beside,
-            )
+            scene, tolerance, step = self.scenes[name], min(solver.tolerance, LOOSEST), solver.step or 0.0
+            driver: AnyDriver
+            if isinstance(scene, Scene):
+                reductions = np.array([REDUCTIONS[each.over_time] for each in looked], dtype=np.int64)
+                driver = Driver(scene, self._method, tolerance, step, reductions, self._n, self._beside)
+            else:
+                from mdstopo.general.driver import GeneralDriver
+
+                driver = GeneralDriver(self.case, scene, self._method, tolerance, step)
             if self.integrator == "generalized_alpha" and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
 
@@ -202,18 +217,28 @@ class Evaluator:
 
     def _culprit(self, name: str) -> Culprits:
         if name not in self._culprits:
-            self._culprits[name] = Culprits(self.case, self.scenes[name])
+            scene = self.scenes[name]
+            assert isinstance(scene, Scene)
+            self._culprits[name] = Culprits(self.case, scene)
         return self._culprits[name]
+
+    def _explain(
+        self, name: str, design: FloatArray, status: Status, time: float, state: FloatArray
+    ) -> tuple[Status, str]:
+        """The status and its culprit, for a motion that ended at `time` in a state (2, n)."""
+        driver = self.driver(name)
+        if isinstance(driver, Driver):
+            return self._culprit(name).explain(design, status, time, state)
+        return status, driver.message
 
     def _verdict(self, name: str, design: FloatArray, result: Looked) -> tuple[Status, str]:
         """Whether the motion of a load case can be trusted, and who is to blame where not."""
         if result.status.ok and result.meeting < 0:
             return Status.OK, ""
-        culprit = self._culprit(name)
         if result.status.ok:
-            return Status.ZERO_LENGTH, culprit.member(result.meeting)
+            return Status.ZERO_LENGTH, self._culprit(name).member(result.meeting)
         status, steps = self.driver(name).simulate(design)
-        return culprit.explain(design, status, float(steps.t[-1]), steps.state[-1])
+        return self._explain(name, design, status, float(steps.t[-1]), steps.state[-1])
 
     def _evaluation(
         self,
@@ -227,23 +252,44 @@ class Evaluator:
         names = [objective.name for objective in self.case.objectives]
         if not status.ok:
             lost = (Peak(np.nan, np.nan, None),)
-            looked = {name: looked.get(name, lost) if status is Status.NO_GRADIENT else lost for name in names}
+            keys = [*names, *self._limited]
+            looked = {key: looked.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}
         gradients = {}
         for name in names:
             first = looked[name][0].gradient
             if gradient and first is not None:
                 gradients[name] = first
+        constraints, rows = np.einsum("ij,j->i", self._rows, design) - self._bounds, self._rows
+        if self._limited:
+            rows = rows.copy()
+            for key in self._limited:
+                i = int(key[len("constraints[") : -1])
+                first = looked[key][0]
+                constraints[i] = first.value - self._bounds[i]
+                rows[i] = np.nan if first.gradient is None else first.gradient
         return Evaluation(
             objectives={name: looked[name][0].value for name in names},
             gradients=gradients,
             peak_times={name: looked[name][0].time for name in names},
-            constraints=np.einsum("ij,j->i", self._rows, design) - self._bounds,
-            constraint_gradients=self._rows,
+            constraints=constraints,
+            constraint_gradients=rows,
             peaks={name: looked[name] for name in names},
+            constraint_peaks={int(key[len("constraints[") : -1]): looked[key] for key in self._limited},
             work=work,
             status=status,
             message=message,
         )
+
+
+def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
+    """Every load case as a scene of the family that the case needs."""
+    if general:
+        from mdstopo.general.compile import compile_general
+
+        return {load_case.name: compile_general(case, load_case) for load_case in case.load_cases}
+    order = state_order(case)
+    shared = compile_members(case, {name: i for i, name in enumerate(order)})
+    return {load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases}
 
 
 def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:

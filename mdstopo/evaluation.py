@@ -1,7 +1,7 @@
 """What an evaluation gives back."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class Evaluation:
     objectives: raw G; gradients: dG/dalpha (N,), at tied peaks the highest's, the earliest if equal; peak_times: t_n in
     s (NaN for mean and integral); peaks: all that compete, highest first; constraints (n_con,): h_j - h_0j in the
     case's order; constraint_gradients (n_con, N); work: counts of what was done; status: anything but OK leaves values
-    NaN, and message names the culprit.
+    NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all that compete.
     """
 
     objectives: Mapping[str, float]
@@ -43,3 +43,4 @@ class Evaluation:
     work: Mapping[str, int]
     status: Status
     message: str = ""
+    constraint_peaks: Mapping[int, tuple[Peak, ...]] = field(default_factory=dict)

@@ -21,7 +21,7 @@ import numpy as np
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_ROOMS = ("mechanics", "integrators", "responses", "sensitivity", "optimizer", "scene")
+_ROOMS = ("general", "mechanics", "integrators", "responses", "sensitivity", "optimizer", "scene")
 # Sums may be reordered for the vector units and products fused; NaN and infinity keep their meaning.
 _VECTOR = {"reassoc", "contract", "nsz"}
 

@@ -128,9 +128,7 @@ def _build_grid(name: str, fields: Fields, frames: Frames, reading: Reading) -> 
     count = sum(grid_count(kind, grid) for kind, grid in kinds)
     most = total_memory() // BYTES_PER_POINT
     if count > most:
-        reading.mistake(
-            path, f"{count_text(count)} points are more than memory holds; allowed are {count_text(most)}"
-        )
+        reading.mistake(path, f"{count_text(count)} points are more than memory holds; allowed are {count_text(most)}")
         return None
     points = np.concatenate([grid_points(kind, grid) for kind, grid in kinds])
     local, world = frames.both(fields["body"], points, fields["frame"])

@@ -21,9 +21,7 @@ DESIGN_KEYS = ("initial", "lower", "upper", "power")
 DESIGN_DEFAULTS = {"initial": 0.1, "lower": 0.001, "upper": 1.0, "power": 1.0}
 
 
-def apply_design(
-    top: Fields, groups: dict[str, MemberGroup], reading: Reading
-) -> dict[str, MemberGroup] | None:
+def apply_design(top: Fields, groups: dict[str, MemberGroup], reading: Reading) -> dict[str, MemberGroup] | None:
     """The groups with the design's numbers; None where those are wrong.
 
     A case without design, objectives and constraints is simulated with alpha = 1: its initial design is 1.

@@ -143,9 +143,7 @@ def _build_group(
     )
 
 
-def _end(
-    fields: Fields, key: str, points: dict[str, PointGrid], frames: Frames, reading: Reading
-) -> _End | None:
+def _end(fields: Fields, key: str, points: dict[str, PointGrid], frames: Frames, reading: Reading) -> _End | None:
     end = fields[key]
     if isinstance(end, str):
         grid = points.get(end)

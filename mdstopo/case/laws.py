@@ -131,6 +131,5 @@ class InerterLaw(Law):
 
 
 LAWS: dict[str, type[Law]] = {
-    law.type: law
-    for law in (SpringLaw, GapLaw, CubicLaw, CurveLaw, PulseLaw, TableLaw, ActuatorLaw, InerterLaw)
+    law.type: law for law in (SpringLaw, GapLaw, CubicLaw, CurveLaw, PulseLaw, TableLaw, ActuatorLaw, InerterLaw)
 }

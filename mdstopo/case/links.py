@@ -59,9 +59,7 @@ def build_bushings(entries: Any, frames: Frames, reading: Reading) -> tuple[Bush
         bodies = _two_bodies(fields, frames, reading)
         ends = None if bodies is None else _points(fields, bodies, frames, reading)
         if bodies is not None and ends is not None and fields.good():
-            built.append(
-                Bushing(index, bodies, ends[0][0], ends[1][0], fields["stiffness"], fields["damping"])
-            )
+            built.append(Bushing(index, bodies, ends[0][0], ends[1][0], fields["stiffness"], fields["damping"]))
     return tuple(built)
 
 

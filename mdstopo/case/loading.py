@@ -78,9 +78,7 @@ def build_load_cases(
         _check_weights(gravity, frames, path, reading)
         moving = [body for body in frames.bodies.values() if body.name != GROUND]
         bodies = tuple(_started(body, starts.get((name, body.name))) for body in moving)
-        built.append(
-            LoadCase(name, gravity, window.start, window.end, common + own, motions.get(name, ()), bodies)
-        )
+        built.append(LoadCase(name, gravity, window.start, window.end, common + own, motions.get(name, ()), bodies))
     return tuple(built)
 
 

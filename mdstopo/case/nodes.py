@@ -139,9 +139,7 @@ class _Builder:
                 node = self._open(event)
                 if node.kind != SCALAR and not isinstance(event, yaml.AliasEvent):
                     if len(stack) >= DEEPEST:
-                        raise YamlSyntaxError(
-                            self._mistake(event.start_mark, f"nested deeper than {DEEPEST} levels")
-                        )
+                        raise YamlSyntaxError(self._mistake(event.start_mark, f"nested deeper than {DEEPEST} levels"))
                     self.unfinished.add(id(node))
                     stack.append((node, []))
                     continue
@@ -158,9 +156,7 @@ class _Builder:
             if target is None:
                 raise YamlSyntaxError(self._mistake(mark, f"no anchor &{name} before this alias"))
             if id(target) in self.unfinished:
-                raise YamlSyntaxError(
-                    self._mistake(mark, f"the alias *{name} stands inside what it refers to")
-                )
+                raise YamlSyntaxError(self._mistake(mark, f"the alias *{name} stands inside what it refers to"))
             return target.at(line, column)
         if isinstance(event, self.yaml.ScalarEvent):
             node = Node(SCALAR, line, column, self.origin)
@@ -232,9 +228,7 @@ class _Builder:
             begun = getattr(error, "context_mark", None)
             context = ""
             if error.context and begun is not None:
-                context = (
-                    f" ({error.context} that starts at line {begun.line + 1}, column {begun.column + 1})"
-                )
+                context = f" ({error.context} that starts at line {begun.line + 1}, column {begun.column + 1})"
             if self._character(mark) == "\t":
                 problem, context = "a tab stands here; indent with blanks", ""
             return YamlSyntaxError(self._mistake(mark, f"not valid YAML: {problem}{context}"))

@@ -115,9 +115,7 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
     if root is None or root.kind != MAPPING:
         what = "nothing" if root is None else found(root)
         line, column = (1, 1) if root is None else (root.line, root.column)
-        mistake = Mistake(
-            "", f"found {what}, allowed is a mapping that starts with `format: 1`", line, column
-        )
+        mistake = Mistake("", f"found {what}, allowed is a mapping that starts with `format: 1`", line, column)
         raise CaseError([*reading.mistakes, mistake], file)
     return root
 

@@ -93,9 +93,7 @@ class Reading:
         if len(self.mistakes) < MOST_MISTAKES:
             self.mistakes.append(self._located(path, message, node))
         elif len(self.mistakes) == MOST_MISTAKES:
-            self.mistakes.append(
-                self._located(path, "there are more mistakes; this is the last one told", node)
-            )
+            self.mistakes.append(self._located(path, "there are more mistakes; this is the last one told", node))
 
     def warning(self, path: str, message: str) -> None:
         """Note a remark at `path`."""

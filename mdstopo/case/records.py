@@ -24,9 +24,7 @@ class Vector(Value):
         if node.kind != SEQUENCE or len(node.items) != self.length:
             reading.mistake(path, f"found {found(node)}, allowed is a list of {self.length}", node)
             return BAD
-        values = tuple(
-            self.item.read(child, f"{path}[{index}]", reading) for index, child in enumerate(node.items)
-        )
+        values = tuple(self.item.read(child, f"{path}[{index}]", reading) for index, child in enumerate(node.items))
         return BAD if any(value is BAD for value in values) else values
 
     def schema(self) -> Schema:

@@ -38,9 +38,7 @@ class FileName(Value):
         return {"type": "string", "minLength": 1}
 
 
-FILE = Record(
-    "a file of rows", (Key("file", FileName(), "columns of numbers, one header line allowed", True),)
-)
+FILE = Record("a file of rows", (Key("file", FileName(), "columns of numbers, one header line allowed", True),))
 
 
 @frozen

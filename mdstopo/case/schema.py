@@ -80,12 +80,8 @@ _RESPONSE = ByShape(
         "a response", tuple(Key(name, kind) for name, kind in RESPONSES.items()), one_of=(tuple(RESPONSES),)
     ),
 )
-_OVER_TIME = Key(
-    "over_time", Word(("max", "min", "max_abs", "mean", "rms", "integral", "final")), default="max"
-)
-_LOAD_CASE = Key(
-    "load_case", Ref("load case", also=("default",)), "may be left out where there is one or none"
-)
+_OVER_TIME = Key("over_time", Word(("max", "min", "max_abs", "mean", "rms", "integral", "final")), default="max")
+_LOAD_CASE = Key("load_case", Ref("load case", also=("default",)), "may be left out where there is one or none")
 OBJECTIVE = Record(
     "an objective",
     (

@@ -36,16 +36,12 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
     if not fields.good():
         return SolverSettings()
     _warn_ignored(fields, reading)
-    return SolverSettings(
-        integrator, tolerance, sensitivity, fields["assemble"], step, fields["spectral_radius"]
-    )
+    return SolverSettings(integrator, tolerance, sensitivity, fields["assemble"], step, fields["spectral_radius"])
 
 
 def _warn_ignored(fields: Fields, reading: Reading) -> None:
     integrator = fields["integrator"]
-    damped = integrator == "generalized_alpha" or (
-        integrator == "auto" and fields["sensitivity"] == "iterative"
-    )
+    damped = integrator == "generalized_alpha" or (integrator == "auto" and fields["sensitivity"] == "iterative")
     if "spectral_radius" in fields.stated and not damped:
         message = f"the integrator {integrator} ignores spectral_radius: only generalized_alpha has one"
         reading.warning(inside(fields.path, "spectral_radius"), message)

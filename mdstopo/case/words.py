@@ -25,9 +25,7 @@ def inside(path: str, key: str) -> str:
 def listed(words: Iterable[str]) -> str:
     """``a, b, c``, on one line; cut where there are very many."""
     all_words = list(words)
-    told = [
-        word if word.isprintable() and len(word) <= _LONGEST else shown(word) for word in all_words[:_MOST]
-    ]
+    told = [word if word.isprintable() and len(word) <= _LONGEST else shown(word) for word in all_words[:_MOST]]
     return ", ".join(told) + (f", ... ({len(all_words)} in all)" if len(all_words) > _MOST else "")
 
 

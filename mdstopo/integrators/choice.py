@@ -8,14 +8,19 @@ from mdstopo.case.model import SolverSettings
 from mdstopo.integrators.driver import Method
 
 
-def choose(solver: SolverSettings) -> tuple[str, str]:
-    """Name of the integrator and the reason, as a sentence without a full stop."""
+def choose(solver: SolverSettings, beyond: str = "") -> tuple[str, str]:
+    """Name of the integrator and the reason, as a sentence without a full stop.
+
+    beyond: what in the case goes beyond springs between free bodies, in words.
+    """
     if solver.integrator != "auto":
         return solver.integrator, "as the case says"
     if solver.sensitivity == "iterative":
         return "generalized_alpha", "the iterative sensitivity method is defined on its steps"
     if solver.spectral_radius is not None:
         return "generalized_alpha", "a spectral radius is given, which no other method has"
+    if beyond:
+        return "runge_kutta", f"explicit steps of high order that carry {beyond}"
     return "gauss", "adaptive collocation needs the fewest passes over the members on smooth motion"
 
 

@@ -302,9 +302,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                         for d in range(n):
                             ref[0, i, d] = q[i, d]
                             ref[1, i, d] = v[i, d]
-                    forces(
-                        model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn
-                    )
+                    forces(model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
                     work[FORCES] += s
                     work[TANGENTS] += s
                     work[NEWTON] += 1

@@ -191,9 +191,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                         q_now[0, d] = q[d] + h * (v[d] + h * ((0.5 - beta) * x[0, d] + beta * x_now[d]))
                         v_now[0, d] = v[d] + h * ((1.0 - gamma) * x[0, d] + gamma * x_now[d])
                     previous = np.inf
-                forces(
-                    model, strength, segment, one, t_now, q_now, v_now, yes, damped, rel, sums, f, k, c, turn
-                )
+                forces(model, strength, segment, one, t_now, q_now, v_now, yes, damped, rel, sums, f, k, c, turn)
                 work[FORCES] += 1
                 work[TANGENTS] += 1
                 if count == 0 and newton == -starting:

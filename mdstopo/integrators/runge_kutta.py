@@ -44,8 +44,30 @@ MARGIN = 0.1
 
 @kernel
 def advance(  # type: ignore[no-untyped-def]
-    model, table, s, strength, segment, t, h, q0, v0, tangent, damped, o, rel, sums, f, k, c, turn, q, v, a, steps,
-    ends, work,
+    model,
+    table,
+    s,
+    strength,
+    segment,
+    t,
+    h,
+    q0,
+    v0,
+    tangent,
+    damped,
+    o,
+    rel,
+    sums,
+    f,
+    k,
+    c,
+    turn,
+    q,
+    v,
+    a,
+    steps,
+    ends,
+    work,
 ):
     """One step of length h from q0, v0: the stages into q, v, a (s, n), the end into ends (2, n).
 

@@ -25,9 +25,17 @@ from mdstopo.jit import kernel
 from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)
-OK, NON_FINITE, STEP_LIMIT, STEP_TOO_SMALL, NEWTON_FAILED, NEEDS_ROOM = range(6)
+OK, NON_FINITE, STEP_LIMIT, STEP_TOO_SMALL, NEWTON_FAILED, NEEDS_ROOM, SINGULAR, CHATTERING = range(8)
 
-_STATUS = (Status.OK, Status.NON_FINITE, Status.STEP_LIMIT, Status.STEP_TOO_SMALL, Status.NEWTON_FAILED)
+_STATUS = {
+    OK: Status.OK,
+    NON_FINITE: Status.NON_FINITE,
+    STEP_LIMIT: Status.STEP_LIMIT,
+    STEP_TOO_SMALL: Status.STEP_TOO_SMALL,
+    NEWTON_FAILED: Status.NEWTON_FAILED,
+    SINGULAR: Status.SINGULAR,
+    CHATTERING: Status.CHATTERING,
+}
 
 #: positions in the array of work counts: states at which forces were summed, those of them with tangents, accepted
 #: and rejected steps, Newton corrections, body-level sweeps, reverse steps, states in design gradient passes

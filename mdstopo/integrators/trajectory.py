@@ -1,6 +1,8 @@
 """The motion of a scene as the user sees it: steps, and any time between them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -8,6 +10,9 @@ from numpy.typing import ArrayLike
 from mdstopo.integrators.driver import DenseSteps
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralSteps
 
 
 @dataclass(frozen=True)
@@ -27,7 +32,8 @@ class Trajectory:
     t (T,): times of the accepted steps, start and end included; q, v, a (T, n): x, y, psi of each body as declared and
     their derivatives, a by the equations of motion, right-continuous where a load jumps; lam (T, n_rows): Lagrange
     multipliers (no rows without joints and motions). status: anything but OK means that it ends early, at t[-1];
-    message says why. work: counts by name.
+    message says why. work: counts by name. reactions: Fx, Fy, M (T, 3) of each joint on its first body, at the joint,
+    global axes.
     """
 
     load_case: str
@@ -39,17 +45,31 @@ class Trajectory:
     a: FloatArray
     lam: FloatArray
     work: dict[str, int]
-    steps: DenseSteps = field(repr=False)
+    steps: "DenseSteps | GeneralSteps" = field(repr=False)
+    reactions: Mapping[str, FloatArray] = field(default_factory=dict)
 
     @classmethod
     def of(
-        cls, load_case: str, n: int, steps: DenseSteps, status: Status, message: str, work: dict[str, int]
+        cls,
+        load_case: str,
+        n: int,
+        steps: "DenseSteps | GeneralSteps",
+        status: Status,
+        message: str,
+        work: dict[str, int],
     ) -> "Trajectory":
         """The trajectory of the first n coordinates (what follows is ground)."""
         t = steps.t.copy()
         q, v = steps.state[:, 0, :n].copy(), steps.state[:, 1, :n].copy()
-        a = steps.at(t)[2][:, :n].copy() if steps.count else np.zeros_like(q)
-        return cls(load_case, status, message, t, q, v, a, np.zeros((len(t), 0)), work, steps)
+        a, lam = np.zeros_like(q), np.zeros((len(t), 0))
+        if isinstance(steps, DenseSteps):
+            a = steps.at(t)[2][:, :n].copy() if steps.count else a
+            return cls(load_case, status, message, t, q, v, a, lam, work, steps)
+        if not steps.count:
+            return cls(load_case, status, message, t, q, v, a, lam, work, steps)
+        out, lam = steps.balanced(t)
+        a = out[2][:, :n].copy()
+        return cls(load_case, status, message, t, q, v, a, lam, work, steps, steps.reactions(out[0], lam))
 
     def at(self, times: ArrayLike) -> States:
         """States at times (T,), from the integrator's own dense output.
@@ -60,5 +80,9 @@ class Trajectory:
         if asked.ndim != 1 or not np.all((asked >= self.t[0]) & (asked <= self.t[-1])):
             raise ValueError(f"times must be one-dimensional and lie within {self.t[0]:g} .. {self.t[-1]:g} s")
         n = self.q.shape[1]
-        q, v, a = self.steps.at(asked)[:, :, :n]
-        return States(q, v, a, np.zeros((len(asked), 0)))
+        if isinstance(self.steps, DenseSteps):
+            out, lam = self.steps.at(asked), np.zeros((len(asked), 0))
+        else:
+            out, lam = self.steps.balanced(asked)
+        q, v, a = out[:, :, :n]
+        return States(q, v, a, lam)

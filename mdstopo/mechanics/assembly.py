@@ -110,9 +110,7 @@ def member_sums(block, member, strength, rel, m, tangent, sums):  # type: ignore
                 ps = strength[2, lo:hi]
                 if tangent:
                     (x, y, t, e, ex, ey, et, k0, k1, k2, k3, k4, k5, k6, k7, k8, c0, c1, c2, c3, c4, c5) = (
-                        viscous_tangent(
-                            px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
-                        )
+                        viscous_tangent(px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6])
                     )
                     o[7] += k0
                     o[8] += k1

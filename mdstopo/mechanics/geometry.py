@@ -73,4 +73,3 @@ def add_pair_force(pair, rel, p, qx, qy, qt, out):  # type: ignore[no-untyped-de
     out[a] -= fx
     out[a + 1] -= fy
     out[a + 2] += qx * rel[p, 1] - qy * rel[p, 0] - qt
-

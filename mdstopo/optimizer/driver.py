@@ -44,9 +44,7 @@ class Gsao:
     bounds and volume rows, and ValueError where the bounds cross.
     """
 
-    def __init__(
-        self, problem: Problem, settings: Settings, clock: Callable[[], float] = time.perf_counter
-    ) -> None:
+    def __init__(self, problem: Problem, settings: Settings, clock: Callable[[], float] = time.perf_counter) -> None:
         self.problem = problem
         self.settings = settings
         self.clock = clock
@@ -208,9 +206,7 @@ class Gsao:
         highest = float(state.rows.max())
         near = state.rows >= highest - settings.number("peak_window") * abs(highest)
         chosen = np.flatnonzero(near)[: int(settings.number("peaks"))]
-        slopes = np.concatenate(
-            [state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))]
-        )
+        slopes = np.concatenate([state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))])
         distance = state.shift * self.range
         below = distance
         if settings.flag("zero_shift"):

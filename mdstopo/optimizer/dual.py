@@ -34,9 +34,7 @@ def solve_dual(model: Approximation, lower: Floats, upper: Floats, linear: Linea
     x, value = excess(0.0)
     if value == 0.0 or (value < 0.0 and not linear.equal[0]):
         return Optimum(x, np.ones(1), np.zeros(1), 1, True)
-    rounding = 1e-15 * (
-        float(np.einsum("i,i->", np.abs(a), np.maximum(np.abs(lower), np.abs(upper)))) + abs(b)
-    )
+    rounding = 1e-15 * (float(np.einsum("i,i->", np.abs(a), np.maximum(np.abs(lower), np.abs(upper)))) + abs(b))
     # `near` is the side at zero, `far` the other; the root lies between.
     sign = 1.0 if value > 0.0 else -1.0
     unit = float(np.abs(model.slopes).max()) / float(np.abs(a).max())

@@ -37,9 +37,7 @@ class Optimum:
     converged: bool
 
 
-def interior_point(
-    model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, price: Floats
-) -> Optimum:
+def interior_point(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, price: Floats) -> Optimum:
     """Solve the subproblem in the box lower <= x <= upper, lower < upper throughout.
 
     price: (C,) of the constraint rows. Some x in the box must satisfy the linear rows, no one of which may be

@@ -149,9 +149,7 @@ def expand(
         for side in range(2 if R > 0 else 0):
             out = low if side == 0 else high
             power_here = 1.0 if side == 1 and linear_above else power
-            _terms(
-                step[:n], 1.0 - 2.0 * side, frame[1 + side, start:stop], power_here, out[0], out[1], out[2]
-            )
+            _terms(step[:n], 1.0 - 2.0 * side, frame[1 + side, start:stop], power_here, out[0], out[1], out[2])
         for a in range(K):
             row = B[a, start:stop]
             if a < R:
@@ -176,9 +174,7 @@ def expand(
 
 
 @member_kernel
-def direct(
-    B: Floats, change: Floats, bounds: Floats, work: Floats
-) -> tuple[float, float, float, float, float]:
+def direct(B: Floats, change: Floats, bounds: Floats, work: Floats) -> tuple[float, float, float, float, float]:
     """The steps of variables and of their bounds' multipliers, for the rows' multiplier steps `change`.
 
     Returns the largest -dw/w and -dz/z (w a distance to a bound, z its multiplier), and the sums of z dw, w
@@ -284,9 +280,7 @@ def eliminate(matrix: Floats, right: Floats, solution: Floats) -> bool:
 
 
 @member_kernel
-def _rows_right(
-    kind: Ints, rhs: Floats, miss: Floats, rows: Floats, aims: Floats, rz: float, right: Floats
-) -> None:
+def _rows_right(kind: Ints, rhs: Floats, miss: Floats, rows: Floats, aims: Floats, rz: float, right: Floats) -> None:
     """The right side of the rows' system for the present targets."""
     for a in range(len(kind)):
         right[a] = rhs[a] + miss[a] + aims[0, a]
@@ -296,9 +290,7 @@ def _rows_right(
 
 
 @member_kernel
-def _rows_direct(
-    kind: Ints, change: Floats, rows: Floats, aims: Floats
-) -> tuple[float, float, float, float, float]:
+def _rows_direct(kind: Ints, change: Floats, rows: Floats, aims: Floats) -> tuple[float, float, float, float, float]:
     """The rows' own steps for their multiplier steps `change`; returns what `direct` returns."""
     primal, multiplier, zdw, wdz, dwdz = 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(len(kind)):

@@ -82,24 +82,12 @@ OPTIONS: dict[str, Option] = {
     "trust_region": Option(
         bool, None, None, True, "reject steps that do not decrease the objective and adapt a trust box"
     ),
-    "trust_start": Option(
-        float, 1e-6, 1.0, 0.2, "first half width of the trust box, in ranges of the variable"
-    ),
-    "trust_grow": Option(
-        float, 1.0, 10.0, 2.0, "factor on the trust box after a step that was predicted well"
-    ),
-    "trust_shrink": Option(
-        float, 0.01, 1.0, 0.5, "factor on the trust box after a step that was predicted badly"
-    ),
-    "good_ratio": Option(
-        float, 0.0, 1.0, 0.75, "actual / predicted decrease above which the trust box grows"
-    ),
-    "poor_ratio": Option(
-        float, 0.0, 1.0, 0.25, "actual / predicted decrease below which the trust box shrinks"
-    ),
-    "accept_ratio": Option(
-        float, 0.0, 1.0, 1e-3, "actual / predicted decrease below which a step is rejected"
-    ),
+    "trust_start": Option(float, 1e-6, 1.0, 0.2, "first half width of the trust box, in ranges of the variable"),
+    "trust_grow": Option(float, 1.0, 10.0, 2.0, "factor on the trust box after a step that was predicted well"),
+    "trust_shrink": Option(float, 0.01, 1.0, 0.5, "factor on the trust box after a step that was predicted badly"),
+    "good_ratio": Option(float, 0.0, 1.0, 0.75, "actual / predicted decrease above which the trust box grows"),
+    "poor_ratio": Option(float, 0.0, 1.0, 0.25, "actual / predicted decrease below which the trust box shrinks"),
+    "accept_ratio": Option(float, 0.0, 1.0, 1e-3, "actual / predicted decrease below which a step is rejected"),
     # The stops.
     "decrease_tolerance": Option(
         float,

@@ -104,9 +104,7 @@ def _several_rows(x: Floats, lower: Floats, upper: Floats, rows: LinearRows) -> 
     out = np.clip(x, lower, upper)
     if not free.any():
         return out
-    rest = LinearRows(
-        rows.A[:, free], rows.b - np.einsum("ij,j->i", rows.A[:, ~free], out[~free]), rows.equal
-    )
+    rest = LinearRows(rows.A[:, free], rows.b - np.einsum("ij,j->i", rows.A[:, ~free], out[~free]), rows.equal)
     used = np.abs(rest.A).max(axis=1, initial=0.0) > 0.0
     rest = LinearRows(rest.A[used], rest.b[used], rest.equal[used])
     n = int(free.sum())

@@ -59,9 +59,7 @@ def first_price(sample: Sample, settings: Settings) -> Floats:
         return np.zeros(0)
     steepest = np.abs(sample.constraint_gradients).max(axis=1)
     slope = float(np.abs(sample.gradients).max())
-    return (
-        settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(steepest > 0.0, steepest, 1.0)
-    )
+    return settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(steepest > 0.0, steepest, 1.0)
 
 
 def better(objective: float, violation: float, state: State, tolerance: float) -> bool:
@@ -125,9 +123,7 @@ def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, s
             f"actual and predicted decrease were both below {share:.2g} of the objective twice running"
         )
     if move <= settings.number("change_tolerance"):
-        return RunStatus.CONVERGED, (
-            f"the next step would change no variable by more than {move:.2g} of its range"
-        )
+        return RunStatus.CONVERGED, (f"the next step would change no variable by more than {move:.2g} of its range")
     if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, f"the limit of {settings.max_iterations} iterations was reached"
     return RunStatus.RUNNING, ""

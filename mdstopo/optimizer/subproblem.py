@@ -31,9 +31,7 @@ def solve(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows
     rest = (
         linear
         if whole
-        else LinearRows(
-            linear.A[:, free], linear.b - np.einsum("ij,j->i", linear.A[:, ~free], x[~free]), linear.equal
-        )
+        else LinearRows(linear.A[:, free], linear.b - np.einsum("ij,j->i", linear.A[:, ~free], x[~free]), linear.equal)
     )
     used = np.abs(rest.A).max(axis=1, initial=0.0) > 0.0
     if not used.all():

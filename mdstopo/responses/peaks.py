@@ -46,9 +46,7 @@ def keep_peak(peaks, found, time, value):  # type: ignore[no-untyped-def]
     """Insert a peak, highest first and the earlier first where equal; return how many are kept."""
     rows = peaks.shape[0]
     place = found
-    while place > 0 and (
-        value > peaks[place - 1, 1] or (value == peaks[place - 1, 1] and time < peaks[place - 1, 0])
-    ):
+    while place > 0 and (value > peaks[place - 1, 1] or (value == peaks[place - 1, 1] and time < peaks[place - 1, 0])):
         place -= 1
     if place >= rows:
         return found

@@ -161,9 +161,7 @@ def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
     return Scene(load_case, model, names, n_bodies, damped, _skipped(case, names, damped, times, turning, block))
 
 
-def _watched_pairs(
-    names: tuple[str, ...], shared: Members
-) -> tuple[IndexArray, FloatArray, FloatArray]:
+def _watched_pairs(names: tuple[str, ...], shared: Members) -> tuple[IndexArray, FloatArray, FloatArray]:
     """Pairs that members connect, then each body without members against ground: errors are measured on pairs."""
     pairs = [tuple(pair) for pair in shared.pairs.tolist()]
     held = {body for pair in pairs for body in pair}

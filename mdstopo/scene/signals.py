@@ -1,17 +1,19 @@
 """Piecewise linear signals of time, cut into segments at whose ends the integrators land."""
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from mdstopo.case.model import LoadCase, Signal, Table
 from mdstopo.scene.model import FloatArray
 
 
-def breakpoints(load_case: LoadCase) -> FloatArray:
-    """Start, every row of a load's table that lies inside the simulated time, end: ascending.
+def breakpoints(load_case: LoadCase, more: Iterable[float] = ()) -> FloatArray:
+    """Start, every row of a load's table and of `more` that lies inside the simulated time, end: ascending.
 
     Rows that differ by rounding (another program's 0.30000000000000004) are one.
     """
-    inside: set[float] = set()
+    inside: set[float] = set(more)
     for load in load_case.loads:
         for signal in (*load.force, load.moment):
             if isinstance(signal, Table):

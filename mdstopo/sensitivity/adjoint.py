@@ -130,9 +130,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
             reached = max(stages, steps.index[w + 1, 0])
             z = np.empty((reached, n))
             used = np.zeros(reached, np.int64)
-            reverse_sweep(
-                pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, work
-            )
+            reverse_sweep(pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, work)
             design_gradient(pair, model.block, model.member, steps.stage, z, used, out, work)
         if integral:
             energy_gradient(pair, model.block, model.member, unit, steps.stage, weight, out)

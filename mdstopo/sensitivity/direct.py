@@ -97,8 +97,23 @@ def finish_rows(  # type: ignore[no-untyped-def]
 
 @entry
 def direct(  # type: ignore[no-untyped-def]
-    tag, ints, floats, tables, alpha, damped, limits, count, reductions, room, room_ints, strength, rows, found,
-    gradients, history, work,
+    tag,
+    ints,
+    floats,
+    tables,
+    alpha,
+    damped,
+    limits,
+    count,
+    reductions,
+    room,
+    room_ints,
+    strength,
+    rows,
+    found,
+    gradients,
+    history,
+    work,
 ):
     """Gradients of the rows that `look` found, by one forward sweep over the steps left in room, with tangents.
 
@@ -161,9 +176,7 @@ def direct(  # type: ignore[no-untyped-def]
             total_line = line[0]
             total_line[:] = 0.0
             apply_matrix(pair, model.block, model.member, steps.stage, 0, matrix, 0, 1, True, S, line)
-            energy_gradient(
-                pair, model.block, model.member, model.member[5:8], steps.state[k : k + 1], one, total_line
-            )
+            energy_gradient(pair, model.block, model.member, model.member[5:8], steps.state[k : k + 1], one, total_line)
             unscale_gradient(model.block, model.power, alpha, total_line, history[k])
         if k == count:
             break

@@ -142,8 +142,22 @@ def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):  # type: ignore[no-untyp
 
 @entry
 def iterative(  # type: ignore[no-untyped-def]
-    tag, ints, floats, tables, alpha, damped, limits, count, reductions, room, room_ints, strength, rows, found,
-    gradients, work,
+    tag,
+    ints,
+    floats,
+    tables,
+    alpha,
+    damped,
+    limits,
+    count,
+    reductions,
+    room,
+    room_ints,
+    strength,
+    rows,
+    found,
+    gradients,
+    work,
 ):
     """Gradients (n_obj, R, N) of the rows that `look` found; arguments as those of `direct.direct`.
 

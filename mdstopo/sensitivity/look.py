@@ -18,8 +18,26 @@ from mdstopo.sensitivity.adjoint import energy_rows
 
 @entry
 def look(  # type: ignore[no-untyped-def]
-    tag, ints, floats, tables, alpha, damped, settings, limits, count, reductions, gradient, room, room_ints, strength,
-    padded, rows, found, gradients, meeting, work,
+    tag,
+    ints,
+    floats,
+    tables,
+    alpha,
+    damped,
+    settings,
+    limits,
+    count,
+    reductions,
+    gradient,
+    room,
+    room_ints,
+    strength,
+    padded,
+    rows,
+    found,
+    gradients,
+    meeting,
+    work,
 ):
     """Every objective of the load case, from the steps that `simulate` left in room.
 

@@ -60,9 +60,7 @@ def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning,
                 pair, rel, p, unit if axis == 0 else 0.0, unit if axis == 1 else 0.0, unit if axis == 2 else 0.0,
                 force[stage],
             )  # fmt: skip
-        tangent_step(
-            pair, inv_mass, tables, steps, w, c, y[:n], y[n : 2 * n], dx, force, moved, damped, turning
-        )
+        tangent_step(pair, inv_mass, tables, steps, w, c, y[:n], y[n : 2 * n], dx, force, moved, damped, turning)
         value = 0.0
         for d in range(n):
             value += mu_q[d] * y[d]

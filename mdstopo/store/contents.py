@@ -22,7 +22,8 @@ Datasets = dict[str, Value]
 
 
 class Motion(Protocol):
-    """The steps of a trajectory: t (T,), q, v, a (T, 3 n_bodies), lam (T, n_rows); how it ended."""
+    """The steps of a trajectory: t (T,), q, v, a (T, 3 n_bodies), lam (T, n_rows), reactions (T, 3) by joint; how it
+    ended."""
 
     @property
     def t(self) -> Floats: ...
@@ -34,6 +35,8 @@ class Motion(Protocol):
     def a(self) -> Floats: ...
     @property
     def lam(self) -> Floats: ...
+    @property
+    def reactions(self) -> Mapping[str, Floats]: ...
     @property
     def status(self) -> Status: ...
 
@@ -65,6 +68,7 @@ def trajectory_part(trajectories: Mapping[str, Motion]) -> Datasets:
             f"trajectories/{name}/a": motion.a,
             f"trajectories/{name}/lambda": motion.lam,
         }
+        part |= {f"trajectories/{name}/reactions/{joint}": force for joint, force in motion.reactions.items()}
     return part
 
 

@@ -1,0 +1,272 @@
+"""The exact gradient of a discretised objective of a general scene: one reverse sweep over steps, joints and events.
+
+A row of `extremes` (or an integral over all stages) pulls on states, accelerations and multipliers. What pulls on
+accelerations and multipliers goes through the transposed balance and leaves a virtual displacement z; so does every
+stage of every step on the way back. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum f_i (b_i . T z). An event on the
+way changes the cotangents by saltation (`events`); a peak at an event is not stationary and adds (dg/dt) dt_e/dalpha.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unknowns
+from mdstopo.general.duties import point_of, step_back, weights_of
+from mdstopo.general.forces import general_forces, inerter_force
+from mdstopo.general.members import block_design
+from mdstopo.general.model import INERTER
+from mdstopo.general.responses import ENERGY, MEMBER_FORCE, largest_force, response
+from mdstopo.general.track import copy_vector, restore_modes
+from mdstopo.integrators.steps import DESIGN, FORCES
+from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.laws.table import law
+
+
+@kernel
+def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) -= f_i (b_i . T z) at unit strength, += weight V_i, of all design members at one state."""
+    n_pair = model.pair.shape[0]
+    work[DESIGN] += 1
+    rel = np.empty((n_pair, POSE))
+    u = np.empty((n_pair, 3))
+    row = np.empty(6)
+    relative_pose(model.pair, q, v, rel)
+    for p in range(n_pair):
+        _virtual(model.pair, rel, p, z, u[p])
+    for k in range(model.block.shape[0]):
+        if model.block[k, 4] < 0 or model.active[segment, k] == 0:
+            continue
+        p = model.block[k, 0]
+        if model.block[k, 3] != INERTER:
+            block_design(model, k, segment, t, strength, strength[1], rel[p], u[p], weight, out)
+            continue
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            f = inerter_force(model, k, i, q, v, a, row)
+            value = 0.0
+            for r in range(6):
+                value += row[r] * z[3 * model.pair[p, r // 3] + r % 3]
+            out[i] -= f * value
+
+
+@kernel
+def _virtual(pair, rel, p, z, out):  # type: ignore[no-untyped-def]
+    """out (3,) = -T z."""
+    pair_displacement(pair, rel, p, z, out)
+    for i in range(3):
+        out[i] = -out[i]
+
+
+@kernel
+def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += scale dg_j/d(alpha^mu) at fixed motion of a member force."""
+    if model.response[j, 0] != MEMBER_FORCE:
+        return
+    row = np.empty(6)
+    rel = np.empty((model.pair.shape[0], POSE))
+    relative_pose(model.pair, q, v, rel)
+    total = 0.0
+    for part in range(2):  # the sum of its laws gives the sign, then each law its part
+        sign = 1.0 if total >= 0.0 else -1.0
+        for k in range(model.block.shape[0]):
+            if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
+                continue
+            i = model.block[k, 1] + who
+            if model.block[k, 3] == INERTER:
+                f = inerter_force(model, k, i, q, v, a, row)
+            else:
+                f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], strength)
+            if part == 0:
+                total += strength[0, i] * f
+            else:
+                out[i] += scale * sign * f
+
+
+@kernel
+def _unit_force(model, k, i, segment, t, r, strength):  # type: ignore[no-untyped-def]
+    c = r[2]
+    s = r[3]
+    ax = c * model.member[2, i] - s * model.member[3, i]
+    ay = s * model.member[2, i] + c * model.member[3, i]
+    x = r[0] + ax - model.member[0, i]
+    y = r[1] + ay - model.member[1, i]
+    length = np.sqrt(x * x + y * y)
+    rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
+    value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
+    f, _, _, _, _ = law(
+        model.block[k, 3], model.law[k], length - model.member[4, i], rate, int(strength[1, i]), t, value, model.curves
+    )
+    return f
+
+
+@kernel
+def free_only(model, x):  # type: ignore[no-untyped-def]
+    """What is driven does not answer: its entries of x (n,) become zero."""
+    for i in range(model.driven.shape[0]):
+        x[model.driven[i]] = 0.0
+
+
+@kernel
+def through_events(model, track, state, lam_q, lam_v):  # type: ignore[no-untyped-def]
+    """Pull cotangents behind the events of a state back to before them (saltation), in place."""
+    last = track.index[state, 3]
+    first = track.index[state - 1, 3] if state > 0 else last
+    for back in range(last - first):
+        e = last - 1 - back
+        if track.event[e, 0] != state:
+            continue
+        pulled = 0.0
+        for d in range(lam_v.shape[0]):
+            pulled += lam_v[d] * track.salt[e, 2, d]
+        for d in range(lam_v.shape[0]):
+            lam_q[d] -= pulled * track.salt[e, 0, d]
+            lam_v[d] -= pulled * track.salt[e, 1, d]
+    free_only(model, lam_q)
+    free_only(model, lam_v)
+
+
+@kernel
+def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_bar, desk, out, work):  # type: ignore[no-untyped-def]
+    """Pull cotangents of fraction c of step w's motion back to the start; every stage adds to out (M_padded,).
+
+    bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of all stages (no rows: none).
+    """
+    n = lam_q.shape[0]
+    z = np.empty((17, n))
+    y = np.empty(model.size[0])
+    lam_x = np.zeros((2, n))
+    spread = bars.shape[0] > 0
+    while w >= 0:
+        o = track.index[w, 0]
+        end = track.index[w + 1, 0]
+        b = bars[o:end] if spread else bars
+        r = rows_bar[o:end] if spread else rows_bar
+        step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, b, r, z, y, desk, work)
+        restore_modes(track, track.index[w, 3], strength)
+        segment = track.index[w, 2]
+        for j in range(end - o):
+            stage = track.stage[o + j]
+            add_design(model, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], z[j], 0.0, out, work)
+        c = 1.0
+        before = track.index[w, 1]
+        if before >= 0:
+            through_events(model, track, before + 1, lam_q, lam_v)
+        w = before
+
+
+@kernel
+def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu."""
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    q = np.empty(n)
+    v = np.empty(n)
+    a = np.empty(n)
+    lam = np.empty(n_row)
+    bars = np.empty((3, n))
+    row_bar = np.empty(n_row)
+    none = np.empty((0, 3, n))
+    no_rows = np.empty((0, n_row))
+    out[:] = 0.0
+    k = int(row[2])
+    c = row[3]
+    w = k
+    segment = track.index[k, 2]
+    if c <= 0.0 or c >= 1.0:
+        state = track.state[k if c <= 0.0 else k + 1]
+        copy_vector(state[0], q)
+        copy_vector(state[1], v)
+        if c <= 0.0:
+            w = k - 1
+    else:
+        w = point_of(tag, model, tables, strength, track, count, k, c, np.bool_(True), desk, q, v, work)
+    t = track.t[k] + c * (track.t[k + 1] - track.t[k])
+    restore_modes(track, track.index[k, 3], strength)
+    balance(model, strength, segment, t, q, v, np.bool_(True), desk, a, lam)
+    work[FORCES] += 1
+    who = int(row[6])
+    response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    z = bars[2]
+    factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, np.bool_(True))
+    solve_unknowns(model, desk, z, row_bar)
+    pull_back(model, desk, desk.k, desk.c, desk.turn, z, row_bar, bars[0], bars[1])
+    free_only(model, bars[0])
+    free_only(model, bars[1])
+    weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
+    add_design(model, segment, t, strength, q, v, a, z, weight, out, work)
+    explicit_part(model, segment, j, who, t, strength, q, v, a, 1.0, out)
+    at = k if c <= 0.0 else k + 1
+    if c <= 0.0 and k > 0:
+        through_events(model, track, k, bars[0], bars[1])
+    if (c <= 0.0 and k > 0) or c >= 1.0:
+        event = _first_event(track, at)
+        if event >= 0:
+            for d in range(n):
+                bars[0, d] -= row[4] * track.salt[event, 0, d]
+                bars[1, d] -= row[4] * track.salt[event, 1, d]
+    if w >= 0:
+        fraction = c if w == k else 1.0
+        sweep(tag, model, tables, strength, track, w, fraction, bars[0], bars[1], none, no_rows, desk, out, work)
+
+
+@kernel
+def _first_event(track, state):  # type: ignore[no-untyped-def]
+    """The first event of a state whose time varies, or -1."""
+    if state == 0:
+        return -1
+    for e in range(track.index[state - 1, 3], track.index[state, 3]):
+        if track.event[e, 0] == state:
+            return e
+    return -1
+
+
+@kernel
+def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, out, work):  # type: ignore[no-untyped-def]
+    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out."""
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    stages = track.index[count, 0]
+    bars = np.zeros((stages if gradient else 1, 3, n))
+    rows_bar = np.zeros((stages if gradient else 1, n_row))
+    weight = np.zeros(17)
+    total = 0.0
+    out[:] = 0.0
+    none = np.zeros(n)
+    energy = model.response[j, 0] == ENERGY
+    for w in range(count):
+        restore_modes(track, track.index[w, 3], strength)
+        segment = track.index[w, 2]
+        weights_of(tag, model, tables, track, w, weight)
+        o = track.index[w, 0]
+        for i in range(track.index[w + 1, 0] - o):
+            if weight[i] == 0.0:
+                continue
+            stage = track.stage[o + i]
+            t = track.when[o + i]
+            at = o + i if gradient else 0
+            general_forces(
+                model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk.rel, desk.sums, desk.f,
+                desk.k, desk.c, desk.turn,
+            )  # fmt: skip
+            who = -1
+            if model.response[j, 0] == MEMBER_FORCE:
+                who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
+            value = response(
+                model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[o + i], desk,
+                bars[at], rows_bar[at],
+            )  # fmt: skip
+            factor = weight[i] * (2.0 * value if square else 1.0)
+            total += weight[i] * (value * value if square else value)
+            if not gradient:
+                continue
+            for part in range(3):
+                for d in range(n):
+                    bars[at, part, d] *= factor
+            for r in range(n_row):
+                rows_bar[at, r] *= factor
+            if energy:
+                add_design(model, segment, t, strength, stage[0], stage[1], stage[2], none, factor, out, work)
+            explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor, out)
+    if gradient:
+        lam_q = np.zeros(n)
+        lam_v = np.zeros(n)
+        sweep(tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, desk, out, work)
+    return total

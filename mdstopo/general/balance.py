@@ -1,0 +1,318 @@
+"""Accelerations and multipliers from forces, and the linear systems of everything that is derived from them.
+
+    [M  Phi_q^T] [a  ]   [F     ]        Phi_q a + gamma = 0  is the second time derivative of Phi(q) = 0
+    [Phi_q   0 ] [lam] = [-gamma]
+
+for the free coordinates; what is driven has a known acceleration and moves to the right side. The unknowns stand in an
+order in which the matrix is banded (`place`), so a chain of bodies costs what its length costs. With tangents added,
+
+    W(w_q, w_v) = [M + w_q K + w_v C,  Phi_q^T; Phi_q + w_q G_q + w_v G_v,  0]
+
+is the matrix of an implicit step and, transposed, that of the reverse sweep. K holds the stiffness of members, loads,
+joints (d(Phi_q^T lam)/dq) and inerters, G_q and G_v the slopes of Phi_q a + gamma.
+"""
+
+import numpy as np
+
+from mdstopo.general.forces import (
+    add_inerter_tangents,
+    add_inerters,
+    drive_acceleration,
+    drive_state,
+    general_forces,
+)
+from mdstopo.general.structures import DeskStructure, bundle
+from mdstopo.integrators.banded import factorise, solve
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import SUMS
+from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.joints.table import (
+    joint_acceleration_slopes,
+    joint_gamma,
+    joint_rows,
+    joint_stiffness,
+)
+
+#: a pivot of the scaled matrix below this means that joints contradict or repeat each other here
+SINGULAR = 1e-12
+#: what one balance needs and leaves: relative poses, sums, forces, K, C, slope of turning loads, inerters' mass; of the
+#: joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the scales of
+#: its unknowns, which make every row about 1 whatever the masses
+DESK = (
+    "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots", "x", "scale",
+)  # fmt: skip
+
+
+class Desk:
+    """Made in kernels only, by `make_desk`."""
+
+
+bundle(Desk, DeskStructure, DESK)
+
+
+@kernel
+def make_desk(model):  # type: ignore[no-untyped-def]
+    """Room for one balance."""
+    n = model.mass.shape[0]
+    n_pair = model.pair.shape[0]
+    n_joint = model.joint.shape[0]
+    total = model.place.shape[0]
+    return Desk(
+        np.zeros((n_pair, POSE)),
+        np.zeros((n_pair, SUMS)),
+        np.zeros(n),
+        np.zeros((n_pair, 6, 6)),
+        np.zeros((n_pair, 6, 6)),
+        np.zeros(n),
+        np.zeros((n_pair, 6, 6)),
+        np.zeros((n_joint, 3)),
+        np.zeros((n_joint, 3, 6)),
+        np.zeros((n_joint, 3)),
+        np.zeros((n_joint, 3, 6)),
+        np.zeros((n_joint, 3, 6)),
+        np.zeros((total, 3 * model.size[1] + 1)),
+        np.zeros(total, np.int64),
+        np.zeros(total),
+        np.ones(total),
+    )
+
+
+@kernel
+def gather(model, j, x, out):  # type: ignore[no-untyped-def]
+    """out (6,) = the entries of x (n,) of the two bodies of joint j."""
+    a = 3 * model.joint[j, 1]
+    b = 3 * model.joint[j, 2]
+    for i in range(3):
+        out[i] = x[a + i]
+        out[3 + i] = x[b + i]
+
+
+@kernel
+def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
+    """out (3,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
+    for r in range(3):
+        i = model.row[j, r]
+        out[r] = lam[i] if i >= 0 else 0.0
+
+
+@kernel
+def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
+    """Phi, Phi_q and gamma of all joints."""
+    w = np.empty(6)
+    wd = np.empty(6)
+    for j in range(model.joint.shape[0]):
+        gather(model, j, q, w)
+        gather(model, j, v, wd)
+        joint_rows(model.joint[j, 0], model.joint_par[j], w, desk.phi[j], desk.jac[j])
+        joint_gamma(model.joint[j, 0], model.joint_par[j], w, wd, desk.gamma[j])
+
+
+@kernel
+def joint_slopes(model, q, v, a, lam, desk):  # type: ignore[no-untyped-def]
+    """G_q and G_v of all joints, and their stiffness added to K."""
+    w = np.empty(6)
+    wd = np.empty(6)
+    wdd = np.empty(6)
+    mine = np.empty(3)
+    for j in range(model.joint.shape[0]):
+        gather(model, j, q, w)
+        gather(model, j, v, wd)
+        gather(model, j, a, wdd)
+        gather_multipliers(model, j, lam, mine)
+        code = model.joint[j, 0]
+        par = model.joint_par[j]
+        joint_acceleration_slopes(code, par, w, wd, wdd, desk.by_q[j], desk.by_v[j])
+        joint_stiffness(code, par, w, mine, desk.k[model.joint[j, 3]])
+
+
+@kernel
+def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type: ignore[no-untyped-def]
+    """Factorise W(w_q, w_v), or its transpose, into desk.band; k, c, mass (n_pair, 6, 6), turn (n,).
+
+    The joints' Phi_q, G_q and G_v are those on the desk. Returns the place of the unknown at which it is singular, or
+    -1.
+    """
+    band = desk.band
+    half = model.size[1]
+    n = model.mass.shape[0]
+    tangent = w_q != 0.0 or w_v != 0.0
+    band[:] = 0.0
+    scale = desk.scale
+    for d in range(n):
+        scale[model.place[d]] = 1.0 / np.sqrt(model.mass[d]) if model.free[d] != 0 else 1.0
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            if model.row[j, r] >= 0:
+                size = 0.0
+                for i in range(6):
+                    column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                    if model.free[column] != 0:
+                        size += desk.jac[j, r, i] ** 2 / model.mass[column]
+                scale[model.place[n + model.row[j, r]]] = 1.0 / np.sqrt(size) if size > 0.0 else 1.0
+    for d in range(n):
+        p = model.place[d]
+        band[p, half] = 1.0
+        if tangent and model.free[d] != 0:
+            angle = d - d % 3 + 2
+            if model.free[angle] != 0 and turn[d] != 0.0:
+                put(band, half, scale, p, model.place[angle], -w_q * turn[d], transposed)
+    for p in range(model.pair.shape[0]):
+        for i in range(6):
+            row = 3 * model.pair[p, i // 3] + i % 3
+            if model.free[row] == 0:
+                continue
+            for j in range(6):
+                column = 3 * model.pair[p, j // 3] + j % 3
+                if model.free[column] == 0:
+                    continue
+                value = mass[p, i, j]
+                if tangent:
+                    value += w_q * k[p, i, j] + w_v * c[p, i, j]
+                if value != 0.0:
+                    put(band, half, scale, model.place[row], model.place[column], value, transposed)
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own < 0:
+                continue
+            at = model.place[n + own]
+            for i in range(6):
+                column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                if model.free[column] == 0:
+                    continue
+                there = model.place[column]
+                force = desk.jac[j, r, i]
+                value = force
+                if tangent:
+                    value += w_q * desk.by_q[j, r, i] + w_v * desk.by_v[j, r, i]
+                put(band, half, scale, there, at, force, transposed)
+                put(band, half, scale, at, there, value, transposed)
+    return factorise_at(band, half, desk.pivots, tangent)
+
+
+@kernel
+def put(band, half, scale, row, column, value, transposed):  # type: ignore[no-untyped-def]
+    """band[row, column] += value in scaled unknowns, or the mirrored entry."""
+    value *= scale[row] * scale[column]
+    if transposed:
+        band[column, row - column + half] += value
+    else:
+        band[row, column - row + half] += value
+
+
+@kernel
+def factorise_at(band, half, pivots, tangent):  # type: ignore[no-untyped-def]
+    """Factorise; -1, or the place at which the matrix is singular (without tangents: to rounding)."""
+    regular = factorise(band, half, pivots)
+    for p in range(band.shape[0]):
+        size = abs(band[p, half])
+        if (size == 0.0 and not regular) or (size < SINGULAR and not tangent):
+            return p
+    return -1
+
+
+@kernel
+def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
+    """Solve with the factors on the desk for the right side a (n,), lam (n_row,), in place; driven parts become 0."""
+    n = model.mass.shape[0]
+    x = desk.x
+    for d in range(n):
+        p = model.place[d]
+        x[p] = a[d] * desk.scale[p] if model.free[d] != 0 else 0.0
+    for r in range(lam.shape[0]):
+        p = model.place[n + r]
+        x[p] = lam[r] * desk.scale[p]
+    solve(desk.band, model.size[1], desk.pivots, x)
+    for d in range(n):
+        p = model.place[d]
+        a[d] = x[p] * desk.scale[p]
+    for r in range(lam.shape[0]):
+        p = model.place[n + r]
+        lam[r] = x[p] * desk.scale[p]
+
+
+@kernel
+def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: ignore[no-untyped-def]
+    """Accelerations a (n,) and multipliers lam (n_row,) at one state, whose driven part is put in place first.
+
+    With `tangent`, desk.k, .c, .turn, .by_q, .by_v hold the tangents of the whole balance. Returns the place of the
+    unknown at which the joints are singular, or -1.
+    """
+    n = q.shape[0]
+    drive_state(model, segment, t, q, v)
+    general_forces(model, strength, segment, t, q, v, tangent, desk.rel, desk.sums, desk.f, desk.k, desk.c, desk.turn)
+    add_inerters(model, segment, strength, q, v, desk.mass, desk.f)
+    joint_state(model, q, v, desk)
+    singular = factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, np.bool_(False))
+    if singular >= 0:
+        return singular
+    known = np.zeros(n)
+    drive_acceleration(model, segment, t, known)
+    for d in range(n):
+        a[d] = desk.f[d]
+    if model.driven.shape[0] > 0:
+        for p in range(model.pair.shape[0]):
+            for i in range(6):
+                row = 3 * model.pair[p, i // 3] + i % 3
+                for j in range(6):
+                    a[row] -= desk.mass[p, i, j] * known[3 * model.pair[p, j // 3] + j % 3]
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                value = -desk.gamma[j, r]
+                for i in range(6):
+                    value -= desk.jac[j, r, i] * known[3 * model.joint[j, 1 + i // 3] + i % 3]
+                lam[own] = value
+    solve_unknowns(model, desk, a, lam)
+    for i in range(model.driven.shape[0]):
+        a[model.driven[i]] = known[model.driven[i]]
+    if tangent:
+        joint_slopes(model, q, v, a, lam, desk)
+        add_inerter_tangents(model, segment, strength, q, v, a, desk.k, desk.c)
+    return -1
+
+
+@kernel
+def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+    """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,) with driven parts 0."""
+    for p in range(model.pair.shape[0]):
+        for i in range(6):
+            value = z[3 * model.pair[p, i // 3] + i % 3]
+            if value == 0.0:
+                continue
+            for j in range(6):
+                column = 3 * model.pair[p, j // 3] + j % 3
+                bar_q[column] -= k[p, i, j] * value
+                bar_v[column] -= c[p, i, j] * value
+    for d in range(z.shape[0]):
+        bar_q[d - d % 3 + 2] += turn[d] * z[d]
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                for i in range(6):
+                    column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                    bar_q[column] -= desk.by_q[j, r, i] * y[own]
+                    bar_v[column] -= desk.by_v[j, r, i] * y[own]
+
+
+@kernel
+def push_forward(model, desk, k, c, turn, dq, dv, force, row):  # type: ignore[no-untyped-def]
+    """force (n,) -= K dq + C dv (turning loads with their sign), row (n_row,) -= G_q dq + G_v dv."""
+    for p in range(model.pair.shape[0]):
+        for i in range(6):
+            value = 0.0
+            for j in range(6):
+                column = 3 * model.pair[p, j // 3] + j % 3
+                value += k[p, i, j] * dq[column] + c[p, i, j] * dv[column]
+            force[3 * model.pair[p, i // 3] + i % 3] -= value
+    for d in range(dq.shape[0]):
+        force[d] += turn[d] * dq[d - d % 3 + 2]
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                for i in range(6):
+                    column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                    row[own] -= desk.by_q[j, r, i] * dq[column] + desk.by_v[j, r, i] * dv[column]

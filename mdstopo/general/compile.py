@@ -1,0 +1,267 @@
+"""A case and one of its load cases, compiled into the arrays of a general scene (`GeneralModel`), once."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow, TableLaw
+from mdstopo.general.drives import drives, motion_times
+from mdstopo.general.layout import arrange
+from mdstopo.general.model import GeneralModel
+from mdstopo.general.responses import KINDS, POINT
+from mdstopo.mechanics.joints import table as joints
+from mdstopo.mechanics.laws import table as laws
+from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
+from mdstopo.scene.signals import breakpoints, segment_values
+
+COMPONENTS = {"x": 0, "y": 1, "norm": 2}
+
+
+@dataclass(frozen=True)
+class GeneralScene:
+    """One load case, ready to be computed.
+
+    load_case; model: the arrays; bodies: names in the order of the state, ground last; n_bodies: without it; damped:
+    whether anything depends on velocity; skipped: what was left out, and why; redundant: joints with rows that others
+    imply; responses, reductions: what is looked at and how, objectives first, in the case's order.
+    """
+
+    load_case: LoadCase
+    model: GeneralModel
+    bodies: tuple[str, ...]
+    n_bodies: int
+    damped: bool
+    skipped: tuple[str, ...]
+    redundant: tuple[str, ...]
+    responses: tuple[Response, ...]
+    reductions: tuple[str, ...]
+
+    @cached_property
+    def n(self) -> int:
+        """Coordinates of the bodies."""
+        return 3 * self.n_bodies
+
+
+def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[str, ...]]:
+    """Responses and reductions of a load case: its objectives, then its constraints, each in the case's order."""
+    found = [(o.response, o.over_time) for o in case.objectives if o.load_case == load_case]
+    for row in case.constraints:
+        if isinstance(row, ResponseRow) and row.load_case == load_case:
+            found.append((row.response, row.over_time))
+    return tuple(r for r, _ in found), tuple(o for _, o in found)
+
+
+def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
+    """The arrays of one load case."""
+    names = (*(body.name for body in case.bodies), GROUND)
+    index = {name: i for i, name in enumerate(names)}
+    n = 3 * len(names)
+    mass, q0, v0 = np.ones(n), np.zeros(n), np.zeros(n)
+    for i, body in enumerate(load_case.bodies):
+        mass[3 * i : 3 * i + 3] = body.mass, body.mass, body.inertia
+        q0[3 * i : 3 * i + 3] = *body.position, body.angle
+        v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
+
+    records = [law for group in case.members for law in group.laws]
+    more = [t for law in records for t in laws.landings(law)] + motion_times(load_case)
+    times = breakpoints(load_case, more)
+    driven, drive = drives(load_case, times, q0, v0)
+    free = np.ones(n, dtype=np.int64)
+    free[-3:] = 0
+    free[driven] = 0
+
+    pairs: dict[tuple[int, int], int] = {}
+    members = _members(case, index, pairs, times)
+    bushing_pair, bushing = _bushings(case, index, pairs, q0)
+    joint, joint_par = _joints(case, index, pairs, q0)
+    held = {body for pair in pairs for body in pair}
+    for i in range(len(names) - 1):
+        if i not in held:
+            pairs.setdefault((len(names) - 1, i), len(pairs))
+    pair = np.array(list(pairs), dtype=np.int64).reshape(-1, 2)
+    reach = _reach(case, index, pairs, members)
+    force, turning, load_force = _loads(load_case, index, times, n)
+    responses, reductions = looked_at(case, load_case.name)
+    response, response_par = _responses(case, responses, index, q0)
+    rows, place, size, redundant = arrange(case, joint, joint_par, free, mass, q0, pair)
+    damped = _damped(case, responses, reductions)
+    model = GeneralModel(
+        free=free, mass=mass, q0=q0, v0=v0, pair=pair, reach=reach, **members, times=times, force=force,
+        load_body=np.array([index[load.body] for load in turning], dtype=np.int64),
+        load_follows=np.array([load.frame == "body" for load in turning], dtype=np.int64),
+        load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
+        load_force=load_force, bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
+        joint_par=joint_par, row=rows, place=place, size=np.array([*size, int(damped)], dtype=np.int64),
+        response=response, response_par=response_par,
+    )  # fmt: skip
+    return GeneralScene(
+        load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), redundant, responses,
+        reductions,
+    )  # fmt: skip
+
+
+def _members(
+    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], times: FloatArray
+) -> dict[str, FloatArray | IndexArray]:
+    """Blocks of one law each: a group with a list of laws has as many, which share its design variables."""
+    blocks, powers, rows, active, level, columns = [], [], [], [], [], []
+    curves: list[float] = []
+    first = start = 0
+    segments = len(times) - 1
+    for number, group in enumerate(case.members):
+        pair = pairs.setdefault((index[group.body_from], index[group.body_to]), len(pairs))
+        count = len(group)
+        padded = -(-count // VECTOR) * VECTOR
+        for record in group.laws:
+            member = np.zeros((5, padded))
+            member[0:2, :count], member[2:4, :count] = group.p_local.T, group.q_local.T
+            rest = getattr(record, "free_length", None)
+            member[4, :count] = group.length if rest is None else rest
+            code = laws.CODES[record.type]
+            blocks.append([pair, start, start + padded, code, first if group.design else -1, count, number])
+            rows.append(laws.parameters(record, curves))
+            powers.append(group.power)
+            columns.append(member)
+            begin = -np.inf if record.active_from is None else record.active_from
+            until = np.inf if record.active_until is None else record.active_until
+            middle = 0.5 * (times[:-1] + times[1:])
+            active.append((middle > begin) & (middle < until))
+            known = segment_values(record.table, times) if isinstance(record, TableLaw) else np.zeros((segments, 2))
+            level.append(known)
+            start += padded
+        first += count if group.design else 0
+    return {
+        "block": np.array(blocks, dtype=np.int64).reshape(-1, 7),
+        "law": np.array(rows, dtype=np.float64).reshape(-1, laws.PARAMETERS),
+        "active": np.array(active, dtype=np.int64).reshape(-1, segments).T.copy(),
+        "level": np.array(level, dtype=np.float64).reshape(-1, segments, 2).transpose(1, 0, 2).copy(),
+        "power": np.array(powers, dtype=np.float64),
+        "member": np.concatenate(columns, axis=1) if columns else np.zeros((5, 0)),
+        "curves": np.array(curves, dtype=np.float64),
+    }
+
+
+def _bushings(
+    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], q0: FloatArray
+) -> tuple[IndexArray, FloatArray]:
+    where, rows = [], []
+    for bushing in case.bushings:
+        a, b = (index[name] for name in bushing.bodies)
+        where.append(pairs.setdefault((a, b), len(pairs)))
+        angle = q0[3 * b + 2] - q0[3 * a + 2]
+        rows.append([*bushing.at_first, *bushing.at_second, angle, *bushing.stiffness, *bushing.damping])
+    return np.array(where, dtype=np.int64), np.array(rows, dtype=np.float64).reshape(-1, 11)
+
+
+def _joints(
+    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], q0: FloatArray
+) -> tuple[IndexArray, FloatArray]:
+    codes, rows = [], []
+    for joint in case.joints:
+        a, b = (index[name] for name in joint.bodies)
+        pair = pairs.setdefault((a, b), len(pairs))
+        codes.append([joints.CODES[joint.type], a, b, pair, joints.ROWS[joint.type]])
+        rows.append(joints.parameters(joint, float(q0[3 * a + 2]), float(q0[3 * b + 2])))
+    return (
+        np.array(codes, dtype=np.int64).reshape(-1, 5),
+        np.array(rows, dtype=np.float64).reshape(-1, joints.WIDTH),
+    )
+
+
+def _reach(
+    case: Case,
+    index: dict[str, int],
+    pairs: dict[tuple[int, int], int],
+    members: dict[str, FloatArray | IndexArray],
+) -> FloatArray:
+    """Largest distance of an attachment point of the second body of each pair from its centre of mass, m."""
+    reach = np.zeros(len(pairs))
+    member = members["member"]
+    for pair, start, stop, *_ in members["block"].tolist():
+        reach[pair] = max(reach[pair], float(np.hypot(member[2, start:stop], member[3, start:stop]).max()))
+    for tie in (*case.joints, *case.bushings):
+        a, b = (index[name] for name in tie.bodies)
+        pair = pairs[a, b]
+        reach[pair] = max(reach[pair], float(np.hypot(*tie.at_second)), float(np.hypot(*tie.at_first)))
+    reach[reach == 0.0] = 1.0
+    return reach
+
+
+def _loads(
+    load_case: LoadCase, index: dict[str, int], times: FloatArray, n: int
+) -> tuple[FloatArray, list[Load], FloatArray]:
+    """Generalised loads, and those that depend on a body's rotation with their components."""
+    force = np.zeros((len(times) - 1, n, 2))
+    for i, body in enumerate(load_case.bodies):
+        force[:, 3 * i, 0] += body.mass * load_case.gravity[0]
+        force[:, 3 * i + 1, 0] += body.mass * load_case.gravity[1]
+    turning: list[Load] = []
+    for load in load_case.loads:
+        if load.body == GROUND:
+            continue
+        b = 3 * index[load.body]
+        force[:, b + 2] += segment_values(load.moment, times)
+        if load.frame == "global" and tuple(load.at_local) == (0.0, 0.0):
+            force[:, b] += segment_values(load.force[0], times)
+            force[:, b + 1] += segment_values(load.force[1], times)
+        elif any(np.any(segment_values(component, times)) for component in load.force):
+            turning.append(load)
+    load_force = np.zeros((len(times) - 1, len(turning), 2, 2))
+    for k, load in enumerate(turning):
+        load_force[:, k, 0] = segment_values(load.force[0], times)
+        load_force[:, k, 1] = segment_values(load.force[1], times)
+    return force, turning, load_force
+
+
+def _responses(
+    case: Case, responses: tuple[Response, ...], index: dict[str, int], q0: FloatArray
+) -> tuple[IndexArray, FloatArray]:
+    codes, rows = [], []
+    groups = [group.name for group in case.members]
+    named = [joint.name for joint in case.joints]
+    for response in responses:
+        kind, order = KINDS[response.kind]
+        body = index[response.body or GROUND]
+        reference = index[response.relative_to or GROUND]
+        subject = 0
+        if response.group is not None:
+            subject = groups.index(response.group)
+        if response.joint is not None:
+            subject = named.index(response.joint)
+        codes.append([kind, body, reference, COMPONENTS[response.component or "norm"], order, subject])
+        point = np.array(response.at_local or (0.0, 0.0))
+        start = np.zeros(2)
+        if kind == POINT:
+            qb, qr = q0[3 * body : 3 * body + 3], q0[3 * reference : 3 * reference + 3]
+            turn = np.array([[np.cos(qb[2]), -np.sin(qb[2])], [np.sin(qb[2]), np.cos(qb[2])]])
+            back = np.array([[np.cos(qr[2]), np.sin(qr[2])], [-np.sin(qr[2]), np.cos(qr[2])]])
+            start = back @ (qb[:2] + turn @ point - qr[:2])
+        rows.append([*point, *start])
+    return np.array(codes, dtype=np.int64).reshape(-1, 6), np.array(rows, dtype=np.float64).reshape(-1, 4)
+
+
+def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, ...]) -> bool:
+    """Whether anything depends on velocity: then the steps' stages need velocities that are right."""
+    forces = any(laws.depends_on_rate(law) for group in case.members for law in group.laws)
+    bushed = any(any(bushing.damping) for bushing in case.bushings)
+    looks = any(
+        over_time in ("mean", "rms", "integral") and response.kind not in ("energy", "displacement", "angle")
+        for response, over_time in zip(responses, reductions, strict=True)
+    )
+    return forces or bushed or looks or bool(case.joints)
+
+
+def _skipped(case: Case, load_case: LoadCase, damped: bool) -> tuple[str, ...]:
+    notes = []
+    if not damped:
+        notes.append("velocity terms: nothing depends on velocity")
+    if not case.joints:
+        notes.append("multipliers: there are no joints")
+    for motion in load_case.motions:
+        if None not in (motion.x, motion.y, motion.angle):
+            notes.append(f"equations of motion of {motion.body}: its motion is prescribed")
+    fixed = sum(len(group) for group in case.members if not group.design)
+    if fixed:
+        notes.append(f"design gradient of {fixed} members that are no design variables")
+    return tuple(notes)

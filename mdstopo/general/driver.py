@@ -1,0 +1,341 @@
+"""From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
+
+import math
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.general.compile import GeneralScene
+from mdstopo.general.extremes import COLUMNS, SIGN, VALUE, peaks, ranked, sample
+from mdstopo.general.model import COUNT, GROUP, INERTER, START, pack_general
+from mdstopo.general.track import track_room
+from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
+from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, WORK, status_of
+from mdstopo.mechanics.joints.table import describe
+from mdstopo.scene.model import FloatArray
+from mdstopo.status import Status
+
+#: peaks kept of one response
+ROWS = 6
+#: of what a reduction takes the peaks: of g, of -g, or of both
+SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
+#: misfit of a joint at the start, relative to the scene's size or speeds, up to which it fits
+FITS = 1e-8
+
+
+def load_method(name: str) -> ModuleType:
+    """The compiled entries of a method for general scenes."""
+    if name == "generalized_alpha":
+        from mdstopo.general import generalized_alpha_entry
+
+        return generalized_alpha_entry
+    from mdstopo.general import runge_kutta_entry
+
+    return runge_kutta_entry
+
+
+class GeneralDriver:
+    """One general scene, one method, ready to run; the duties of `integrators.driver.Driver`."""
+
+    def __init__(self, case: Case, scene: GeneralScene, method: Method, tolerance: float, step: float) -> None:
+        self.case = case
+        self.scene = scene
+        self.method = method
+        model = scene.model
+        self.ints, self.floats = pack_general(model)
+        self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
+        self.work = np.zeros(WORK, dtype=np.int64)
+        padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
+        self._alpha = np.zeros(n_design)
+        self.strength = np.zeros((2, padded + 1))
+        self.padded = np.zeros(padded)
+        self.rows = np.zeros((count, ROWS, COLUMNS))
+        self.found = np.zeros(count, dtype=np.int64)
+        self.gradients = np.zeros((count, ROWS, n_design))
+        self.where = np.zeros(2, dtype=np.int64)
+        self.events = 0
+        self._inertial = bool(np.any(model.block[:, 3] == INERTER))
+        self._entry: Any = None
+        self._message = ""
+        self._make_room(method.steps, method.stages, 64)
+        self._fit()
+
+    @property
+    def entry(self) -> Any:
+        """The method's compiled entries, imported when first used."""
+        if self._entry is None:
+            self._entry = load_method(self.method.name)
+        return self._entry
+
+    def _make_room(self, steps: int, stages: int, events: int) -> None:
+        model = self.scene.model
+        sizes = len(model.mass), len(model.pair), int(model.size[0]), self._inertial
+        floats, ints = track_room(*sizes, steps, stages, events)
+        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial], dtype=np.int64)
+        self.room = np.zeros(floats)
+        self.room_ints = np.zeros(ints, dtype=np.int64)
+
+    def _fit(self) -> None:
+        """Refuse joints that do not fit at the start, or move the start where the case asks for it (CaseError)."""
+        model = self.scene.model
+        if not len(model.joint):
+            return
+        from mdstopo.general.start_entry import assemble
+
+        q, v = model.q0.copy(), model.v0.copy()
+        phi, rates = np.zeros((len(model.joint), 3)), np.zeros((len(model.joint), 3))
+        move = self.case.solver.assemble
+        assemble(self.ints, self.floats, q, v, move, phi, rates)
+        size = _size(self.case)
+        span = self.scene.load_case.end - self.scene.load_case.start
+        speed = max(_speed(self.case, v), size / span)
+        mistakes = []
+        for j, joint in enumerate(self.case.joints):
+            misfit, rate = float(np.abs(phi[j]).max()), float(np.abs(rates[j]).max())
+            if misfit > FITS * size:
+                problem = "cannot be assembled" if move else "does not fit at the start"
+                mistakes.append((joint, f"{describe(joint)} {problem}: its misfit is {misfit:.3g} (m or rad)"))
+            elif rate > FITS * speed:
+                mistakes.append(
+                    (joint, f"the start velocities tear {describe(joint)} apart at {rate:.3g} (m/s or rad/s)")
+                )
+        if mistakes:
+            hint = "" if move else "; `solver: {assemble: true}` moves the start to the nearest that fits"
+            raise CaseError(
+                [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
+                str(self.case.path or self.case.name),
+            )
+        self.moved = float(np.abs(q - model.q0).max())
+        if move:
+            n = len(q)
+            self.floats[n : 2 * n], self.floats[2 * n : 3 * n] = q, v
+
+    def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
+        """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
+        code, count, time = self.run(alpha, gradient)
+        if code == OK:
+            for j, name in enumerate(self.scene.reductions):
+                self._look(j, name, count, gradient)
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, -1)
+
+    def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
+        """Rows and gradients of response j, reduced over time."""
+        t = self._states()[0][: count + 1].copy()
+        rows = self.rows[j]
+        if reduction in ("mean", "rms", "integral"):
+            scale = 1.0 if reduction == "integral" else 1.0 / float(t[-1] - t[0])
+            square = reduction == "rms"
+            value = scale * self._pull(j, rows[0], 2 if square else 1, count, gradient, self.gradients[j, 0])
+            if square:
+                value = math.sqrt(max(value, 0.0))
+                scale = 0.5 * scale / value if value > 0.0 else 0.0
+            rows[0] = np.nan, value, 0.0, 0.0, 0.0, 1.0, -1.0
+            self.gradients[j, 0] *= scale
+            self.found[j] = 1
+            return
+
+        def see(places: FloatArray, exact: bool) -> FloatArray:
+            return self._visit(j, places, exact, count)[2]
+
+        if reduction == "final":
+            value, rate, who = see(np.array([[count - 1.0, 1.0]]), True)[0]
+            found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
+        else:
+            samples = sample(t, see)
+            found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, CLOSENESS)]
+            found = ranked(found, CLOSENESS, ROWS)
+        self.found[j] = len(found)
+        for r, row in enumerate(found):
+            flip = row[SIGN] if reduction == "max_abs" else 1.0
+            rows[r] = row
+            if gradient:
+                self._pull(j, rows[r], 0, count, True, self.gradients[j, r])
+                self.gradients[j, r] *= flip
+            rows[r, VALUE] *= flip
+
+    def _visit(
+        self, j: int, places: FloatArray, exact: bool, count: int, steps: "GeneralSteps | None" = None
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """q, v, a (3, K, n), multipliers (K, n_row + n_driven) and (K, 3) value, rate, member at places (K, 2)."""
+        model = self.scene.model
+        limits, room, ints, strength = (
+            (self.limits, self.room, self.room_ints, self.strength) if steps is None else steps.kept
+        )
+        out = np.zeros((3, len(places), len(model.mass)))
+        lam = np.zeros((len(places), int(model.size[0]) + len(model.driven)))
+        seen = np.zeros((len(places), 3))
+        self.entry.visit(
+            self.entry.TAG, self.ints, self.floats, self.method.tables, limits, count, room, ints, strength, exact, j,
+            -1, places, out, lam, seen, self.work,
+        )  # fmt: skip
+        return out, lam, seen
+
+    def _pull(self, j: int, row: FloatArray, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
+        total: float = self.entry.pull(
+            self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count, j, integral,
+            gradient, row, self.room, self.room_ints, self.strength, self.padded, out, self.work,
+        )  # fmt: skip
+        return total
+
+    def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
+        """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
+        self._alpha[:] = alpha
+        while True:
+            self.work[:] = 0
+            code, count, self.events, time = self.entry.simulate(
+                self.ints, self.floats, self.method.tables, self._alpha, tangent, self.settings, self.limits, self.room,
+                self.room_ints, self.strength, self.work, self.where,
+            )  # fmt: skip
+            if code != NEEDS_ROOM:
+                self._message = self._explain(code, time)
+                return code, count, time
+            self._make_room(*(2 * int(size) for size in self.limits[1:4]))
+
+    @property
+    def message(self) -> str:
+        """Who is to blame for how the last run ended, or nothing."""
+        return self._message
+
+    def _explain(self, code: int, time: float) -> str:
+        if code == OK:
+            return ""
+        when = f"at t = {time:.6g} s"
+        if code == SINGULAR:
+            return f"{self._singular(int(self.where[0]))}, {when}"
+        if code == CHATTERING:
+            return f"{self.member(int(self.where[0]))}, {when}"
+        n, count = len(self.scene.model.mass), self._steps_until(time)
+        speed = np.abs(self._states()[1][count, 1, : self.scene.n]).reshape(-1, 3).max(axis=1)
+        wild = np.flatnonzero(~np.isfinite(speed))
+        body = self.scene.bodies[int(wild[0]) if wild.size else int(speed.argmax())] if n > 3 else "ground"
+        return f"{when}; the fastest body is {body}"
+
+    def _states(self) -> tuple[FloatArray, FloatArray]:
+        """Times and states in the driver's room, with the room for more behind them."""
+        steps, n = int(self.limits[1]) + 1, len(self.scene.model.mass)
+        return self.room[:steps], self.room[steps : steps + 2 * n * steps].reshape(steps, 2, n)
+
+    def _steps_until(self, time: float) -> int:
+        return int(np.argmin(np.abs(self._states()[0] - time)))
+
+    def _singular(self, place: int) -> str:
+        """The joint whose row stands at a place of the matrix, or the body whose coordinate does."""
+        model = self.scene.model
+        n = len(model.mass)
+        if place >= len(model.place):
+            return describe(self.case.joints[place - len(model.place)])
+        unknown = int(np.flatnonzero(model.place == place)[0])
+        if unknown >= n:
+            return describe(self.case.joints[int(np.argwhere(model.row == unknown - n)[0, 0])])
+        body = unknown // 3
+        tied = [joint for joint in self.case.joints if self.scene.bodies[body] in joint.bodies]
+        return describe(tied[0]) if tied else f"body {self.scene.bodies[body]}"
+
+    def member(self, padded: int) -> str:
+        """A member in words, from its place in the padded arrays."""
+        for block in self.scene.model.block.tolist():
+            i = padded - block[START]
+            if 0 <= i < block[COUNT]:
+                group = self.case.members[block[GROUP]]
+                p, q = group.p_world[i], group.q_world[i]
+                return (
+                    f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
+                    f"({q[0]:g}, {q[1]:g}) on {group.body_to}"
+                )
+        return "a member"
+
+    def simulate(self, alpha: FloatArray) -> tuple[Status, "GeneralSteps"]:
+        """Simulate alpha (N,); the steps come back in arrays of their own."""
+        code, count, _ = self.run(alpha, False)
+        return status_of(code), GeneralSteps(self, count)
+
+
+def _size(case: Case) -> float:
+    """The largest distance between bodies and points, m."""
+    points = [np.array([body.position for body in case.bodies])]
+    points += [grid.world for grid in case.points.values()]
+    points += [np.concatenate([group.from_world, group.to_world]) for group in case.members]
+    cloud = np.concatenate(points)
+    for joint in case.joints:
+        for name, at in zip(joint.bodies, (joint.at_first, joint.at_second), strict=True):
+            centre = np.zeros(2) if name == "ground" else np.array(case.body(name).position)
+            cloud = np.concatenate([cloud, [centre + np.array(at)]])
+    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    size = float(np.hypot(*(high - low)))
+    return size if size > 0.0 else 1.0
+
+
+def _speed(case: Case, v: FloatArray) -> float:
+    """The largest speed of a body's centre or of a point a scene's size away from it, m/s."""
+    bodies = v.reshape(-1, 3)
+    return float((np.hypot(bodies[:, 0], bodies[:, 1]) + _size(case) * np.abs(bodies[:, 2])).max())
+
+
+class GeneralSteps:
+    """The steps of one simulation, and the motion between them (as `integrators.driver.DenseSteps`)."""
+
+    def __init__(self, driver: GeneralDriver, count: int) -> None:
+        self._driver = driver
+        self.kept = driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.strength.copy()
+        self.count = count
+        t, state = driver._states()
+        self.t: FloatArray = t[: count + 1].copy()
+        self.state: FloatArray = state[: count + 1].copy()
+
+    def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """q, v, a (3, T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
+        if self.count == 0:
+            raise ValueError("no step was completed")
+        step = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, self.count - 1)
+        fraction = (times - self.t[step]) / (self.t[step + 1] - self.t[step])
+        fraction[times == self.t[step + 1]] = 1.0
+        places = np.stack([step.astype(np.float64), fraction], axis=1)
+        out, solved, _ = self._driver._visit(-1, places, True, self.count, self)
+        return out, self._all_rows(out[0], solved)
+
+    def at(self, times: FloatArray) -> FloatArray:
+        """q, v, a (3, T, n) at times (T,) within what was simulated."""
+        return self.balanced(np.asarray(times, dtype=np.float64))[0]
+
+    def _all_rows(self, q: FloatArray, solved: FloatArray) -> FloatArray:
+        """The multipliers of all rows, joints then motions; where rows repeat others, those of least norm."""
+        model = self._driver.scene.model
+        n_row = int(model.size[0])
+        places = [(j, r) for j in range(len(model.joint)) for r in range(int(model.joint[j, 4]))]
+        lam = np.zeros((len(q), len(places)))
+        for i, (j, r) in enumerate(places):
+            if model.row[j, r] >= 0:
+                lam[:, i] = solved[:, model.row[j, r]]
+        if n_row < len(places):
+            from mdstopo.general.start_entry import slopes_of
+
+            jac = np.zeros((len(model.joint), 3, 6))
+            for k in range(len(q)):
+                slopes_of(model.joint, model.joint_par, q[k].copy(), np.zeros((len(model.joint), 3)), jac)
+                dense = np.zeros((len(places), len(model.mass)))
+                for i, (j, r) in enumerate(places):
+                    for c in range(6):
+                        dense[i, 3 * int(model.joint[j, 1 + c // 3]) + c % 3] += jac[j, r, c]
+                dense[:, model.free == 0] = 0.0
+                lam[k] = np.linalg.lstsq(dense.T, dense.T @ lam[k], rcond=1e-10)[0]
+        return np.concatenate([lam, solved[:, n_row:]], axis=1)
+
+    def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
+        """Joint name -> Fx, Fy, M (T, 3) on its first body, at states q (T, n) with lam (T, n_rows)."""
+        from mdstopo.general.start_entry import reactions
+
+        model = self._driver.scene.model
+        row = np.full((len(model.joint), 3), -1, dtype=np.int64)
+        i = 0
+        for j in range(len(model.joint)):
+            for r in range(int(model.joint[j, 4])):
+                row[j, r] = i
+                i += 1
+        full = np.zeros((len(q), len(model.mass)))
+        full[:, : q.shape[1]] = q
+        out = np.zeros((len(q), len(model.joint), 3))
+        reactions(model.joint, model.joint_par, row, full, np.ascontiguousarray(lam), out)
+        return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}

@@ -1,0 +1,71 @@
+"""What a method of integration does for those who look at its steps, chosen by its tag when a kernel is compiled.
+
+The tag is a tuple of zeros whose length says which method is meant.
+
+1. `point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work) -> w`: the state at fraction c of
+   step k, inside it; with `keep` as an end from which the reverse sweep can start: of step w.
+2. `step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work)`: cotangents of
+   the end of step w (of its fraction c where that is below 1) pulled back to its start, in place, with explicit ones of
+   the stages; z (s, n) are the virtual displacements of the stages' balances. lam_x (2, n): what a method carries
+   from step to step beside the state.
+3. `step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk)`: changes pushed through
+   step w, with forces (s, n) on its stages; changes (s, 3, n) and rows (s, n_row) of the stages come out.
+4. `weights_of(tag, model, tables, track, w, out)`: weights (s,) of the stages in the integral over step w.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from numba.extending import overload
+
+DUTIES: dict[str, dict[int, Any]] = {"point_of": {}, "step_back": {}, "step_forward": {}, "weights_of": {}}
+
+
+def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+    """Duty 1."""
+    raise NotImplementedError
+
+
+def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+    """Duty 2."""
+    raise NotImplementedError
+
+
+def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+    """Duty 3."""
+    raise NotImplementedError
+
+
+def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+    """Duty 4."""
+    raise NotImplementedError
+
+
+def implement(tag: tuple[int, ...], **duties: Callable[..., Any]) -> None:
+    """Enter a method's compiled functions."""
+    for name, function in duties.items():
+        DUTIES[name][len(tag)] = function
+
+
+def _of(name: str, tag: Any) -> Any:
+    return DUTIES[name][len(tag)].py_func
+
+
+@overload(point_of)
+def _point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+    return _of("point_of", tag)
+
+
+@overload(step_back)
+def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+    return _of("step_back", tag)
+
+
+@overload(step_forward)
+def _step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+    return _of("step_forward", tag)
+
+
+@overload(weights_of)
+def _weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+    return _of("weights_of", tag)

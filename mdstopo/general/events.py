@@ -1,0 +1,171 @@
+"""Members that switch: when, what becomes of them, and what that does to derivatives.
+
+Within a step every member stays in its mode and its law is smooth. A mode holds while its margin s (the law's, of
+Delta and dDelta/dt) is not negative. Where s falls below zero the step is shortened until it ends there; then the
+member changes its mode and, where the force jumps, the accelerations with it. The time of the event varies by
+
+    dt_e = -(s_q dq + s_v dv) / s',      and behind it  dv+ = dv- + (a- - a+) dt_e      (saltation).
+
+With L' = B v, dL'/dq is dB/dt, so s_q = s_x B + s_xd dB/dt, s_v = s_xd B, s' = s_x x' + s_xd x''.
+"""
+
+import math
+
+import numpy as np
+
+from mdstopo.general.members import direction
+from mdstopo.general.model import INERTER
+from mdstopo.jit import kernel
+from mdstopo.mechanics.laws.table import law_margin, law_margin_slopes, law_next, law_switches
+
+
+@kernel
+def has_switches(model):  # type: ignore[no-untyped-def]
+    """Whether any member can switch at all."""
+    for k in range(model.block.shape[0]):
+        if model.block[k, 3] != INERTER and law_switches(model.block[k, 3], model.law[k]):
+            return True
+    return False
+
+
+@kernel
+def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-def]
+    """The smallest margin of all acting members at relative poses rel (n_pair, POSE), and whose it is."""
+    best = np.inf
+    who = -1
+    for k in range(model.block.shape[0]):
+        code = model.block[k, 3]
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+            continue
+        r = rel[model.block[k, 0]]
+        lo = model.block[k, 1]
+        for i in range(lo, lo + model.block[k, 5]):
+            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+            rate = bx * r[4] + by * r[5] + bt * r[6]
+            s = law_margin(code, model.law[k], length - model.member[4, i], rate, int(strength[1, i]))
+            if s < best:
+                best = s
+                who = i
+    return best, who
+
+
+@kernel
+def first_dip(model, segment, strength, rel0, rel1, h):  # type: ignore[no-untyped-def]
+    """The earliest fraction of a step at which the cubic through a margin's values and rates at both ends has a
+    minimum below zero although both ends are not; 2 where there is none. For members that come and go within a step.
+    """
+    best = 2.0
+    for k in range(model.block.shape[0]):
+        code = model.block[k, 3]
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+            continue
+        p = model.block[k, 0]
+        lo = model.block[k, 1]
+        for i in range(lo, lo + model.block[k, 5]):
+            mode = int(strength[1, i])
+            r = rel0[p]
+            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+            rate = bx * r[4] + by * r[5] + bt * r[6]
+            x = length - model.member[4, i]
+            s0 = law_margin(code, model.law[k], x, rate, mode)
+            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+            if by_rate != 0.0:
+                continue
+            d0 = h * by_x * rate
+            r = rel1[p]
+            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+            rate = bx * r[4] + by * r[5] + bt * r[6]
+            x = length - model.member[4, i]
+            s1 = law_margin(code, model.law[k], x, rate, mode)
+            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+            if by_rate != 0.0:
+                continue
+            d1 = h * by_x * rate
+            if not (d0 < 0.0 and d1 > 0.0) or s0 < 0.0 or s1 < 0.0:
+                continue
+            # s0 + d0 c + (3 D - 2 d0 - d1) c^2 + (d0 + d1 - 2 D) c^3, D = s1 - s0
+            square = 3.0 * (s1 - s0) - 2.0 * d0 - d1
+            cube = d0 + d1 - 2.0 * (s1 - s0)
+            root = math.sqrt(max(square * square - 3.0 * cube * d0, 0.0))
+            c = -d0 / (square + root) if square + root > 0.0 else 0.5
+            if c > 0.0 and c < 1.0 and s0 + c * (d0 + c * (square + c * cube)) < 0.0:
+                best = min(best, c)
+    return best
+
+
+@kernel
+def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-def]
+    """Delta, dDelta/dt, B (6,) and dB/dt (6,) of member i over the coordinates of its pair p."""
+    a = 3 * model.pair[p, 0]
+    b = 3 * model.pair[p, 1]
+    m = model.member
+    ca = math.cos(q[a + 2])
+    sa = math.sin(q[a + 2])
+    cb = math.cos(q[b + 2])
+    sb = math.sin(q[b + 2])
+    px = ca * m[0, i] - sa * m[1, i]
+    py = sa * m[0, i] + ca * m[1, i]
+    qx = cb * m[2, i] - sb * m[3, i]
+    qy = sb * m[2, i] + cb * m[3, i]
+    ux = q[b] + qx - q[a] - px
+    uy = q[b + 1] + qy - q[a + 1] - py
+    length = math.sqrt(ux * ux + uy * uy)
+    y = 1.0 / length if length > 1e-15 else 0.0
+    ex = ux * y
+    ey = uy * y
+    wa = v[a + 2]
+    wb = v[b + 2]
+    dx = v[b] - wb * qy - v[a] + wa * py
+    dy = v[b + 1] + wb * qx - v[a + 1] - wa * px
+    rate = ex * dx + ey * dy
+    fx = y * (dx - rate * ex)
+    fy = y * (dy - rate * ey)
+    row[0] = -ex
+    row[1] = -ey
+    row[2] = ex * py - ey * px
+    row[3] = ex
+    row[4] = ey
+    row[5] = ey * qx - ex * qy
+    row_rate[0] = -fx
+    row_rate[1] = -fy
+    row_rate[2] = fx * py - fy * px + wa * (ex * px + ey * py)
+    row_rate[3] = fx
+    row_rate[4] = fy
+    row_rate[5] = fy * qx - fx * qy - wb * (ex * qx + ey * qy)
+    return length - m[4, i], rate
+
+
+@kernel
+def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[no-untyped-def]
+    """The mode that member i of block k goes to, its margin's rate s', and slopes (2, n) = s_q / s', s_v / s'."""
+    n = q.shape[0]
+    p = model.block[k, 0]
+    code = model.block[k, 3]
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    x, rate = member_rows(model, p, i, q, v, row, row_rate)
+    second = 0.0
+    for r in range(6):
+        d = 3 * model.pair[p, r // 3] + r % 3
+        second += row[r] * a[d] + row_rate[r] * v[d]
+    mode = int(strength[1, i])
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+    speed = by_x * rate + by_rate * second
+    for d in range(n):
+        slopes[0, d] = 0.0
+        slopes[1, d] = 0.0
+    if speed != 0.0:
+        for r in range(6):
+            d = 3 * model.pair[p, r // 3] + r % 3
+            slopes[0, d] = (by_x * row[r] + by_rate * row_rate[r]) / speed
+            slopes[1, d] = by_rate * row[r] / speed
+    return law_next(code, model.law[k], x, rate, second, mode), speed
+
+
+@kernel
+def block_of(model, i):  # type: ignore[no-untyped-def]
+    """The block of padded member i."""
+    for k in range(model.block.shape[0]):
+        if model.block[k, 1] <= i and i < model.block[k, 2]:
+            return k
+    return -1

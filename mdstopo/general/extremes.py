@@ -1,0 +1,163 @@
+"""The extremes of a response over time, in continuous time, of a general scene.
+
+Every step is sampled at its start, its end and in between (on the quintic through both ends), each with the rate of the
+response and on the step's own side: where a response jumps or has a kink, at a given time or at an event, both limits
+are there. In a step, changes of sign of the rate are refined on the method's own motion. At the boundary of two steps a
+rise into it or a fall out of it is a peak there: stationary, at a given time, or at an event, whose time varies.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mdstopo.scene.model import FloatArray
+
+#: columns of a row: time, value, step, fraction of it, rate on this side, sign of what is largest, member
+TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO = range(7)
+COLUMNS = 7
+#: samples of every step
+FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
+LAST = len(FRACTIONS) - 1
+#: values or rates that differ by less than this, relative to the largest, differ by rounding
+ROUNDING = 1e-13
+
+#: places (K, 2), exact -> (K, 3) value, rate, member
+See = Callable[[FloatArray, bool], FloatArray]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """value, rate, who (m, 5) of a response in every step, at FRACTIONS; t (m + 1,): the steps' times."""
+
+    t: FloatArray
+    value: FloatArray
+    rate: FloatArray
+    who: FloatArray
+
+
+def sample(t: FloatArray, see: See) -> Samples:
+    """Look at all steps between the times t (m + 1,)."""
+    m = len(t) - 1
+    places = np.empty((m, len(FRACTIONS), 2))
+    places[:, :, 0] = np.arange(m)[:, None]
+    places[:, :, 1] = FRACTIONS
+    seen = see(places.reshape(-1, 2), False).reshape(m, len(FRACTIONS), 3)
+    return Samples(t, seen[:, :, 0], seen[:, :, 1], seen[:, :, 2])
+
+
+def peaks(samples: Samples, see: See, sign: float, closeness: float) -> list[FloatArray]:
+    """The peaks of sign g that come within `closeness` (relative) of the highest sample, as rows (COLUMNS,)."""
+    g, d = sign * samples.value, sign * samples.rate
+    highest = float(g.max())
+    limit = highest - closeness * abs(highest)
+    found = _inside(samples, g, d, limit, see, sign) + _boundaries(samples, g, d, limit, sign)
+    if not found:  # constant
+        w, i = np.unravel_index(int(g.argmax()), g.shape)
+        found.append(_row(samples, int(w), FRACTIONS[i], samples.value[w, i], 0.0, sign, samples.who[w, i]))
+    return found
+
+
+def ranked(rows: list[FloatArray], closeness: float, most: int) -> list[FloatArray]:
+    """Those within `closeness` of the highest, highest first, the earlier first where equal; at most so many."""
+    order = sorted(rows, key=lambda row: (-row[SIGN] * row[VALUE], row[TIME]))
+    best = order[0][SIGN] * order[0][VALUE]
+    return [row for row in order if row[SIGN] * row[VALUE] >= best - closeness * abs(best)][:most]
+
+
+def _row(samples: Samples, w: int, c: float, value: float, rate: float, sign: float, who: float) -> FloatArray:
+    time = samples.t[w + 1] if c >= 1.0 else samples.t[w] + c * (samples.t[w + 1] - samples.t[w])
+    return np.array([time, value, w, c, rate, sign, who])
+
+
+def _inside(samples: Samples, g: FloatArray, d: FloatArray, limit: float, see: See, sign: float) -> list[FloatArray]:
+    """Peaks within steps: roots of the rate between two samples where it falls through zero."""
+    width = (np.diff(samples.t) / LAST)[:, None]
+    da, db = d[:, :-1], d[:, 1:]
+    bound = np.maximum(g[:, :-1] + np.maximum(da, 0.0) * width, g[:, 1:] + np.maximum(-db, 0.0) * width)
+    crossing = (da > 0.0) & (db < 0.0)
+    # both rates of one sign, and yet the cubic through them turns twice
+    slope = np.diff(g, axis=1) / width
+    half, square = 3.0 * slope - 2.0 * da - db, 3.0 * (da + db - 2.0 * slope)
+    turning = (da * db > 0.0) & (half * half > square * da) & (square != 0.0)
+    with np.errstate(all="ignore"):
+        split = np.where(turning, -half / square, -1.0)
+    turning &= (split > 0.0) & (split < 1.0)
+    found = []
+    for w, i in np.argwhere((bound >= limit) & (crossing | turning)).tolist():
+        low, high = FRACTIONS[i], FRACTIONS[i + 1]
+        rise, fall = float(da[w, i]), float(db[w, i])
+        if turning[w, i]:
+            middle = low + float(split[w, i]) * (high - low)
+            rate = sign * float(see(np.array([[w, middle]]), True)[0, 1])
+            if rise > 0.0 > rate:
+                high, fall = middle, rate
+            elif rate > 0.0 > fall:
+                low, rise = middle, rate
+            else:
+                continue
+        c, value, rate, who = _refine(w, low, high, rise, fall, see, sign)
+        found.append(_row(samples, w, c, value, rate, sign, who))
+    return found
+
+
+def _refine(
+    w: int, low: float, high: float, rise: float, fall: float, see: See, sign: float
+) -> tuple[float, float, float, float]:
+    """Fraction, value, rate and member where the rate vanishes: Illinois' rule on the method's own motion."""
+    size, side = max(rise, -fall), 0
+    c = seen = last = np.nan
+    for _ in range(60):
+        c = (low * fall - high * rise) / (fall - rise)
+        if not low < c < high:
+            c = 0.5 * (low + high)
+        seen = see(np.array([[w, c]]), True)[0]
+        rate = sign * float(seen[1])
+        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= 1e-13:
+            break
+        last = c
+        if rate > 0.0:
+            low, rise = c, rate
+            fall = 0.5 * fall if side == -1 else fall
+            side = -1
+        else:
+            high, fall = c, rate
+            rise = 0.5 * rise if side == 1 else rise
+            side = 1
+    value, rate, who = (float(x) for x in seen)
+    return c, value, rate, who
+
+
+def _boundaries(samples: Samples, g: FloatArray, d: FloatArray, limit: float, sign: float) -> list[FloatArray]:
+    """Peaks at the ends of steps: a rise into one, or a fall out of it."""
+    m = len(g)
+    g_left = np.concatenate([[-np.inf], g[:, LAST]])
+    d_left = np.concatenate([[1.0], d[:, LAST]])
+    g_right = np.concatenate([g[:, 0], [-np.inf]])
+    d_right = np.concatenate([d[:, 0], [-1.0]])
+    size = float(np.abs(g).max())
+    if d_right[0] == 0.0:  # from rest: the first sample that differs by more than rounding tells
+        moved = np.flatnonzero(np.abs(g.ravel() - g[0, 0]) > ROUNDING * size)
+        d_right[0] = -1.0 if moved.size == 0 or g.ravel()[moved[0]] < g[0, 0] else 1.0
+    jump = np.abs(g_left - g_right) > 1e-9 * size
+    jump[[0, -1]] = False
+    ends = np.zeros(m + 1, dtype=bool)
+    ends[-1] = True
+    starts = np.zeros(m + 1, dtype=bool)
+    starts[0] = True
+    from_left = (g_left >= limit) & (d_left > 0.0) & (ends | (d_right <= 0.0) | (jump & (g_right < g_left)))
+    from_left[0] = False
+    from_right = (g_right >= limit) & (d_right < 0.0) & (starts | (d_left >= 0.0) | (jump & (g_left < g_right)))
+    from_right[-1] = False
+    # where both sides have one peak in common, it is one
+    from_right &= ~(from_left & ~(jump & (g_right > g_left)))
+    from_left &= ~(from_right & jump)
+    found = [
+        _row(samples, w - 1, 1.0, sign * g[w - 1, LAST], sign * d[w - 1, LAST], sign, samples.who[w - 1, LAST])
+        for w in np.flatnonzero(from_left).tolist()
+    ]
+    found += [
+        _row(samples, w, 0.0, sign * g[w, 0], sign * d[w, 0], sign, samples.who[w, 0])
+        for w in np.flatnonzero(from_right).tolist()
+    ]
+    return found

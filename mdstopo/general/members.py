@@ -1,0 +1,210 @@
+"""All member laws at one relative pose: sums over a block, one member's motion, the design gradient.
+
+Geometry as in `mechanics.laws.spring`: with r = d + R q - p, L = |r|, e = r/L,
+
+    b = dL/dxi = (e, (R q x r)/L),   B2 = d2L/dxi2,   Delta = L - l0,   dDelta/dt = b . xi'
+
+and a law f(Delta, dDelta/dt, t) with its partials gives Q = -sum s f b, K = sum s (b (f_D b + f_Dd B2 xi')^T + f B2),
+C = sum s f_Dd b b^T, E = sum s V, E_xi = sum s V' b, where s = alpha^mu. A law that switches is taken in the mode that
+the member is in (`strength` row 1); the integrators keep modes fixed within a step and land on their ends (`events`).
+"""
+
+import math
+
+import numpy as np
+
+from mdstopo.general.model import INERTER
+from mdstopo.jit import inline, kernel
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.mechanics.laws.table import law, law_start
+
+#: rows of `strength` (2, M_padded): alpha^mu, and the mode of a law that switches
+SCALE, MODE = range(2)
+
+
+@kernel
+def scale_general(block, power, alpha, strength):  # type: ignore[no-untyped-def]
+    """strength row SCALE = alpha^mu (Eq. 12); 1 for members that are no design variables."""
+    for k in range(block.shape[0]):
+        first = block[k, 4]
+        mu = power[k]
+        for i in range(block[k, 5]):
+            a = alpha[first + i] if first >= 0 else 1.0
+            strength[0, block[k, 1] + i] = a if mu == 1.0 else a**mu
+
+
+@inline
+def direction(member, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """Length, b (3 numbers), the inverse length (0 at none) and R q of member i."""
+    ax = c * member[2, i] - s * member[3, i]
+    ay = s * member[2, i] + c * member[3, i]
+    rx = dx + ax - member[0, i]
+    ry = dy + ay - member[1, i]
+    r2 = rx * rx + ry * ry
+    y = 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
+    return r2 * y, y * rx, y * ry, y * (ax * ry - ay * rx), y, ax, ay
+
+
+@inline
+def stretch_of(member, i, r):  # type: ignore[no-untyped-def]
+    """Delta and dDelta/dt of member i at the relative pose r (POSE,)."""
+    length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
+    return length - member[4, i], bx * r[4] + by * r[5] + bt * r[6]
+
+
+@kernel
+def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no-untyped-def]
+    """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C."""
+    p = model.law[k]
+    code = model.block[k, 3]
+    member = model.member
+    tau = t - model.times[segment]
+    value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
+    counted = model.block[k, 4] >= 0
+    vx = r[4]
+    vy = r[5]
+    vt = r[6]
+    lo = model.block[k, 1]
+    for i in range(lo, lo + model.block[k, 5]):
+        length, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
+        if y == 0.0:
+            continue
+        rate = bx * vx + by * vy + bt * vt
+        scale = strength[0, i]
+        f, fd, fr, energy, pull = law(code, p, length - member[4, i], rate, int(strength[1, i]), t, value, model.curves)
+        f *= scale
+        o[0] -= f * bx
+        o[1] -= f * by
+        o[2] -= f * bt
+        if counted:
+            o[3] += scale * energy
+            pull *= scale
+            o[4] += pull * bx
+            o[5] += pull * by
+            o[6] += pull * bt
+        if not tangent:
+            continue
+        fd *= scale
+        fr *= scale
+        hxx = y * (1.0 - bx * bx)
+        hxy = -y * bx * by
+        hyy = y * (1.0 - by * by)
+        hxt = -y * (ay + bx * bt)
+        hyt = y * (ax - by * bt)
+        htt = y * (ax * ax + ay * ay - bt * bt) - (bx * ax + by * ay)
+        fx = fd * bx + fr * (hxx * vx + hxy * vy + hxt * vt)
+        fy = fd * by + fr * (hxy * vx + hyy * vy + hyt * vt)
+        ft = fd * bt + fr * (hxt * vx + hyt * vy + htt * vt)
+        o[7] += bx * fx + f * hxx
+        o[8] += bx * fy + f * hxy
+        o[9] += bx * ft + f * hxt
+        o[10] += by * fx + f * hxy
+        o[11] += by * fy + f * hyy
+        o[12] += by * ft + f * hyt
+        o[13] += bt * fx + f * hxt
+        o[14] += bt * fy + f * hyt
+        o[15] += bt * ft + f * htt
+        o[16] += fr * bx * bx
+        o[17] += fr * bx * by
+        o[18] += fr * by * by
+        o[19] += fr * bx * bt
+        o[20] += fr * by * bt
+        o[21] += fr * bt * bt
+
+
+@kernel
+def general_sums(model, segment, t, strength, rel, tangent, sums):  # type: ignore[no-untyped-def]
+    """sums (n_pair, SUMS) = those of all acting blocks at relative poses rel (n_pair, POSE)."""
+    sums[:] = 0.0
+    for k in range(model.block.shape[0]):
+        if model.active[segment, k] != 0 and model.block[k, 3] != INERTER:
+            p = model.block[k, 0]
+            add_block(model, k, segment, t, strength, rel[p], tangent, sums[p])
+
+
+@kernel
+def set_modes(model, strength, rel, rel_rate):  # type: ignore[no-untyped-def]
+    """The modes at the start from elongation, rate and second derivative (rel_rate: the pose of the accelerations)."""
+    for k in range(model.block.shape[0]):
+        code = model.block[k, 3]
+        if code == INERTER:
+            continue
+        r = rel[model.block[k, 0]]
+        acc = rel_rate[model.block[k, 0]]
+        lo = model.block[k, 1]
+        for i in range(lo, lo + model.block[k, 5]):
+            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+            rate = bx * r[4] + by * r[5] + bt * r[6]
+            second = second_rate(model.member, i, r, acc)
+            strength[1, i] = law_start(code, model.law[k], length - model.member[4, i], rate, second)
+
+
+@inline
+def second_rate(member, i, r, acc):  # type: ignore[no-untyped-def]
+    """d2Delta/dt2 = b . xi'' + xi' . B2 xi' of member i; acc (3,): xi''."""
+    _, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
+    hxx = y * (1.0 - bx * bx)
+    hxy = -y * bx * by
+    hyy = y * (1.0 - by * by)
+    hxt = -y * (ay + bx * bt)
+    hyt = y * (ax - by * bt)
+    htt = y * (ax * ax + ay * ay - bt * bt) - (bx * ax + by * ay)
+    vx = r[4]
+    vy = r[5]
+    vt = r[6]
+    return (
+        bx * acc[0]
+        + by * acc[1]
+        + bt * acc[2]
+        + vx * (hxx * vx + 2.0 * (hxy * vy + hxt * vt))
+        + vy * (hyy * vy + 2.0 * hyt * vt)
+        + vt * htt * vt
+    )
+
+
+@kernel
+def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += f_i (b_i . u) + weight V_i of the members of block k at unit strength.
+
+    r (POSE,): relative pose; u (3,): virtual change of it; weight: of the stored energy. modes_of (M_padded,).
+    """
+    p = model.law[k]
+    code = model.block[k, 3]
+    member = model.member
+    tau = t - model.times[segment]
+    value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
+    lo = model.block[k, 1]
+    for i in range(lo, lo + model.block[k, 5]):
+        length, bx, by, bt, y, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
+        if y == 0.0:
+            continue
+        rate = bx * r[4] + by * r[5] + bt * r[6]
+        f, _, _, energy, _ = law(code, p, length - member[4, i], rate, int(modes_of[i]), t, value, model.curves)
+        out[i] += f * (bx * u[0] + by * u[1] + bt * u[2]) + weight * energy
+
+
+@kernel
+def unscale_general(block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
+    """out (N,) = mu alpha^(mu - 1) times the padded gradient by alpha^mu, summed over the laws of a member."""
+    out[:] = 0.0
+    for k in range(block.shape[0]):
+        first = block[k, 4]
+        if first < 0:
+            continue
+        mu = power[k]
+        for i in range(block[k, 5]):
+            factor = 1.0 if mu == 1.0 else mu * alpha[first + i] ** (mu - 1.0)
+            out[first + i] += factor * padded[block[k, 1] + i]
+
+
+@kernel
+def lengths_collapse(model, strength, rel):  # type: ignore[no-untyped-def]
+    """Padded index of a member without length that would carry a force at these poses, or -1."""
+    for k in range(model.block.shape[0]):
+        r = rel[model.block[k, 0]]
+        lo = model.block[k, 1]
+        for i in range(lo, lo + model.block[k, 5]):
+            length, _, _, _, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+            if length <= 1e-9 * model.member[4, i] and strength[0, i] != 0.0 and np.isfinite(length):
+                return i
+    return -1

@@ -1,0 +1,185 @@
+"""A general scene as arrays, and the same arrays packed for the way into compiled code.
+
+Bodies are those of the case as declared, ground after them; n = 3 bodies coordinates q = (x, y, psi) each. A
+coordinate is free, or driven: known as a cubic of time within each segment; ground is driven and stands still. Rows of
+joints are solved together with the accelerations (`balance`); rows that others imply are left out there.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mdstopo.general.structures import ModelStructure, bundle
+from mdstopo.jit import kernel
+from mdstopo.scene.model import FloatArray, IndexArray
+
+#: columns of `GeneralModel.block`; code -1 is an inerter
+PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP = range(7)
+#: columns of `GeneralModel.joint`
+JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
+#: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
+KIND, BODY, REFERENCE, COMPONENT, ORDER, SUBJECT = range(6)
+#: the law code of an inerter, which is no function of elongation and rate
+INERTER = -1
+
+
+class GeneralModel(NamedTuple):
+    """What is constant during every evaluation of one load case.
+
+    ============  ================  =====================================================================
+    free          (n,) 0 or 1       whether a coordinate is an unknown
+    mass          (n,)              m, m, J of each body (1 for ground)
+    q0, v0        (n,)              state at the start
+    pair          (n_pair, 2)       the two bodies of each pair that members, joints or bushings connect
+    reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
+    block         (n_block, 7)      pair, start, stop (padded), code of the law, first design variable or -1, count, group
+    law           (n_block, 8)      the law's parameters (`mechanics.laws.table`)
+    active        (n_seg, n_block)  whether the law acts during a segment
+    level         (n_seg, n_block, 2)   a tabulated force at the segment's start, and its slope
+    power         (n_block,)        mu of Eq. 12
+    member        (5, M_padded)     P, Q in body frames; free length
+    curves        (any,)            what `curve` laws read
+    times         (n_seg + 1,)      start, everything that has a kink in time, end
+    force         (n_seg, n, 2)     generalised load at the segment's start, slope in time; with gravity
+    load_*                          loads that depend on the body's rotation, as in `scene.model.Model`
+    bushing_pair  (n_bushing,)      and `bushing` (n_bushing, 11): P, Q, angle at rest, stiffness, damping
+    driven        (n_driven,)       coordinates that are driven
+    drive         (n_seg, n_driven, 4)   their positions in a segment, powers of the time since its start
+    joint         (n_joint, 5)      code, first and second body, pair, rows; `joint_par` (n_joint, 12)
+    row           (n_joint, 3)      the place of each of its rows among the solved ones, or -1
+    place         (n + n_row,)      where each coordinate, then each row, stands in the banded matrix
+    size          (3,)              n_row; half width of the band; whether anything depends on velocity
+    response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point, its place at the start
+    ============  ================  =====================================================================
+    """
+
+    free: IndexArray
+    mass: FloatArray
+    q0: FloatArray
+    v0: FloatArray
+    pair: IndexArray
+    reach: FloatArray
+    block: IndexArray
+    law: FloatArray
+    active: IndexArray
+    level: FloatArray
+    power: FloatArray
+    member: FloatArray
+    curves: FloatArray
+    times: FloatArray
+    force: FloatArray
+    load_body: IndexArray
+    load_follows: IndexArray
+    load_arm: FloatArray
+    load_force: FloatArray
+    bushing_pair: IndexArray
+    bushing: FloatArray
+    driven: IndexArray
+    drive: FloatArray
+    joint: IndexArray
+    joint_par: FloatArray
+    row: IndexArray
+    place: IndexArray
+    size: IndexArray
+    response: IndexArray
+    response_par: FloatArray
+
+
+class ModelView:
+    """A `GeneralModel` inside kernels, made by `unpack_general`."""
+
+
+bundle(ModelView, ModelStructure, GeneralModel._fields)
+
+
+def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
+    """Flat integers (sizes first) and flat floats, in the order of the fields."""
+    sizes = [
+        len(model.mass), len(model.pair), len(model.block), model.member.shape[1], len(model.curves),
+        len(model.times) - 1, len(model.load_body), len(model.bushing_pair), len(model.driven), len(model.joint),
+        len(model.place), len(model.response),
+    ]  # fmt: skip
+    ints = [np.asarray(sizes, dtype=np.int64)]
+    floats = []
+    for array in model:
+        (ints if array.dtype.kind == "i" else floats).append(array.ravel())
+    return np.concatenate(ints).astype(np.int64), np.concatenate(floats).astype(np.float64)
+
+
+@kernel
+def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
+    """The `GeneralModel` whose arrays are views of the packed ones."""
+    n = ints[0]
+    n_pair = ints[1]
+    n_block = ints[2]
+    padded = ints[3]
+    n_curve = ints[4]
+    n_seg = ints[5]
+    n_load = ints[6]
+    n_bush = ints[7]
+    n_driven = ints[8]
+    n_joint = ints[9]
+    n_place = ints[10]
+    n_resp = ints[11]
+    i = 12
+    free = ints[i : i + n]
+    i += n
+    pair = ints[i : i + 2 * n_pair].reshape((n_pair, 2))
+    i += 2 * n_pair
+    block = ints[i : i + 7 * n_block].reshape((n_block, 7))
+    i += 7 * n_block
+    active = ints[i : i + n_seg * n_block].reshape((n_seg, n_block))
+    i += n_seg * n_block
+    load_body = ints[i : i + n_load]
+    i += n_load
+    load_follows = ints[i : i + n_load]
+    i += n_load
+    bushing_pair = ints[i : i + n_bush]
+    i += n_bush
+    driven = ints[i : i + n_driven]
+    i += n_driven
+    joint = ints[i : i + 5 * n_joint].reshape((n_joint, 5))
+    i += 5 * n_joint
+    row = ints[i : i + 3 * n_joint].reshape((n_joint, 3))
+    i += 3 * n_joint
+    place = ints[i : i + n_place]
+    i += n_place
+    size = ints[i : i + 3]
+    i += 3
+    response = ints[i : i + 6 * n_resp].reshape((n_resp, 6))
+    mass = floats[0:n]
+    q0 = floats[n : 2 * n]
+    v0 = floats[2 * n : 3 * n]
+    f = 3 * n
+    reach = floats[f : f + n_pair]
+    f += n_pair
+    law = floats[f : f + 8 * n_block].reshape((n_block, 8))
+    f += 8 * n_block
+    level = floats[f : f + 2 * n_seg * n_block].reshape((n_seg, n_block, 2))
+    f += 2 * n_seg * n_block
+    power = floats[f : f + n_block]
+    f += n_block
+    member = floats[f : f + 5 * padded].reshape((5, padded))
+    f += 5 * padded
+    curves = floats[f : f + n_curve]
+    f += n_curve
+    times = floats[f : f + n_seg + 1]
+    f += n_seg + 1
+    force = floats[f : f + 2 * n_seg * n].reshape((n_seg, n, 2))
+    f += 2 * n_seg * n
+    load_arm = floats[f : f + 2 * n_load].reshape((n_load, 2))
+    f += 2 * n_load
+    load_force = floats[f : f + 4 * n_seg * n_load].reshape((n_seg, n_load, 2, 2))
+    f += 4 * n_seg * n_load
+    bushing = floats[f : f + 11 * n_bush].reshape((n_bush, 11))
+    f += 11 * n_bush
+    drive = floats[f : f + 4 * n_seg * n_driven].reshape((n_seg, n_driven, 4))
+    f += 4 * n_seg * n_driven
+    joint_par = floats[f : f + 12 * n_joint].reshape((n_joint, 12))
+    f += 12 * n_joint
+    response_par = floats[f : f + 4 * n_resp].reshape((n_resp, 4))
+    return ModelView(
+        free, mass, q0, v0, pair, reach, block, law, active, level, power, member, curves, times, force, load_body,
+        load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row, place, size,
+        response, response_par,
+    )  # fmt: skip

@@ -1,0 +1,186 @@
+"""Back onto the joints after a step: the nearest state, by mass, that satisfies Phi(q) = 0 and Phi_q v = 0.
+
+    M (q+ - q-) + Phi_q(q+)^T mu = 0,  Phi(q+) = 0;      M (v+ - v-) + Phi_q(q+)^T nu = 0,  Phi_q(q+) v+ = 0
+
+What a step has drifted is of the order of its error, so mu and nu are small; their terms are kept in the derivatives
+all the same, so that these belong to what was computed. Driven coordinates are in place already and stay.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import factor_matrix, gather, gather_multipliers, joint_state, solve_unknowns
+from mdstopo.jit import kernel
+from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
+
+#: corrections of the position at most; each squares the misfit
+MOST = 12
+
+
+@kernel
+def misfit(model, phi, rows):  # type: ignore[no-untyped-def]
+    """Largest |Phi| of the joints (m or rad), and its place in `rows` of joint numbers."""
+    worst = 0.0
+    for j in range(model.joint.shape[0]):
+        for r in range(model.joint[j, 4]):
+            if abs(phi[j, r]) > worst or np.isnan(phi[j, r]):
+                worst = abs(phi[j, r])
+                rows[0] = j
+    return worst
+
+
+@kernel
+def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
+    """Move q, v (n,) onto the joints; mu, nu (n_row,) are the multipliers that did it.
+
+    scale: size of the scene, m. Returns the place of the unknown at which the joints are singular, or -1, and the
+    misfit that is left.
+    """
+    n = q.shape[0]
+    n_row = mu.shape[0]
+    mu[:] = 0.0
+    nu[:] = 0.0
+    if n_row == 0:
+        return -1, 0.0
+    start = np.empty(n)
+    shift = np.empty(n)
+    which = np.zeros(1, np.int64)
+    for d in range(n):
+        start[d] = q[d]
+    none = desk.mass
+    none[:] = 0.0
+    last = np.inf
+    worst = np.inf
+    for _ in range(MOST):
+        joint_state(model, q, v, desk)
+        worst = misfit(model, desk.phi, which)
+        if worst <= 1e-15 * scale or not worst < last:
+            break
+        last = worst
+        singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
+        if singular >= 0:
+            return singular, worst
+        for d in range(n):
+            shift[d] = model.mass[d] * (start[d] - q[d])
+        for j in range(model.joint.shape[0]):
+            for r in range(3):
+                if model.row[j, r] >= 0:
+                    mu[model.row[j, r]] = -desk.phi[j, r]
+        solve_unknowns(model, desk, shift, mu)
+        for d in range(n):
+            q[d] += shift[d]
+    joint_state(model, q, v, desk)
+    singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
+    if singular >= 0:
+        return singular, worst
+    for d in range(n):
+        shift[d] = 0.0
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                value = 0.0
+                for i in range(6):
+                    value -= desk.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
+                nu[own] = value
+    solve_unknowns(model, desk, shift, nu)
+    for d in range(n):
+        v[d] += shift[d]
+    return -1, worst
+
+
+@kernel
+def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[no-untyped-def]
+    """h_mu, h_nu (n_pair, 6, 6) = d(Phi_q^T mu)/dq and with nu; slope (n_joint, 3, 6) = d(Phi_q v)/dq."""
+    w = np.empty(6)
+    wd = np.empty(6)
+    mine = np.empty(3)
+    h_mu[:] = 0.0
+    h_nu[:] = 0.0
+    for j in range(model.joint.shape[0]):
+        code = model.joint[j, 0]
+        par = model.joint_par[j]
+        gather(model, j, q, w)
+        gather(model, j, v, wd)
+        gather_multipliers(model, j, mu, mine)
+        joint_stiffness(code, par, w, mine, h_mu[model.joint[j, 3]])
+        gather_multipliers(model, j, nu, mine)
+        joint_stiffness(code, par, w, mine, h_nu[model.joint[j, 3]])
+        joint_velocity_slope(code, par, w, wd, slope[j])
+
+
+@kernel
+def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-untyped-def]
+    """Pull cotangents of the projected state q, v back to the one before; bar_q, bar_v (n,) in place."""
+    n = q.shape[0]
+    if mu.shape[0] == 0:
+        return
+    n_pair = model.pair.shape[0]
+    h_mu = np.empty((n_pair, 6, 6))
+    h_nu = np.empty((n_pair, 6, 6))
+    slope = np.zeros((model.joint.shape[0], 3, 6))
+    y = np.zeros(mu.shape[0])
+    none = np.zeros((n_pair, 6, 6))
+    turn = np.zeros(n)
+    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    joint_state(model, q, v, desk)
+    desk.by_q[:] = 0.0
+    desk.by_v[:] = 0.0
+    factor_matrix(model, desk, none, none, turn, none, 0.0, 0.0, np.bool_(True))
+    solve_unknowns(model, desk, bar_v, y)
+    for p in range(n_pair):
+        for i in range(6):
+            value = bar_v[3 * model.pair[p, i // 3] + i % 3]
+            for j in range(6):
+                bar_q[3 * model.pair[p, j // 3] + j % 3] -= h_nu[p, i, j] * value
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                for i in range(6):
+                    bar_q[3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
+    y[:] = 0.0
+    factor_matrix(model, desk, h_mu, none, turn, none, 1.0, 0.0, np.bool_(True))
+    solve_unknowns(model, desk, bar_q, y)
+    for d in range(n):
+        bar_q[d] *= model.mass[d]
+        bar_v[d] *= model.mass[d]
+
+
+@kernel
+def project_forward(model, q, v, mu, nu, desk, dq, dv):  # type: ignore[no-untyped-def]
+    """Push changes dq, dv (n,) of the state before through the projection, in place."""
+    n = q.shape[0]
+    if mu.shape[0] == 0:
+        return
+    n_pair = model.pair.shape[0]
+    h_mu = np.empty((n_pair, 6, 6))
+    h_nu = np.empty((n_pair, 6, 6))
+    slope = np.zeros((model.joint.shape[0], 3, 6))
+    y = np.zeros(mu.shape[0])
+    none = np.zeros((n_pair, 6, 6))
+    turn = np.zeros(n)
+    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    joint_state(model, q, v, desk)
+    desk.by_q[:] = 0.0
+    desk.by_v[:] = 0.0
+    factor_matrix(model, desk, h_mu, none, turn, none, 1.0, 0.0, np.bool_(False))
+    for d in range(n):
+        dq[d] *= model.mass[d]
+        dv[d] *= model.mass[d]
+    solve_unknowns(model, desk, dq, y)
+    for p in range(n_pair):
+        for i in range(6):
+            value = 0.0
+            for j in range(6):
+                value += h_nu[p, i, j] * dq[3 * model.pair[p, j // 3] + j % 3]
+            dv[3 * model.pair[p, i // 3] + i % 3] -= value
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                value = 0.0
+                for i in range(6):
+                    value -= slope[j, r, i] * dq[3 * model.joint[j, 1 + i // 3] + i % 3]
+                y[own] = value
+    factor_matrix(model, desk, none, none, turn, none, 0.0, 0.0, np.bool_(False))
+    solve_unknowns(model, desk, dv, y)

@@ -1,0 +1,220 @@
+"""What can be looked at in a general scene: g(q, v, a, lam, alpha) of Eq. 16, its slopes and its rate.
+
+A response is evaluated at a state whose balance has just been made (`balance`), so poses, forces, accelerations and
+multipliers are at hand. A new response is one more kind here, with its slopes.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, gather, gather_multipliers
+from mdstopo.general.events import member_rows
+from mdstopo.general.forces import inerter_force
+from mdstopo.general.model import INERTER
+from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import add_pair_force
+from mdstopo.mechanics.joints.table import joint_transmitted
+from mdstopo.mechanics.laws.table import law
+from mdstopo.responses.kinematics import angle_response, point_response
+
+#: kinds, column KIND of `GeneralModel.response`
+ENERGY, POINT, ANGLE, MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT = range(6)
+KINDS = {
+    "energy": (ENERGY, 0),
+    "displacement": (POINT, 0),
+    "velocity": (POINT, 1),
+    "acceleration": (POINT, 2),
+    "angle": (ANGLE, 0),
+    "angular_velocity": (ANGLE, 1),
+    "angular_acceleration": (ANGLE, 2),
+    "member_force": (MEMBER_FORCE, 0),
+    "joint_force": (JOINT_FORCE, 0),
+    "joint_moment": (JOINT_MOMENT, 1),
+}
+#: fraction of a step by which the rate of a response is differenced where it has no formula
+APART = 3e-4
+
+
+@kernel
+def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  # type: ignore[no-untyped-def]
+    """f* of member i of a group, all its laws together; slopes (3, 6) by q, v, a of its two bodies; own: scratch (2, 6).
+
+    Returns f*, its pair.
+    """
+    total = 0.0
+    pair = 0
+    slopes[:] = 0.0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 6] != group or model.active[segment, k] == 0 or i >= model.block[k, 5]:
+            continue
+        pair = model.block[k, 0]
+        m = model.block[k, 1] + i
+        scale = strength[0, m]
+        x, rate = member_rows(model, pair, m, q, v, own[0], own[1])
+        if model.block[k, 3] == INERTER:
+            total += scale * inerter_force(model, k, m, q, v, a, own[0])
+            for r in range(6):
+                slopes[2, r] += scale * model.law[k, 0] * own[0, r]
+            continue
+        tau = t - model.times[segment]
+        value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
+        f, by_x, by_rate, _, _ = law(
+            model.block[k, 3], model.law[k], x, rate, int(strength[1, m]), t, value, model.curves
+        )
+        total += scale * f
+        for r in range(6):
+            slopes[0, r] += scale * (by_x * own[0, r] + by_rate * own[1, r])
+            slopes[1, r] += scale * by_rate * own[0, r]
+    return total, pair
+
+
+@kernel
+def largest_force(model, strength, segment, t, group, q, v, a):  # type: ignore[no-untyped-def]
+    """The member of a group that carries the largest |f*|."""
+    slopes = np.empty((3, 6))
+    own = np.empty((2, 6))
+    best = -1.0
+    who = 0
+    count = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 6] == group:
+            count = model.block[k, 5]
+    for i in range(count):
+        f, _ = member_force(model, strength, segment, t, group, i, q, v, a, slopes, own)
+        if abs(f) > best:
+            best = abs(f)
+            who = i
+    return who
+
+
+@kernel
+def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):  # type: ignore[no-untyped-def]
+    """g_j at a balanced state; bars (3, n), row_bar (n_row,) = its slopes by q, v, a and lam (set, not added to).
+
+    who: the member looked at, for member forces.
+    """
+    bars[:] = 0.0
+    row_bar[:] = 0.0
+    kind = model.response[j, 0]
+    if kind == ENERGY:
+        value = 0.0
+        for p in range(model.pair.shape[0]):
+            o = desk.sums[p]
+            value += o[3]
+            add_pair_force(model.pair, desk.rel, p, o[4], o[5], o[6], bars[0])
+        return value
+    if kind == POINT or kind == ANGLE:
+        slope = np.empty((6, 3))
+        b = 3 * model.response[j, 1]
+        r = 3 * model.response[j, 2]
+        par = model.response_par[j]
+        order = model.response[j, 4]
+        if kind == POINT:
+            value = point_response(
+                order, model.response[j, 3], par[0:2], par[2:4], q[b : b + 3], v[b : b + 3], a[b : b + 3],
+                q[r : r + 3], v[r : r + 3], a[r : r + 3], slope,
+            )  # fmt: skip
+        else:
+            value = angle_response(
+                order, q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3], v[r : r + 3], a[r : r + 3], slope
+            )
+        for i in range(3):
+            for c in range(3):
+                bars[i, b + c] += slope[i, c]
+                bars[i, r + c] += slope[3 + i, c]
+        return value
+    if kind == MEMBER_FORCE:
+        slopes = np.empty((3, 6))
+        own = np.empty((2, 6))
+        f, pair = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+        sign = 1.0 if f >= 0.0 else -1.0
+        inertial = False
+        for i in range(3):
+            for c in range(6):
+                bars[i, 3 * model.pair[pair, c // 3] + c % 3] += sign * slopes[i, c]
+                inertial = inertial or (i == 2 and slopes[i, c] != 0.0)
+        if inertial:
+            _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars)
+        return sign * f
+    joint = model.response[j, 5]
+    w = np.empty(6)
+    mine = np.empty(3)
+    by_lam = np.empty(3)
+    by_q = np.empty(6)
+    gather(model, joint, q, w)
+    gather_multipliers(model, joint, lam, mine)
+    value = joint_transmitted(
+        model.joint[joint, 0], model.joint_par[joint], w, mine, model.response[j, 4], by_lam, by_q
+    )
+    for r in range(3):
+        if model.row[joint, r] >= 0:
+            row_bar[model.row[joint, r]] = by_lam[r]
+    for c in range(6):
+        bars[0, 3 * model.joint[joint, 1 + c // 3] + c % 3] += by_q[c]
+    return value
+
+
+@kernel
+def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # type: ignore[no-untyped-def]
+    """Slopes by q and v of an inerter's force, by sixth-order differences of its formula: six of each, rarely needed."""
+    own = np.empty(6)
+    for k in range(model.block.shape[0]):
+        if model.block[k, 6] != model.response[j, 5] or model.block[k, 3] != INERTER or model.active[segment, k] == 0:
+            continue
+        pair = model.block[k, 0]
+        m = model.block[k, 1] + who
+        for part in range(2):
+            x = q if part == 0 else v
+            for c in range(6):
+                d = 3 * model.pair[pair, c // 3] + c % 3
+                kept = x[d]
+                size = 1e-2 * (0.1 + abs(kept)) if part == 1 else 2e-3 * max(model.reach[pair], 1e-3)
+                if c % 3 == 2 and part == 0:
+                    size = 2e-3
+                slope = 0.0
+                for n in range(3):
+                    weight = 0.75 if n == 0 else (-0.15 if n == 1 else 1.0 / 60.0)
+                    x[d] = kept + (n + 1) * size
+                    plus = inerter_force(model, k, m, q, v, a, own)
+                    x[d] = kept - (n + 1) * size
+                    slope += weight * (plus - inerter_force(model, k, m, q, v, a, own))
+                x[d] = kept
+                bars[part, d] += sign * strength[0, m] * slope / size
+
+
+@kernel
+def rated(model, strength, segment, j, who, t, h, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
+    """g_j and dg_j/dt at a state; a, lam, the desk and the slopes are those of it afterwards. near: scratch (4, n).
+
+    j < 0: no response is asked for.
+    where g depends on q and v alone, dg/dt = g_q v + g_v a; else it is differenced along the motion, h: the step.
+    """
+    n = q.shape[0]
+    no = np.bool_(False)
+    rate = 0.0
+    if j < 0:
+        balance(model, strength, segment, t, q, v, no, desk, a, lam)
+        return np.nan, np.nan
+    kind = model.response[j, 0]
+    simple = kind == ENERGY or ((kind == POINT or kind == ANGLE) and model.response[j, 4] < 2)
+    if not simple:
+        balance(model, strength, segment, t, q, v, no, desk, a, lam)
+        for d in range(n):
+            near[0, d] = a[d]
+        apart = APART * h
+        sides = np.zeros(2)
+        for side in range(2):
+            e = apart if side == 1 else -apart
+            for d in range(n):
+                near[1, d] = q[d] + e * (v[d] + 0.5 * e * near[0, d])
+                near[2, d] = v[d] + e * near[0, d]
+            balance(model, strength, segment, t + e, near[1], near[2], no, desk, near[3], lam)
+            sides[side] = response(
+                model, strength, segment, j, who, t + e, near[1], near[2], near[3], lam, desk, bars, row_bar
+            )
+        rate = (sides[1] - sides[0]) / (2.0 * apart)
+    balance(model, strength, segment, t, q, v, no, desk, a, lam)
+    value = response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    if simple:
+        for d in range(n):
+            rate += bars[0, d] * v[d] + bars[1, d] * a[d]
+    return value, rate

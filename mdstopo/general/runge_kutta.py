@@ -1,0 +1,397 @@
+"""Explicit Runge-Kutta steps of a general scene, adaptive, with joints and events.
+
+The method is that of `integrators.runge_kutta`: each stage's accelerations come from the balance with its joints, and the end of
+a step is moved onto the joints (`projection`), by no more than the step's error, so the order stays. A step that a
+switching member's margin does not survive is shortened until it ends at the event.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.events import block_of, first_dip, has_switches, smallest_margin, switch_of
+from mdstopo.general.forces import drive_state, pose_acceleration
+from mdstopo.general.members import scale_general, set_modes
+from mdstopo.general.model import unpack_general
+from mdstopo.general.projection import project
+from mdstopo.general.track import carve_track, keep_stage, keep_state
+from mdstopo.integrators.runge_kutta import MARGIN, MOST, _error
+from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
+from mdstopo.integrators.steps import (
+    ACCEPTED,
+    CHATTERING,
+    FORCES,
+    NEEDS_ROOM,
+    NON_FINITE,
+    OK,
+    REJECTED,
+    SINGULAR,
+    STEP_LIMIT,
+    STEP_TOO_SMALL,
+    TANGENTS,
+    deflection,
+    motion_weights,
+)
+from mdstopo.jit import entry, kernel
+from mdstopo.mechanics.geometry import POSE, relative_pose
+
+TAG = (0,)
+#: events within a millionth of the simulated time after which the scene counts as chattering
+CHATTER = 400
+
+
+@kernel
+def advance(  # type: ignore[no-untyped-def]
+    model, table, s, strength, segment, t, h, q0, v0, tangent, o, desk, lam, q, v, a, track, ends, push, size, work
+):
+    """One step of length h from q0, v0: stages into q, v, a (s, n), the end on the joints into ends (2, n).
+
+    push (2, n_row): the multipliers of the projection. With o >= 0 the stages are kept in `track` from there on.
+    Returns the place of an unknown at which the joints are singular, or -1.
+    """
+    n = q0.shape[0]
+    vectors = table[2]
+    for i in range(s):
+        for d in range(n):
+            q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
+            v[i, d] = v0[d]
+        for j in range(i):
+            w = h * h * table[0, i, j]
+            u = h * table[1, i, j]
+            if w != 0.0:
+                for d in range(n):
+                    q[i, d] += w * a[j, d]
+            if u != 0.0:
+                for d in range(n):
+                    v[i, d] += u * a[j, d]
+        time = t + h * vectors[0, i]
+        singular = balance(model, strength, segment, time, q[i], v[i], tangent, desk, a[i], lam)
+        work[FORCES] += 1
+        if singular >= 0:
+            return singular
+        if o >= 0:
+            keep_stage(track, o + i, time, q[i], v[i], a[i], lam, desk, tangent)
+    if tangent:
+        work[TANGENTS] += s
+    for d in range(n):
+        position = q0[d] + h * v0[d]
+        speed = v0[d]
+        for j in range(s):
+            position += h * h * vectors[1, j] * a[j, d]
+            speed += h * vectors[2, j] * a[j, d]
+        ends[0, d] = position
+        ends[1, d] = speed
+    drive_state(model, segment, t + h, ends[0], ends[1])
+    singular, _ = project(model, size, ends[0], ends[1], desk, push[0], push[1])
+    return singular
+
+
+@kernel
+def scene_size(model):  # type: ignore[no-untyped-def]
+    """A length of the scene, m: what rounding of positions is measured against."""
+    size = 0.0
+    for p in range(model.reach.shape[0]):
+        size = max(size, model.reach[p])
+    for d in range(0, model.q0.shape[0], 3):
+        size = max(size, abs(model.q0[d]), abs(model.q0[d + 1]))
+    return size if size > 0.0 else 1.0
+
+
+@kernel
+def start_modes(model, strength, desk, q, v, a, lam):  # type: ignore[no-untyped-def]
+    """The modes at the start: by elongation, then its rate, then its second derivative with what is surely closed."""
+    n_pair = model.pair.shape[0]
+    rel = np.empty((n_pair, POSE))
+    second = np.zeros((n_pair, 3))
+    relative_pose(model.pair, q, v, rel)
+    for attempt in range(2):
+        set_modes(model, strength, rel, second)
+        if attempt == 0:
+            singular = balance(model, strength, np.int64(0), model.times[0], q, v, np.bool_(False), desk, a, lam)
+            if singular >= 0:
+                return singular
+            for p in range(n_pair):
+                pose_acceleration(model.pair, rel, p, a, second[p])
+    return -1
+
+
+@kernel
+def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, work):  # type: ignore[no-untyped-def]
+    """Switch every member whose margin is used up, one after the other; returns how many events there are now.
+
+    -1: no room; a (n,) holds the accelerations behind the last one. The loop ends because each member switches at
+    most twice here.
+    """
+    n = q.shape[0]
+    n_pair = model.pair.shape[0]
+    rel = np.empty((n_pair, POSE))
+    relative_pose(model.pair, q, v, rel)
+    done = 0
+    while True:
+        margin, who = smallest_margin(model, segment, strength, rel)
+        if not margin < 0.0 or done > 2 * strength.shape[1]:
+            return events
+        if events >= track.event.shape[0]:
+            return -1
+        k = block_of(model, who)
+        salt = track.salt[events]
+        new, _ = switch_of(model, segment, strength, q, v, a, who, k, salt)
+        old = int(strength[1, who])
+        track.event[events, 0] = state
+        track.event[events, 1] = who
+        track.event[events, 2] = old
+        track.event[events, 3] = new
+        strength[1, who] = new
+        events += 1
+        strength[1, strength.shape[1] - 1] = events
+        done += 1
+        for d in range(n):
+            salt[2, d] = a[d]
+        balance(model, strength, segment, t, q, v, np.bool_(False), desk, a, lam)
+        work[FORCES] += 1
+        for d in range(n):
+            salt[2, d] -= a[d]
+        if new == old:
+            return events
+
+
+@entry
+def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):  # type: ignore[no-untyped-def]
+    """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
+
+    Arguments as `integrators.runge_kutta.simulate`'s, limits and rooms those of `track`. where (2,): the member or the
+    unknown that is to blame where it ends early.
+    """
+    model = unpack_general(ints, floats)
+    tolerance = MARGIN * settings[0]
+    fixed_step = settings[2]
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    n_row = model.size[0]
+    track = carve_track(model, limits, room, room_ints)
+    track.mass[0] = 0.0
+    scale_general(model.block, model.power, alpha, strength)
+    strength[1] = 0.0
+    method = 1 if model.size[2] != 0 else 0
+    s = STAGES[method]
+    order = ORDERS[method]
+    table = tables[method]
+    pair = model.pair
+    times = model.times
+    reach = model.reach
+    desk = make_desk(model)
+    no = np.bool_(False)
+    nowhere = np.int64(-1)
+    keep = np.bool_(tangent)
+    size = scene_size(model)
+    rel = np.empty((n_pair, POSE))
+    rel0 = np.empty((n_pair, POSE))
+    before = np.empty((n_pair, POSE))
+    q = np.empty((MOST, n))
+    v = np.empty((MOST, n))
+    a = np.empty((MOST, n))
+    lam = np.zeros(n_row)
+    push = np.zeros((2, n_row))
+    ends = np.empty((2, n))
+    trial = np.empty((2, n))
+    weight = np.empty(n)
+    a0 = np.zeros(n)
+    q0 = np.empty(n)
+    v0 = np.empty(n)
+    for d in range(n):
+        q0[d] = model.q0[d]
+        v0[d] = model.v0[d]
+    where[0] = -1
+    t = times[0]
+    drive_state(model, np.int64(0), t, q0, v0)
+    switching = has_switches(model)
+    if switching:
+        singular = start_modes(model, strength, desk, q0, v0, a0, lam)
+        if singular >= 0:
+            where[0] = singular
+            return SINGULAR, 0, 0, t
+    singular = balance(model, strength, np.int64(0), t, q0, v0, np.bool_(True), desk, a0, lam)
+    work[FORCES] += 1
+    if singular >= 0:
+        where[0] = singular
+        return SINGULAR, 0, 0, t
+    relative_pose(pair, q0, v0, rel0)
+    motion = np.zeros(n_pair)
+    noise = np.empty(n_pair)
+    scale = np.empty(n_pair)
+    for p in range(n_pair):
+        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
+        stiffness = desk.sums[p, 7] + desk.sums[p, 11]
+        if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
+            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)  # a pair that starts strained
+    # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0
+    events = np.int64(0)
+    if switching:
+        for i in range(strength.shape[1] - 1):
+            if strength[1, i] != 0.0:
+                if events >= track.event.shape[0]:
+                    return NEEDS_ROOM, 0, 0, t
+                track.event[events, 0] = 0
+                track.event[events, 1] = i
+                track.event[events, 2] = 0
+                track.event[events, 3] = int(strength[1, i])
+                track.salt[events] = 0.0
+                events += 1
+        strength[1, strength.shape[1] - 1] = events
+    last_time = times[times.shape[0] - 1]
+    span = last_time - t
+    wanted = fixed_step if fixed_step > 0.0 else span
+    keep_state(track, 0, t, q0, v0, push[0], push[1])
+    track.index[0, 0] = 0
+    count = np.int64(0)
+    stages = np.int64(0)
+    crowd_time = t
+    crowd = 0
+    for segment in range(times.shape[0] - 1):
+        end = times[segment + 1]
+        if segment > 0:
+            drive_state(model, segment, t, q0, v0)
+            keep_state(track, count, t, q0, v0, track.push[count, 0], track.push[count, 1])
+            if switching:
+                # what begins to act here may stand on either side
+                balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
+                first = events
+                events = log_switches(model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, work)
+                if events < 0:
+                    return NEEDS_ROOM, count, 0, t
+                for e in range(first, events):
+                    track.salt[e] = 0.0  # the time is given
+        while t < end:
+            if count >= limits[0]:
+                return STEP_LIMIT, count, events, t
+            pieces = np.ceil((end - t) / wanted - 1e-9)
+            h = (end - t) / max(pieces, 1.0)
+            lands = pieces <= 1.0
+            if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
+                return STEP_TOO_SMALL, count, events, t
+            if count + 4 > track.t.shape[0] or stages + 2 * s > track.when.shape[0]:
+                return NEEDS_ROOM, count, events, t
+            singular = advance(
+                model, table, s, strength, segment, t, h, q0, v0, keep, stages, desk, lam, q, v, a, track, ends,
+                push, size, work,
+            )  # fmt: skip
+            if singular >= 0:
+                # a step that overshoots a singular place may be too long; a short one stands before it
+                if h < 1e-9 * span:
+                    where[0] = singular
+                    return SINGULAR, count, events, t
+                wanted = 0.25 * h
+                work[REJECTED] += 1
+                continue
+            relative_pose(pair, ends[0], ends[1], rel)
+            widest = 0.0
+            for p in range(n_pair):
+                scale[p] = max(motion[p], deflection(rel, rel0, reach, p))
+                widest = max(widest, scale[p])
+            for p in range(n_pair):
+                scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+            motion_weights(pair, rel, reach, scale, weight)
+            error = _error(table[2], s, h, a, weight)
+            finite = True
+            for d in range(n):
+                finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
+            if fixed_step > 0.0:
+                if not finite:
+                    return NON_FINITE, count, events, t
+            else:
+                if not finite or not error < 1e6:
+                    wanted = 0.1 * h
+                    work[REJECTED] += 1
+                    continue
+                change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
+                wanted = h * min(max(change, 0.1), 4.0)
+                if error > tolerance:
+                    work[REJECTED] += 1
+                    continue
+            happens = False
+            if switching:
+                margin, who = smallest_margin(model, segment, strength, rel)
+                relative_pose(pair, q0, v0, before)
+                high = h
+                if not margin < 0.0:
+                    dip = first_dip(model, segment, strength, before, rel, h)
+                    if dip < 1.0:
+                        high = dip * h
+                        advance(
+                            model, table, s, strength, segment, t, high, q0, v0, no, nowhere, desk, lam, q, v, a, track,
+                            trial, push, size, work,
+                        )  # fmt: skip
+                        relative_pose(pair, trial[0], trial[1], rel)
+                        margin, who = smallest_margin(model, segment, strength, rel)
+                    if not margin < 0.0:
+                        high = h
+                happens = margin < 0.0
+                if happens:
+                    low = 0.0
+                    at_low, _ = smallest_margin(model, segment, strength, before)
+                    at_high = margin
+                    side = 0
+                    for trial_count in range(100):
+                        if high - low <= 4e-16 * (abs(t) + h) or at_high > -1e-300:
+                            break
+                        middle = (low * at_high - high * at_low) / (at_high - at_low)
+                        if trial_count % 3 == 2 and not (high - low < 1e-9 * h):
+                            middle = 0.5 * (low + high)
+                        # a hair beyond the root, so that it ends between two neighbours
+                        middle = min(max(middle, low + 1e-16 * h), high)
+                        if middle <= low or middle >= high:
+                            middle = 0.5 * (low + high)
+                            if middle <= low or middle >= high:
+                                break
+                        advance(
+                            model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
+                            track, trial, push, size, work,
+                        )  # fmt: skip
+                        relative_pose(pair, trial[0], trial[1], rel)
+                        value, who = smallest_margin(model, segment, strength, rel)
+                        if value < 0.0:
+                            high = middle
+                            at_high = value
+                            if side == 1:
+                                at_low *= 0.5
+                            side = 1
+                        else:
+                            low = middle
+                            at_low = value
+                            if side == -1:
+                                at_high *= 0.5
+                            side = -1
+                    h = high
+                    lands = lands and h >= end - t
+                    singular = advance(
+                        model, table, s, strength, segment, t, h, q0, v0, keep, stages, desk, lam, q, v, a,
+                        track, ends, push, size, work,
+                    )  # fmt: skip
+                    relative_pose(pair, ends[0], ends[1], rel)
+            for p in range(n_pair):
+                motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
+            happened = events
+            t = end if lands else t + h
+            for d in range(n):
+                q0[d] = ends[0, d]
+                v0[d] = ends[1, d]
+            track.index[count, 1] = count - 1
+            track.index[count, 2] = segment
+            track.index[count, 3] = happened
+            stages += s
+            count += 1
+            track.index[count, 0] = stages
+            keep_state(track, count, t, q0, v0, push[0], push[1])
+            work[ACCEPTED] += 1
+            if happens:
+                balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
+                events = log_switches(model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, work)
+                if events < 0:
+                    return NEEDS_ROOM, count, 0, t
+                crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0
+                if crowd == 0:
+                    crowd_time = t
+                if crowd > CHATTER:
+                    where[0] = who
+                    return CHATTERING, count, events, t
+            track.index[count, 3] = events
+    return OK, count, events, t

@@ -1,0 +1,86 @@
+"""What Python asks of the joints before anything moves."""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, joint_state, make_desk
+from mdstopo.general.forces import drive_state
+from mdstopo.general.members import scale_general
+from mdstopo.general.model import unpack_general
+from mdstopo.general.projection import project
+from mdstopo.general.runge_kutta import scene_size, start_modes
+from mdstopo.jit import entry
+from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
+
+
+@entry
+def slopes_of(joint, joint_par, q, phi, jac):  # type: ignore[no-untyped-def]
+    """phi (n_joint, 3) and jac (n_joint, 3, 6) of joints (n_joint, 5) with joint_par (n_joint, 12) at q (n,)."""
+    w = np.empty(6)
+    for j in range(joint.shape[0]):
+        for i in range(3):
+            w[i] = q[3 * joint[j, 1] + i]
+            w[3 + i] = q[3 * joint[j, 2] + i]
+        joint_rows(joint[j, 0], joint_par[j], w, phi[j], jac[j])
+
+
+@entry
+def assemble(ints, floats, q, v, move, phi, rates):  # type: ignore[no-untyped-def]
+    """phi, rates (n_joint, 3) = Phi and Phi_q v at the start; with `move`, q, v (n,) are put on the joints first."""
+    model = unpack_general(ints, floats)
+    desk = make_desk(model)
+    drive_state(model, 0, model.times[0], q, v)
+    if move:
+        push = np.zeros((2, model.size[0]))
+        for _ in range(20):
+            project(model, scene_size(model), q, v, desk, push[0], push[1])
+    joint_state(model, q, v, desk)
+    for j in range(model.joint.shape[0]):
+        for r in range(model.joint[j, 4]):
+            phi[j, r] = desk.phi[j, r]
+            rates[j, r] = 0.0
+            for i in range(6):
+                rates[j, r] += desk.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
+
+
+@entry
+def reactions(joint, joint_par, row, q, lam, out):  # type: ignore[no-untyped-def]
+    """out (T, n_joint, 3) = Fx, Fy, M of each joint on its first body at states q (T, n) with lam (T, n_row)."""
+    w = np.empty(6)
+    mine = np.empty(3)
+    for k in range(q.shape[0]):
+        for j in range(joint.shape[0]):
+            for i in range(3):
+                w[i] = q[k, 3 * joint[j, 1] + i]
+                w[3 + i] = q[k, 3 * joint[j, 2] + i]
+                mine[i] = lam[k, row[j, i]] if row[j, i] >= 0 else 0.0
+            joint_reaction(joint[j, 0], joint[j, 4], joint_par[j], w, mine, out[k, j])
+
+
+@entry
+def linearise(ints, floats, alpha, strength, stiffness, mass, rows):  # type: ignore[no-untyped-def]
+    """stiffness, mass (n, n) and rows (n_row, n) = Phi_q of small motion about the start with design alpha (N,)."""
+    model = unpack_general(ints, floats)
+    desk = make_desk(model)
+    n = model.mass.shape[0]
+    q = model.q0.copy()
+    v = model.v0.copy()
+    a = np.zeros(n)
+    lam = np.zeros(model.size[0])
+    scale_general(model.block, model.power, alpha, strength)
+    start_modes(model, strength, desk, q, v, a, lam)
+    balance(model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk, a, lam)
+    for d in range(n):
+        mass[d, d] = model.mass[d]
+        stiffness[d, d - d % 3 + 2] -= desk.turn[d]
+    for p in range(model.pair.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                row = 3 * model.pair[p, i // 3] + i % 3
+                column = 3 * model.pair[p, j // 3] + j % 3
+                stiffness[row, column] += desk.k[p, i, j]
+                mass[row, column] += desk.mass[p, i, j]
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            if model.row[j, r] >= 0:
+                for i in range(6):
+                    rows[model.row[j, r], 3 * model.joint[j, 1 + i // 3] + i % 3] += desk.jac[j, r, i]

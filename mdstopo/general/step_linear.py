@@ -1,0 +1,130 @@
+"""Steps of a general scene, linearised: the reverse step and the tangent step of the explicit methods."""
+
+import numpy as np
+
+from mdstopo.general.balance import factor_matrix, joint_slopes, joint_state, pull_back, push_forward, solve_unknowns
+from mdstopo.general.projection import project_back, project_forward
+from mdstopo.general.track import mass_of
+from mdstopo.integrators.runge_kutta_tables import STAGES
+from mdstopo.integrators.steps import REVERSE
+from mdstopo.jit import kernel
+
+
+@kernel
+def lay_out(model, track, o, desk):  # type: ignore[no-untyped-def]
+    """Put the joints of stage o on the desk, with their slopes; the members' tangents stay in the track."""
+    q = track.stage[o, 0]
+    v = track.stage[o, 1]
+    joint_state(model, q, v, desk)
+    joint_slopes(model, q, v, track.stage[o, 2], track.lam[o], desk)
+
+
+@kernel
+def stage_back(model, track, o, w_q, w_v, desk, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+    """From what pulls on a stage's accelerations and multipliers, z (n,) and y (n_row,), to the virtual displacement of
+    its balance, in place; and what that pulls on the stage's state, added to bar_q, bar_v (n,).
+    """
+    lay_out(model, track, o, desk)
+    factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(True))
+    solve_unknowns(model, desk, z, y)
+    pull_back(model, desk, track.K[o], track.C[o], track.turn[o], z, y, bar_q, bar_v)
+
+
+@kernel
+def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work):  # type: ignore[no-untyped-def]
+    """Pull cotangents lam_q, lam_v (n,) of the end of step w back to its start, in place.
+
+    bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of each stage's q, v, a and lam (no rows: none). Out: z
+    (s, n), the virtual displacement of each stage's balance.
+    """
+    n = lam_q.shape[0]
+    method = 1 if model.size[2] != 0 else 0
+    s = STAGES[method]
+    table = tables[method]
+    o = track.index[w, 0]
+    h = track.t[w + 1] - track.t[w]
+    work[REVERSE] += 1
+    state = track.state[w + 1]
+    push = track.push[w + 1]
+    project_back(model, state[0], state[1], push[0], push[1], desk, lam_q, lam_v)
+    spread = bars.shape[0] > 0
+    u = np.zeros((s, n))
+    g = np.zeros((s, n))
+    for back in range(s):
+        j = s - 1 - back
+        y[:] = 0.0
+        for d in range(n):
+            value = h * h * table[2, 1, j] * lam_q[d] + h * table[2, 2, j] * lam_v[d]
+            for i in range(j + 1, s):
+                value += h * h * table[0, i, j] * u[i, d] + h * table[1, i, j] * g[i, d]
+            if spread:
+                value += bars[j, 2, d]
+                u[j, d] = bars[j, 0, d]
+                g[j, d] = bars[j, 1, d]
+            z[j, d] = value
+        if spread:
+            for r in range(y.shape[0]):
+                y[r] = rows_bar[j, r]
+        stage_back(model, track, o + j, 0.0, 0.0, desk, z[j], y, u[j], g[j])
+        for i in range(model.driven.shape[0]):
+            u[j, model.driven[i]] = 0.0
+            g[j, model.driven[i]] = 0.0
+    for d in range(n):
+        position = lam_q[d]
+        speed = lam_v[d] + h * lam_q[d]
+        for i in range(s):
+            position += u[i, d]
+            speed += h * table[2, 0, i] * u[i, d] + g[i, d]
+        lam_q[d] = position
+        lam_v[d] = speed
+    for i in range(model.driven.shape[0]):
+        lam_q[model.driven[i]] = 0.0
+        lam_v[model.driven[i]] = 0.0
+
+
+@kernel
+def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_changes, desk):  # type: ignore[no-untyped-def]
+    """Push changes dq, dv (n,) of the start of step w and forces (s, n) of its stages to its end, in place.
+
+    Out: stage_changes (s, 3, n), row_changes (s, n_row): of each stage's q, v, a and lam.
+    """
+    n = dq.shape[0]
+    method = 1 if model.size[2] != 0 else 0
+    s = STAGES[method]
+    table = tables[method]
+    o = track.index[w, 0]
+    h = track.t[w + 1] - track.t[w]
+    for i in range(s):
+        x = stage_changes[i]
+        for d in range(n):
+            position = dq[d] + h * table[2, 0, i] * dv[d]
+            speed = dv[d]
+            for j in range(i):
+                position += h * h * table[0, i, j] * stage_changes[j, 2, d]
+                speed += h * table[1, i, j] * stage_changes[j, 2, d]
+            x[0, d] = position if model.free[d] != 0 else 0.0
+            x[1, d] = speed if model.free[d] != 0 else 0.0
+            x[2, d] = force[i, d]
+        row_changes[i] = 0.0
+        stage_forward(model, track, o + i, 0.0, 0.0, desk, x[0], x[1], x[2], row_changes[i])
+    for d in range(n):
+        dq[d] += h * dv[d]
+        for j in range(s):
+            dq[d] += h * h * table[2, 1, j] * stage_changes[j, 2, d]
+            dv[d] += h * table[2, 2, j] * stage_changes[j, 2, d]
+        if model.free[d] == 0:
+            dq[d] = 0.0
+            dv[d] = 0.0
+    state = track.state[w + 1]
+    push = track.push[w + 1]
+    project_forward(model, state[0], state[1], push[0], push[1], desk, dq, dv)
+
+
+@kernel
+def stage_forward(model, track, o, w_q, w_v, desk, dq, dv, force, row):  # type: ignore[no-untyped-def]
+    """force (n,) and row (n_row,), changes of the balance, become those of the accelerations and multipliers of stage o
+    whose state changes by dq, dv."""
+    lay_out(model, track, o, desk)
+    push_forward(model, desk, track.K[o], track.C[o], track.turn[o], dq, dv, force, row)
+    factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(False))
+    solve_unknowns(model, desk, force, row)

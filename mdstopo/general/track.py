@@ -1,0 +1,166 @@
+"""What a simulation of a general scene leaves behind: states, stages with their tangents, events.
+
+A run is m steps. Step k leads from state k to state k + 1 and owns the stages index[k, FIRST] to index[k + 1, FIRST]:
+states at which the balance was imposed. Behind the steps there is room for a partial one (`index[w, PARENT]` is the
+step before step w).
+
+========  ====================  ======================================================================
+t         (m + 1,)              times of the states
+state     (m + 1, 2, n)         q, v, on the joints
+push      (m + 1, 2, n_row)     the multipliers mu, nu that put the state there (`projection`)
+index     (m + 1, 4) integers   first stage; step before; segment; how many events had happened
+when      (S,)                  times of the stages
+stage     (S, 3, n)             q, v, a
+lam       (S, n_row)            multipliers of the joints
+K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters
+turn      (S, n)                slope of the turning loads
+salt      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
+event     (E, 4) integers       the state at which it happened, member (padded), mode before and after
+========  ====================  ======================================================================
+"""
+
+from mdstopo.general.structures import TrackStructure, bundle
+
+from mdstopo.jit import kernel
+
+FIRST, PARENT, SEGMENT, EVENTS = range(4)
+STATE, MEMBER, OLD, NEW = range(4)
+
+TRACK = ("t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "salt", "event")
+
+
+class Track:
+    """Made in kernels only, by `carve_track`."""
+
+
+bundle(Track, TrackStructure, TRACK)
+
+
+def track_room(
+    n: int, n_pair: int, n_row: int, inertial: bool, steps: int, stages: int, events: int
+) -> tuple[int, int]:
+    """Lengths of the flat arrays of floats and integers that `carve_track` needs."""
+    per_stage = 1 + 4 * n + n_row + 72 * n_pair
+    floats = (steps + 1) * (1 + 2 * n + 2 * n_row) + stages * per_stage + events * 3 * n
+    return floats + 36 * n_pair * (stages if inertial else 1), 4 * (steps + 1) + 4 * events
+
+
+@kernel
+def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
+    """A `Track` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are inerters."""
+    n = model.mass.shape[0]
+    n_pair = model.pair.shape[0]
+    n_row = model.size[0]
+    steps = limits[1]
+    stages = limits[2]
+    events = limits[3]
+    index = ints[: 4 * (steps + 1)].reshape((steps + 1, 4))
+    event = ints[4 * (steps + 1) : 4 * (steps + 1) + 4 * events].reshape((events, 4))
+    t = floats[: steps + 1]
+    f = steps + 1
+    state = floats[f : f + 2 * n * (steps + 1)].reshape((steps + 1, 2, n))
+    f += 2 * n * (steps + 1)
+    push = floats[f : f + 2 * n_row * (steps + 1)].reshape((steps + 1, 2, n_row))
+    f += 2 * n_row * (steps + 1)
+    when = floats[f : f + stages]
+    f += stages
+    stage = floats[f : f + 3 * n * stages].reshape((stages, 3, n))
+    f += 3 * n * stages
+    lam = floats[f : f + n_row * stages].reshape((stages, n_row))
+    f += n_row * stages
+    size = 36 * n_pair * stages
+    k = floats[f : f + size].reshape((stages, n_pair, 6, 6))
+    f += size
+    c = floats[f : f + size].reshape((stages, n_pair, 6, 6))
+    f += size
+    turn = floats[f : f + n * stages].reshape((stages, n))
+    f += n * stages
+    salt = floats[f : f + 3 * n * events].reshape((events, 3, n))
+    f += 3 * n * events
+    rows = stages if limits[4] != 0 else 1
+    mass = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
+    return Track(t, state, push, index, when, stage, lam, k, c, mass, turn, salt, event)
+
+
+@kernel
+def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-untyped-def]
+    """Store stage o, and with `tangent` the tangents on the desk."""
+    track.when[o] = t
+    for d in range(q.shape[0]):
+        track.stage[o, 0, d] = q[d]
+        track.stage[o, 1, d] = v[d]
+        track.stage[o, 2, d] = a[d]
+    for r in range(lam.shape[0]):
+        track.lam[o, r] = lam[r]
+    if not tangent:
+        return
+    inertial = track.mass.shape[0] > 1
+    for d in range(q.shape[0]):
+        track.turn[o, d] = desk.turn[d]
+    for p in range(desk.k.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                track.K[o, p, i, j] = desk.k[p, i, j]
+                track.C[o, p, i, j] = desk.c[p, i, j]
+                if inertial:
+                    track.mass[o, p, i, j] = desk.mass[p, i, j]
+
+
+@kernel
+def mass_of(track, o):  # type: ignore[no-untyped-def]
+    """The inerters' mass at stage o."""
+    return track.mass[o if track.mass.shape[0] > 1 else 0]
+
+
+@kernel
+def keep_state(track, k, t, q, v, mu, nu):  # type: ignore[no-untyped-def]
+    """State k and the multipliers that put it on the joints."""
+    track.t[k] = t
+    for d in range(q.shape[0]):
+        track.state[k, 0, d] = q[d]
+        track.state[k, 1, d] = v[d]
+    for r in range(mu.shape[0]):
+        track.push[k, 0, r] = mu[r]
+        track.push[k, 1, r] = nu[r]
+
+
+@kernel
+def restore_modes(track, happened, strength):  # type: ignore[no-untyped-def]
+    """The modes of members as they were after so many events."""
+    e = strength_cursor(strength)
+    while e > happened:
+        e -= 1
+        if track.event[e, 1] >= 0:
+            strength[1, track.event[e, 1]] = track.event[e, 2]
+    while e < happened:
+        if track.event[e, 1] >= 0:
+            strength[1, track.event[e, 1]] = track.event[e, 3]
+        e += 1
+    strength[1, strength.shape[1] - 1] = e
+
+
+@kernel
+def strength_cursor(strength):  # type: ignore[no-untyped-def]
+    """How many events the modes in `strength` include: kept in its last column, which belongs to no member."""
+    return int(strength[1, strength.shape[1] - 1])
+
+
+@kernel
+def step_at(track, count, t):  # type: ignore[no-untyped-def]
+    """The step that holds time t: the last one that begins before it."""
+    low = 0
+    high = count - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if track.t[middle] < t:
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@kernel
+def copy_vector(source, target):  # type: ignore[no-untyped-def]
+    """target = source, one-dimensional."""
+    for i in range(source.shape[0]):
+        target[i] = source[i]

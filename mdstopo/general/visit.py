@@ -1,0 +1,108 @@
+"""What Python calls for finished steps of a general scene: states and responses anywhere on the motion."""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.duties import point_of
+from mdstopo.general.forces import drive_state
+from mdstopo.general.model import unpack_general
+from mdstopo.general.responses import MEMBER_FORCE, largest_force, rated
+from mdstopo.general.track import carve_track, copy_vector, restore_modes
+from mdstopo.jit import entry, kernel
+
+
+@entry
+def visit(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, limits, count, room, room_ints, strength, exact, j, who, places, out, lam_out, seen, work
+):
+    """States, and where j >= 0 response j, at places (K, 2): steps and fractions of them, each on its step's side.
+
+    exact: the method's own motion inside steps, else the quintic through both ends' states and accelerations. who: a
+    member, or -1 for the one with the largest force. Out: out (3, K, n) = q, v, a; lam_out (K, n_row + n_driven), the
+    multipliers of the solved rows, then those of the driven coordinates (what M a + Phi_q^T lam = F leaves to them);
+    seen (K, 3): value, rate, member.
+    """
+    model = unpack_general(ints, floats)
+    track = carve_track(model, limits, room, room_ints)
+    desk = make_desk(model)
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    no = np.bool_(False)
+    bars = np.empty((3, n))
+    row_bar = np.empty(n_row)
+    near = np.empty((4, n))
+    ends = np.empty((6, n))
+    last = -1
+    for i in range(places.shape[0]):
+        k = int(places[i, 0])
+        c = places[i, 1]
+        h = track.t[k + 1] - track.t[k]
+        t = track.t[k + 1] if c >= 1.0 else track.t[k] + c * h
+        q = out[0, i]
+        v = out[1, i]
+        a = out[2, i]
+        lam = lam_out[i, :n_row]
+        segment = track.index[k, 2]
+        restore_modes(track, track.index[k, 3], strength)
+        if c <= 0.0 or c >= 1.0:
+            state = track.state[k if c <= 0.0 else k + 1]
+            copy_vector(state[0], q)
+            copy_vector(state[1], v)
+        elif exact:
+            point_of(tag, model, tables, strength, track, count, k, c, no, desk, q, v, work)
+        else:
+            if k != last:
+                for e in range(2):
+                    copy_vector(track.state[k + e, 0], ends[3 * e])
+                    copy_vector(track.state[k + e, 1], ends[3 * e + 1])
+                    balance(
+                        model, strength, segment, track.t[k + e], ends[3 * e], ends[3 * e + 1], no, desk,
+                        ends[3 * e + 2], lam,
+                    )  # fmt: skip
+                last = k
+            quintic(c, h, ends, q, v)
+        drive_state(model, segment, t, q, v)
+        seen[i, 2] = who
+        if j >= 0 and model.response[j, 0] == MEMBER_FORCE and who < 0:
+            balance(model, strength, segment, t, q, v, no, desk, a, lam)
+            seen[i, 2] = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
+        value, rate = rated(model, strength, segment, j, int(seen[i, 2]), t, h, q, v, desk, a, lam, bars, row_bar, near)
+        seen[i, 0] = value
+        seen[i, 1] = rate
+        for m in range(model.driven.shape[0]):
+            d = model.driven[m]
+            lam_out[i, n_row + m] = desk.f[d] - model.mass[d] * a[d] - held_back(model, desk, d, a, lam)
+
+
+@kernel
+def quintic(c, h, ends, q, v):  # type: ignore[no-untyped-def]
+    """q, v (n,) at fraction c of a step from both ends' positions, velocities and accelerations, ends (6, n)."""
+    for d in range(q.shape[0]):
+        v0 = ends[1, d]
+        a0 = ends[2, d]
+        j = ends[3, d] - ends[0, d] - h * (v0 + 0.5 * h * a0)
+        w = h * (ends[4, d] - v0 - h * a0)
+        b = h * h * (ends[5, d] - a0)
+        x3 = 10.0 * j - 4.0 * w + 0.5 * b
+        x4 = -15.0 * j + 7.0 * w - b
+        x5 = 6.0 * j - 3.0 * w + 0.5 * b
+        q[d] = ends[0, d] + c * (h * v0 + c * (0.5 * h * h * a0 + c * (x3 + c * (x4 + c * x5))))
+        v[d] = v0 + c * (h * a0 + c * (3.0 * x3 + c * (4.0 * x4 + c * 5.0 * x5)) / h)
+
+
+@kernel
+def held_back(model, desk, d, a, lam):  # type: ignore[no-untyped-def]
+    """What inerters and joints take at coordinate d: (sum s b B^T B a + Phi_q^T lam)_d."""
+    total = 0.0
+    for p in range(model.pair.shape[0]):
+        for i in range(6):
+            if 3 * model.pair[p, i // 3] + i % 3 == d:
+                for j in range(6):
+                    total += desk.mass[p, i, j] * a[3 * model.pair[p, j // 3] + j % 3]
+    for j in range(model.joint.shape[0]):
+        for i in range(6):
+            if 3 * model.joint[j, 1 + i // 3] + i % 3 == d:
+                for r in range(3):
+                    if model.row[j, r] >= 0:
+                        total += desk.jac[j, r, i] * lam[model.row[j, r]]
+    return total

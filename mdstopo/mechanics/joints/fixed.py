@@ -1,0 +1,47 @@
+"""The fixed joint: two points coincide, as in the revolute one, and the angle psi_B - psi_A stays theta_0.
+
+Parameters: s_A (2), s_B (2), -, -, theta_0.
+"""
+
+from mdstopo.jit import kernel
+from mdstopo.mechanics.joints.revolute import (
+    revolute_acceleration_slopes,
+    revolute_gamma,
+    revolute_rows,
+    revolute_velocity_slope,
+)
+
+
+@kernel
+def fixed_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
+    """Phi (3) and its slopes; the angle's are constant, so all else is the revolute joint's."""
+    revolute_rows(par, w, phi, jac)
+    phi[2] = w[5] - w[2] - par[6]
+    for i in range(6):
+        jac[2, i] = 0.0
+    jac[2, 2] = -1.0
+    jac[2, 5] = 1.0
+
+
+@kernel
+def fixed_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
+    """The points' centripetal parts; the angle has none."""
+    revolute_gamma(par, w, wd, gamma)
+    gamma[2] = 0.0
+
+
+@kernel
+def fixed_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
+    """d(Phi_q v)/dq; the angle's row is zero."""
+    revolute_velocity_slope(par, w, wd, out)
+    for i in range(6):
+        out[2, i] = 0.0
+
+
+@kernel
+def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+    """d(Phi_q a + gamma)/dq and d(gamma)/dv; the angle's rows are zero."""
+    revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
+    for i in range(6):
+        by_q[2, i] = 0.0
+        by_v[2, i] = 0.0

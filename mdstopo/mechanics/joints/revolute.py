@@ -1,0 +1,89 @@
+"""The revolute joint: two points coincide. Phi = x_B + c - x_A - p with the arms p = R_A s_A, c = R_B s_B (global axes).
+
+Parameters: s_A (2), s_B (2). Used by the fixed joint too, which adds a row of its own.
+"""
+
+import math
+
+from mdstopo.jit import kernel
+
+
+@kernel
+def arms(par, w):  # type: ignore[no-untyped-def]
+    """px, py, cx, cy: the points relative to their centres of mass, global axes."""
+    ca = math.cos(w[2])
+    sa = math.sin(w[2])
+    cb = math.cos(w[5])
+    sb = math.sin(w[5])
+    return (
+        ca * par[0] - sa * par[1],
+        sa * par[0] + ca * par[1],
+        cb * par[2] - sb * par[3],
+        sb * par[2] + cb * par[3],
+    )
+
+
+@kernel
+def revolute_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
+    """Phi (2) and its slopes."""
+    px, py, cx, cy = arms(par, w)
+    phi[0] = w[3] + cx - w[0] - px
+    phi[1] = w[4] + cy - w[1] - py
+    for r in range(2):
+        for i in range(6):
+            jac[r, i] = 0.0
+        jac[r, r] = -1.0
+        jac[r, 3 + r] = 1.0
+    jac[0, 2] = py
+    jac[0, 5] = -cy
+    jac[1, 2] = -px
+    jac[1, 5] = cx
+
+
+@kernel
+def revolute_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
+    """Centripetal parts of the second derivative."""
+    px, py, cx, cy = arms(par, w)
+    gamma[0] = wd[2] * wd[2] * px - wd[5] * wd[5] * cx
+    gamma[1] = wd[2] * wd[2] * py - wd[5] * wd[5] * cy
+
+
+@kernel
+def revolute_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
+    """d(Phi_q v)/dq: only the arms turn."""
+    px, py, cx, cy = arms(par, w)
+    for r in range(2):
+        for i in range(6):
+            out[r, i] = 0.0
+    out[0, 2] = wd[2] * px
+    out[0, 5] = -wd[5] * cx
+    out[1, 2] = wd[2] * py
+    out[1, 5] = -wd[5] * cy
+
+
+@kernel
+def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+    """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
+    px, py, cx, cy = arms(par, w)
+    for r in range(2):
+        for i in range(6):
+            by_q[r, i] = 0.0
+            by_v[r, i] = 0.0
+    wa = wd[2]
+    wb = wd[5]
+    by_q[0, 2] = wdd[2] * px - wa * wa * py
+    by_q[0, 5] = -wdd[5] * cx + wb * wb * cy
+    by_q[1, 2] = wdd[2] * py + wa * wa * px
+    by_q[1, 5] = -wdd[5] * cy - wb * wb * cx
+    by_v[0, 2] = 2.0 * wa * px
+    by_v[0, 5] = -2.0 * wb * cx
+    by_v[1, 2] = 2.0 * wa * py
+    by_v[1, 5] = -2.0 * wb * cy
+
+
+@kernel
+def revolute_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
+    """k += d(Phi_q^T lam)/dq."""
+    px, py, cx, cy = arms(par, w)
+    k[2, 2] += lam[0] * px + lam[1] * py
+    k[5, 5] -= lam[0] * cx + lam[1] * cy

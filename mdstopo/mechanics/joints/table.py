@@ -1,0 +1,171 @@
+"""The joints: what each contributes to the constrained equations, by its code, and its parameters from the case.
+
+w, wd, wdd (6,): coordinates of the first and the second body, and their time derivatives. The equations of motion are
+M a + Phi_q^T lam = F, so the force of a joint on its first body is -Phi_q^T lam.
+"""
+
+import math
+
+import numpy as np
+
+from mdstopo.case.model import DistanceJoint, Joint, PrismaticJoint
+from mdstopo.jit import kernel
+from mdstopo.mechanics.joints.distance import (
+    distance_acceleration_slopes,
+    distance_gamma,
+    distance_rows,
+    distance_stiffness,
+    distance_velocity_slope,
+)
+from mdstopo.mechanics.joints.fixed import (
+    fixed_acceleration_slopes,
+    fixed_gamma,
+    fixed_rows,
+    fixed_velocity_slope,
+)
+from mdstopo.mechanics.joints.prismatic import (
+    prismatic_acceleration_slopes,
+    prismatic_gamma,
+    prismatic_moment,
+    prismatic_rows,
+    prismatic_stiffness,
+    prismatic_velocity_slope,
+)
+from mdstopo.mechanics.joints.revolute import (
+    arms,
+    revolute_acceleration_slopes,
+    revolute_gamma,
+    revolute_rows,
+    revolute_stiffness,
+    revolute_velocity_slope,
+)
+
+REVOLUTE, PRISMATIC, FIXED, DISTANCE = range(4)
+CODES = {"revolute": REVOLUTE, "prismatic": PRISMATIC, "fixed": FIXED, "distance": DISTANCE}
+ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
+WIDTH = 12
+
+
+def parameters(joint: Joint, angle_first: float, angle_second: float) -> list[float]:
+    """The parameter row (WIDTH,) of a joint between bodies that start at these angles (rad)."""
+    row = [*joint.at_first, *joint.at_second, 0.0, 0.0, angle_second - angle_first]
+    row += [0.0] * (WIDTH - len(row))
+    if isinstance(joint, PrismaticJoint):
+        row[4], row[5] = -joint.axis[1], joint.axis[0]
+    elif isinstance(joint, DistanceJoint):
+        row[7] = joint.length
+    return row
+
+
+def describe(joint: Joint) -> str:
+    """A joint in words."""
+    name = f"{joint.name} " if not joint.name.isdigit() else f"joints[{joint.index}] "
+    return f"joint {name}({joint.type}, between {joint.bodies[0]} and {joint.bodies[1]})"
+
+
+@kernel
+def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
+    """phi (3,) and jac (3, 6) = Phi_q; rows that the joint has not are left as they are."""
+    if code == REVOLUTE:
+        revolute_rows(par, w, phi, jac)
+    elif code == PRISMATIC:
+        prismatic_rows(par, w, phi, jac)
+    elif code == FIXED:
+        fixed_rows(par, w, phi, jac)
+    else:
+        distance_rows(par, w, phi, jac)
+
+
+@kernel
+def joint_gamma(code, par, w, wd, gamma):  # type: ignore[no-untyped-def]
+    """gamma (3,) of Phi_q a + gamma = 0."""
+    if code == REVOLUTE:
+        revolute_gamma(par, w, wd, gamma)
+    elif code == FIXED:
+        fixed_gamma(par, w, wd, gamma)
+    elif code == PRISMATIC:
+        prismatic_gamma(par, w, wd, gamma)
+    else:
+        distance_gamma(par, w, wd, gamma)
+
+
+@kernel
+def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
+    """out (3, 6) = d(Phi_q v)/dq."""
+    if code == REVOLUTE:
+        revolute_velocity_slope(par, w, wd, out)
+    elif code == FIXED:
+        fixed_velocity_slope(par, w, wd, out)
+    elif code == PRISMATIC:
+        prismatic_velocity_slope(par, w, wd, out)
+    else:
+        distance_velocity_slope(par, w, wd, out)
+
+
+@kernel
+def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+    """by_q, by_v (3, 6): slopes of Phi_q a + gamma at fixed a."""
+    if code == REVOLUTE:
+        revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
+    elif code == FIXED:
+        fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
+    elif code == PRISMATIC:
+        prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
+    else:
+        distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
+
+
+@kernel
+def joint_stiffness(code, par, w, lam, k):  # type: ignore[no-untyped-def]
+    """k (6, 6) += d(Phi_q^T lam)/dq."""
+    if code == REVOLUTE or code == FIXED:
+        revolute_stiffness(par, w, lam, k)
+    elif code == PRISMATIC:
+        prismatic_stiffness(par, w, lam, k)
+    else:
+        distance_stiffness(par, w, lam, k)
+
+
+@kernel
+def joint_reaction(code, rows, par, w, lam, out):  # type: ignore[no-untyped-def]
+    """out (3,) = Fx, Fy, M on the first body at its joint point, global axes: -Phi_q^T lam, moved there."""
+    phi = np.zeros(3)
+    jac = np.zeros((3, 6))
+    joint_rows(code, par, w, phi, jac)
+    px, py, _, _ = arms(par, w)
+    for i in range(3):
+        out[i] = 0.0
+        for r in range(rows):
+            out[i] -= jac[r, i] * lam[r]
+    out[2] -= px * out[1] - py * out[0]
+
+
+@kernel
+def joint_transmitted(code, par, w, lam, which, by_lam, by_q):  # type: ignore[no-untyped-def]
+    """Norm of the force (which 0) or the moment (1) that a joint transmits, at the first body's joint point.
+
+    Out: its slopes by_lam (3,), by_q (6,); zero where the norm is.
+    """
+    by_lam[:] = 0.0
+    by_q[:] = 0.0
+    if which == 0:
+        if code == REVOLUTE or code == FIXED:
+            size = math.hypot(lam[0], lam[1])
+            if size > 0.0:
+                by_lam[0] = lam[0] / size
+                by_lam[1] = lam[1] / size
+            return size
+        by_lam[0] = np.sign(lam[0])
+        return abs(lam[0])
+    if code == FIXED:
+        by_lam[2] = np.sign(lam[2])
+        return abs(lam[2])
+    if code == PRISMATIC:
+        moment = prismatic_moment(par, w, lam, by_lam, by_q)
+        sign = np.sign(moment)
+        for i in range(3):
+            by_lam[i] *= sign
+        for i in range(6):
+            by_q[i] *= sign
+        return abs(moment)
+    return 0.0

@@ -1,0 +1,58 @@
+"""`actuator`: f = clip(kp (x - target) + kd x', -limit, limit). Parameters: kp, kd, target, limit (0: none).
+
+Modes: linear, held at +limit, held at -limit.
+"""
+
+from mdstopo.jit import inline
+
+LINEAR, UPPER, LOWER = range(3)
+
+
+@inline
+def actuator_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """f, f_x, f_xd, V, V_x."""
+    if mode == UPPER:
+        return p[3], 0.0, 0.0, 0.0, 0.0
+    if mode == LOWER:
+        return -p[3], 0.0, 0.0, 0.0, 0.0
+    return p[0] * (x - p[2]) + p[1] * xd, p[0], p[1], 0.0, 0.0
+
+
+@inline
+def actuator_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """How far the mode is from its end, in parts of the limit."""
+    f = (p[0] * (x - p[2]) + p[1] * xd) / p[3]
+    if mode == UPPER:
+        return f - 1.0
+    if mode == LOWER:
+        return -1.0 - f
+    return 1.0 - abs(f)
+
+
+@inline
+def actuator_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """Slopes of the margin by x and xd."""
+    f = p[0] * (x - p[2]) + p[1] * xd
+    sign = 1.0 / p[3]
+    if mode == LOWER or (mode == LINEAR and f >= 0.0):
+        sign = -sign
+    return sign * p[0], sign * p[1]
+
+
+@inline
+def actuator_start(p, x, xd):  # type: ignore[no-untyped-def]
+    """The mode by the force alone: it is continuous at both limits."""
+    f = p[0] * (x - p[2]) + p[1] * xd
+    if f > p[3]:
+        return UPPER
+    if f < -p[3]:
+        return LOWER
+    return LINEAR
+
+
+@inline
+def actuator_next(p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """The mode behind the end of this one."""
+    if mode != LINEAR:
+        return LINEAR
+    return UPPER if p[0] * (x - p[2]) + p[1] * xd > 0.0 else LOWER

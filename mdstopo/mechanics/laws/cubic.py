@@ -1,0 +1,11 @@
+"""`cubic`: f = k1 x + k3 x^3, V = k1 x^2/2 + k3 x^4/4. Parameters: k1, k3."""
+
+from mdstopo.jit import inline
+
+
+@inline
+def cubic_force(p, x):  # type: ignore[no-untyped-def]
+    """f, f_x, f_xd, V, V_x."""
+    square = x * x
+    f = x * (p[0] + p[1] * square)
+    return f, p[0] + 3.0 * p[1] * square, 0.0, square * (0.5 * p[0] + 0.25 * p[1] * square), f

@@ -1,0 +1,10 @@
+"""`spring` (Eq. 2) in scalar form: f = k x + c x' + preload, V = k x^2/2. Parameters: k, c, preload."""
+
+from mdstopo.jit import inline
+
+
+@inline
+def linear_force(p, x, xd):  # type: ignore[no-untyped-def]
+    """f, f_x, f_xd, V, V_x."""
+    pull = p[0] * x
+    return pull + p[1] * xd + p[2], p[0], p[1], 0.5 * pull * x, pull

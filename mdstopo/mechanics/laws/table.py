@@ -1,0 +1,157 @@
+"""The member laws of the format: by code in kernels, by record in Python.
+
+A law gives f, f_x, f_xd, V, V_x from its parameters p (PARAMETERS,), elongation x = Delta, rate xd = dDelta/dt, its
+mode, the time t, the present `value` of a tabulated force, and the scene's `curves`. A law that switches is smooth
+within a mode; its margin is not negative as long as the mode holds. The inerter's force needs accelerations and is part
+of the mass (`general.forces`).
+"""
+
+import numpy as np
+
+from mdstopo.case.laws import ActuatorLaw, CubicLaw, CurveLaw, GapLaw, InerterLaw, Law, PulseLaw, SpringLaw, TableLaw
+from mdstopo.jit import inline
+from mdstopo.mechanics.laws.actuator import (
+    actuator_force,
+    actuator_margin,
+    actuator_margin_slopes,
+    actuator_next,
+    actuator_start,
+)
+from mdstopo.mechanics.laws.cubic import cubic_force
+from mdstopo.mechanics.laws.curve import curve_data, curve_force
+from mdstopo.mechanics.laws.gap import gap_force, gap_jumps, gap_margin, gap_margin_slopes, gap_next, gap_start
+from mdstopo.mechanics.laws.linear import linear_force
+from mdstopo.mechanics.laws.pulse import pulse_force, pulse_landings
+
+PARAMETERS = 8
+SPRING, GAP, CUBIC, CURVE, PULSE, TABLE, ACTUATOR = range(7)
+#: an inerter is no function of elongation and rate
+INERTER = -1
+CODES = {
+    "spring": SPRING,
+    "gap": GAP,
+    "cubic": CUBIC,
+    "curve": CURVE,
+    "pulse": PULSE,
+    "table": TABLE,
+    "actuator": ACTUATOR,
+    "inerter": INERTER,
+}
+
+
+@inline
+def law(code, p, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
+    """f, f_x, f_xd, V, V_x."""
+    if code == SPRING:
+        return linear_force(p, x, xd)
+    if code == GAP:
+        return gap_force(p, x, xd, mode)
+    if code == CUBIC:
+        return cubic_force(p, x)
+    if code == CURVE:
+        return curve_force(p, x, curves)
+    if code == PULSE:
+        return pulse_force(p, t)
+    if code == TABLE:
+        return value, 0.0, 0.0, 0.0, 0.0
+    return actuator_force(p, x, xd, mode)
+
+
+@inline
+def law_switches(code, p):  # type: ignore[no-untyped-def]
+    """Whether the law has more than one mode."""
+    return code == GAP or (code == ACTUATOR and p[3] > 0.0)
+
+
+@inline
+def law_margin(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """How far the mode is from its end; infinite where a law has one mode only."""
+    if code == GAP:
+        return gap_margin(p, x, xd, mode)
+    if code == ACTUATOR and p[3] > 0.0:
+        return actuator_margin(p, x, xd, mode)
+    return np.inf
+
+
+@inline
+def law_margin_slopes(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """Slopes of the margin by x and xd."""
+    if code == GAP:
+        return gap_margin_slopes(p, x, xd, mode)
+    if code == ACTUATOR and p[3] > 0.0:
+        return actuator_margin_slopes(p, x, xd, mode)
+    return 0.0, 0.0
+
+
+@inline
+def law_next(code, p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
+    """The mode to go to where the margin is used up."""
+    if code == GAP:
+        return gap_next(p, x, xd, xdd, mode)
+    return actuator_next(p, x, xd, mode)
+
+
+@inline
+def law_start(code, p, x, xd, xdd):  # type: ignore[no-untyped-def]
+    """The mode at the start of the motion."""
+    if code == GAP:
+        return gap_start(p, x, xd, xdd)
+    if code == ACTUATOR and p[3] > 0.0:
+        return actuator_start(p, x, xd)
+    return 0
+
+
+@inline
+def law_jumps(code, p, before, after):  # type: ignore[no-untyped-def]
+    """Whether the force may jump where the mode changes so."""
+    return code == GAP and gap_jumps(p, before, after)
+
+
+def parameters(record: Law, curves: list[float]) -> list[float]:
+    """The row (PARAMETERS,) of a law as the case states it; what it keeps in `curves` is appended there."""
+    row: list[float]
+    match record:
+        case SpringLaw():
+            row = [record.stiffness, record.damping, record.preload]
+        case GapLaw():
+            side = 1.0 if record.side == "tension" else -1.0
+            row = [record.stiffness, record.damping, record.gap, side, float(record.clip)]
+        case CubicLaw():
+            row = [record.stiffness, record.cubic]
+        case CurveLaw():
+            row, data = curve_data(record.curve, len(curves))
+            curves += data
+        case PulseLaw():
+            row = [record.peak, record.rate, record.time]
+        case TableLaw():
+            row = []
+        case ActuatorLaw():
+            limit = 0.0 if record.limit is None else record.limit
+            row = [record.proportional, record.derivative, record.target, limit]
+        case InerterLaw():
+            row = [record.inertance]
+        case _:
+            raise TypeError(f"no kernel for the law {record.type!r}")
+    return row + [0.0] * (PARAMETERS - len(row))
+
+
+def depends_on_rate(record: Law) -> bool:
+    """Whether a law's force depends on velocities."""
+    match record:
+        case SpringLaw() | GapLaw():
+            return record.damping > 0.0
+        case ActuatorLaw():
+            return record.derivative != 0.0
+        case InerterLaw():
+            return True
+    return False
+
+
+def landings(record: Law) -> list[float]:
+    """Times at which a law's force has a kink, a jump or a narrow peak."""
+    times = [t for t in (record.active_from, record.active_until) if t is not None]
+    if isinstance(record, TableLaw):
+        times += record.table.times.tolist()
+    if isinstance(record, PulseLaw):
+        times += pulse_landings(record.rate, record.time)
+    return times

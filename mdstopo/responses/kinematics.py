@@ -1,0 +1,146 @@
+"""Motion of a point, or of an angle, of body b as an observer riding on body r sees it.
+
+    p = R_r^T u,   u = x_b + c - x_r,  c = R_b s;      displacement p - p(start), velocity p', acceleration p''
+
+With A = R_r^T, J the quarter turn and w the turning rate of r:
+
+    p' = A (u' - w J u),     p'' = A (u'' - 2 w J u' - w' J u - w^2 u)
+
+The slopes follow by c_psi = J c, A_psi = -A J, and for c' = w_b J c, c'' = w_b' J c - w_b^2 c.
+"""
+
+import math
+
+from mdstopo.jit import kernel
+
+X, Y, NORM = range(3)
+DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
+
+
+@kernel
+def point_start(s, qb, qr, out):  # type: ignore[no-untyped-def]
+    """out (2,) = the point's coordinates in r's frame."""
+    cb = math.cos(qb[2])
+    sb = math.sin(qb[2])
+    cr = math.cos(qr[2])
+    sr = math.sin(qr[2])
+    ux = qb[0] + cb * s[0] - sb * s[1] - qr[0]
+    uy = qb[1] + sb * s[0] + cb * s[1] - qr[1]
+    out[0] = cr * ux + sr * uy
+    out[1] = cr * uy - sr * ux
+
+
+@kernel
+def point_response(order, component, s, start, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
+    """The response; slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r. The norm's slope is zero where the norm is."""
+    cb = math.cos(qb[2])
+    sb = math.sin(qb[2])
+    ca = math.cos(qr[2])
+    sa = math.sin(qr[2])
+    cx = cb * s[0] - sb * s[1]
+    cy = sb * s[0] + cb * s[1]
+    ux = qb[0] + cx - qr[0]
+    uy = qb[1] + cy - qr[1]
+    wb = vb[2]
+    w = vr[2]
+    # global vector y, whose components along r's axes are looked at
+    if order == DISPLACEMENT:
+        yx = ux
+        yy = uy
+    else:
+        dx = vb[0] - wb * cy - vr[0]
+        dy = vb[1] + wb * cx - vr[1]
+        yx = dx + w * uy
+        yy = dy - w * ux
+        if order == ACCELERATION:
+            ddx = ab[0] - ab[2] * cy - wb * wb * cx - ar[0]
+            ddy = ab[1] + ab[2] * cx - wb * wb * cy - ar[1]
+            yx = ddx + 2.0 * w * dy + ar[2] * uy - w * w * ux
+            yy = ddy - 2.0 * w * dx - ar[2] * ux - w * w * uy
+    gx = ca * yx + sa * yy
+    gy = ca * yy - sa * yx
+    if order == DISPLACEMENT:
+        gx -= start[0]
+        gy -= start[1]
+    # the weights of the two components
+    if component == X:
+        value = gx
+        ex = 1.0
+        ey = 0.0
+    elif component == Y:
+        value = gy
+        ex = 0.0
+        ey = 1.0
+    else:
+        value = math.sqrt(gx * gx + gy * gy)
+        ex = gx / value if value > 0.0 else 0.0
+        ey = gy / value if value > 0.0 else 0.0
+    # in global axes: dg = e . dy, and r's own turning turns y against its axes
+    nx = ca * ex - sa * ey
+    ny = sa * ex + ca * ey
+    for i in range(6):
+        for j in range(3):
+            slope[i, j] = 0.0
+    slope[3, 2] = nx * yy - ny * yx
+    if order == DISPLACEMENT:
+        slope[0, 0] = nx
+        slope[0, 1] = ny
+        slope[0, 2] = ny * cx - nx * cy
+        slope[3, 0] = -nx
+        slope[3, 1] = -ny
+        return value
+    if order == VELOCITY:
+        # y = u' - w J u:  by u' n, by u  w (ny', ..): y_x = .. + w u_y, y_y = .. - w u_x
+        px = -w * ny
+        py = w * nx
+        slope[0, 0] = px
+        slope[0, 1] = py
+        slope[0, 2] = py * cx - px * cy - wb * (nx * cx + ny * cy)
+        slope[1, 0] = nx
+        slope[1, 1] = ny
+        slope[1, 2] = ny * cx - nx * cy
+        slope[3, 0] = -px
+        slope[3, 1] = -py
+        slope[4, 0] = -nx
+        slope[4, 1] = -ny
+        slope[4, 2] = nx * uy - ny * ux
+        return value
+    # by u, u' and u''
+    px = -ar[2] * ny - w * w * nx
+    py = ar[2] * nx - w * w * ny
+    vx = -2.0 * w * ny
+    vy = 2.0 * w * nx
+    along = nx * cx + ny * cy
+    slope[0, 0] = px
+    slope[0, 1] = py
+    slope[0, 2] = py * cx - px * cy - wb * (vx * cx + vy * cy) - ab[2] * along - wb * wb * (ny * cx - nx * cy)
+    slope[1, 0] = vx
+    slope[1, 1] = vy
+    slope[1, 2] = vy * cx - vx * cy - 2.0 * wb * along
+    slope[2, 0] = nx
+    slope[2, 1] = ny
+    slope[2, 2] = ny * cx - nx * cy
+    slope[3, 0] = -px
+    slope[3, 1] = -py
+    slope[4, 0] = -vx
+    slope[4, 1] = -vy
+    slope[4, 2] = 2.0 * (nx * dy - ny * dx) - 2.0 * w * (nx * ux + ny * uy)
+    slope[5, 0] = -nx
+    slope[5, 1] = -ny
+    slope[5, 2] = nx * uy - ny * ux
+    return value
+
+
+@kernel
+def angle_response(order, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
+    """psi_b - psi_r, unwrapped, or its first or second derivative; slope as in `point_response`."""
+    for i in range(6):
+        for j in range(3):
+            slope[i, j] = 0.0
+    slope[order, 2] = 1.0
+    slope[3 + order, 2] = -1.0
+    if order == DISPLACEMENT:
+        return qb[2] - qr[2]
+    if order == VELOCITY:
+        return vb[2] - vr[2]
+    return ab[2] - ar[2]

@@ -1,0 +1,39 @@
+"""Which family of kernels a case needs: that of springs between free bodies, or the general one."""
+
+from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
+
+#: reductions of stored energy that the first family computes
+_REDUCTIONS = frozenset({"max", "min", "mean", "integral", "final"})
+
+
+def beyond_springs(case: Case) -> str:
+    """What in the case only the general kernels compute, in words; empty where nothing is."""
+    if case.joints:
+        return "joints"
+    if case.bushings:
+        return "bushings"
+    if any(load_case.motions for load_case in case.load_cases):
+        return "prescribed motions"
+    for group in case.members:
+        found = _law(group)
+        if found:
+            return found
+    for objective in case.objectives:
+        if objective.response.kind != "energy":
+            return f"the response {objective.response.kind}"
+        if objective.over_time not in _REDUCTIONS:
+            return f"over_time: {objective.over_time}"
+    if any(isinstance(row, ResponseRow) for row in case.constraints):
+        return "constraints on a response"
+    return ""
+
+
+def _law(group: MemberGroup) -> str:
+    if len(group.laws) > 1:
+        return "a list of laws"
+    for law in group.laws:
+        if not isinstance(law, SpringLaw):
+            return f"the law {law.type}"
+        if law.active_from is not None or law.active_until is not None:
+            return "a law that acts for a time"
+    return ""
