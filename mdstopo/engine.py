@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mdstopo.general.compile import GeneralScene
     from mdstopo.general.driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
+    from mdstopo.sensitivity.methods import Differentiated
 
     AnyScene = Scene | GeneralScene
     AnyDriver = Driver | GeneralDriver
@@ -121,10 +122,7 @@ class Evaluator:
             for j, key in enumerate(objectives):
                 looked[key] = _peaks(result, j, exact)
             if gradient and not exact:
-                from mdstopo.sensitivity.methods import differentiate
-
-                assert isinstance(driver, Driver)  # the general kernels know the adjoint only (`refusals`)
-                found = differentiate(method, driver, design, result)
+                found = _differentiate(method, driver, design, result)
                 status, message = found.status, found.message or message
                 if not status.ok:
                     counts += driver.work
@@ -264,9 +262,9 @@ class Evaluator:
             rows = rows.copy()
             for key in self._limited:
                 i = int(key[len("constraints[") : -1])
-                first = looked[key][0]
-                constraints[i] = first.value - self._bounds[i]
-                rows[i] = np.nan if first.gradient is None else first.gradient
+                peak = looked[key][0]
+                constraints[i] = peak.value - self._bounds[i]
+                rows[i] = np.nan if peak.gradient is None else peak.gradient
         return Evaluation(
             objectives={name: looked[name][0].value for name in names},
             gradients=gradients,
@@ -290,6 +288,15 @@ def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
     order = state_order(case)
     shared = compile_members(case, {name: i for i, name in enumerate(order)})
     return {load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases}
+
+
+def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked: Looked) -> "Differentiated":
+    """Gradients by another method than the adjoint one."""
+    from mdstopo.sensitivity.methods import Differentiated, differentiate
+
+    if isinstance(driver, Driver):
+        return differentiate(method, driver, design, looked)
+    return Differentiated(Status.OK, "", driver.differentiate(method, design, looked))
 
 
 def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:

@@ -80,8 +80,11 @@ class Beside:
 def compile_looking(integrator: str) -> None:
     """Compile here what looks at the steps of an integrator: the work of the other process."""
     from mdstopo.engine import Evaluator
+    from mdstopo.integrators.driver import Driver
 
-    Evaluator(_tiny(integrator), beside=False).driver("default").compile_looking()
+    driver = Evaluator(_tiny(integrator), beside=False).driver("default")
+    assert isinstance(driver, Driver)
+    driver.compile_looking()
 
 
 def _tiny(integrator: str) -> "Case":

@@ -187,11 +187,15 @@ def _difference(
 
 def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", datasets: dict[str, Any]) -> str:
     """Add the histories dg(t)/dalpha; why there are none, where there are none."""
+    from mdstopo.integrators.driver import Driver
     from mdstopo.sensitivity.methods import histories
     from mdstopo.store.contents import sensitivity_part
 
     for objective in case.objectives:
-        status, t, rows = histories(engine.driver(objective.load_case), engine.design(alpha))
+        driver = engine.driver(objective.load_case)
+        if not isinstance(driver, Driver):
+            return f"history: not computed with {engine.beyond}"
+        status, t, rows = histories(driver, engine.design(alpha))
         if not status.ok:
             return f"history: {status.value}"
         datasets[f"trajectories/{objective.load_case}/t"] = t

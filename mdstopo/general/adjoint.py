@@ -2,8 +2,9 @@
 
 A row of `extremes` (or an integral over all stages) pulls on states, accelerations and multipliers. What pulls on
 accelerations and multipliers goes through the transposed balance and leaves a virtual displacement z; so does every
-stage of every step on the way back. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum f_i (b_i . T z). An event on the
-way changes the cotangents by saltation (`events`); a peak at an event is not stationary and adds (dg/dt) dt_e/dalpha.
+stage of every step on the way back. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum f_i (b_i . T z). An event on
+the way changes the cotangents by saltation (`events`); a peak at an event is not stationary and adds
+(dg/dt) dt_e/dalpha.
 """
 
 import numpy as np
@@ -156,15 +157,27 @@ def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_ba
 def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, work):  # type: ignore[no-untyped-def]
     """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu."""
     n = model.mass.shape[0]
+    bars = np.empty((3, n))
+    none = np.empty((0, 3, n))
+    no_rows = np.empty((0, model.size[0]))
+    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, out, work)
+    if w >= 0:
+        sweep(tag, model, tables, strength, track, w, c, bars[0], bars[1], none, no_rows, desk, out, work)
+
+
+@kernel
+def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, out, work):  # type: ignore[no-untyped-def]
+    """What a row pulls on the state where it is read: bars (3, n), q and v (a is used up); and on the members there.
+
+    Returns the step (-1: the start) and its fraction to which the cotangents belong; out (M_padded,) is set.
+    """
+    n = model.mass.shape[0]
     n_row = model.size[0]
     q = np.empty(n)
     v = np.empty(n)
     a = np.empty(n)
     lam = np.empty(n_row)
-    bars = np.empty((3, n))
     row_bar = np.empty(n_row)
-    none = np.empty((0, 3, n))
-    no_rows = np.empty((0, n_row))
     out[:] = 0.0
     k = int(row[2])
     c = row[3]
@@ -202,9 +215,7 @@ def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, 
             for d in range(n):
                 bars[0, d] -= row[4] * track.salt[event, 0, d]
                 bars[1, d] -= row[4] * track.salt[event, 1, d]
-    if w >= 0:
-        fraction = c if w == k else 1.0
-        sweep(tag, model, tables, strength, track, w, fraction, bars[0], bars[1], none, no_rows, desk, out, work)
+    return w, (c if w == k else 1.0)
 
 
 @kernel
@@ -222,10 +233,29 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
 def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, out, work):  # type: ignore[no-untyped-def]
     """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out."""
     n = model.mass.shape[0]
+    stages = track.index[count, 0] if gradient else 0
+    bars = np.zeros((stages, 3, n))
+    rows_bar = np.zeros((stages, model.size[0]))
+    total = integral_cotangents(tag, model, tables, strength, track, count, j, square, bars, rows_bar, desk, out, work)
+    if gradient:
+        lam_q = np.zeros(n)
+        lam_v = np.zeros(n)
+        sweep(tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, desk, out, work)
+    return total
+
+
+@kernel
+def integral_cotangents(tag, model, tables, strength, track, count, j, square, bars, rows_bar, desk, out, work):  # type: ignore[no-untyped-def]
+    """The integral over time of g_j (or of its square), by the weights of the stages.
+
+    Out, unless bars has no rows: bars (S, 3, n), rows_bar (S, n_row), its cotangents of the stages' states,
+    accelerations and multipliers; out (M_padded,), its explicit derivative by alpha^mu.
+    """
+    n = model.mass.shape[0]
     n_row = model.size[0]
-    stages = track.index[count, 0]
-    bars = np.zeros((stages if gradient else 1, 3, n))
-    rows_bar = np.zeros((stages if gradient else 1, n_row))
+    gradient = bars.shape[0] > 0
+    own = np.zeros((3, n))
+    own_rows = np.zeros(n_row)
     weight = np.zeros(17)
     total = 0.0
     out[:] = 0.0
@@ -241,7 +271,6 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
                 continue
             stage = track.stage[o + i]
             t = track.when[o + i]
-            at = o + i if gradient else 0
             general_forces(
                 model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk.rel, desk.sums, desk.f,
                 desk.k, desk.c, desk.turn,
@@ -250,23 +279,18 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
             if model.response[j, 0] == MEMBER_FORCE:
                 who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
             value = response(
-                model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[o + i], desk,
-                bars[at], rows_bar[at],
-            )  # fmt: skip
+                model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[o + i], desk, own, own_rows
+            )
             factor = weight[i] * (2.0 * value if square else 1.0)
             total += weight[i] * (value * value if square else value)
             if not gradient:
                 continue
             for part in range(3):
                 for d in range(n):
-                    bars[at, part, d] *= factor
+                    bars[o + i, part, d] = factor * own[part, d]
             for r in range(n_row):
-                rows_bar[at, r] *= factor
+                rows_bar[o + i, r] = factor * own_rows[r]
             if energy:
                 add_design(model, segment, t, strength, stage[0], stage[1], stage[2], none, factor, out, work)
             explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor, out)
-    if gradient:
-        lam_q = np.zeros(n)
-        lam_v = np.zeros(n)
-        sweep(tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, desk, out, work)
     return total

@@ -12,6 +12,8 @@ is the matrix of an implicit step and, transposed, that of the reverse sweep. K 
 joints (d(Phi_q^T lam)/dq) and inerters, G_q and G_v the slopes of Phi_q a + gamma.
 """
 
+from typing import Any
+
 import numpy as np
 
 from mdstopo.general.forces import (
@@ -45,6 +47,8 @@ DESK = (
 
 class Desk:
     """Made in kernels only, by `make_desk`."""
+
+    def __init__(self, *_arrays: Any) -> None: ...
 
 
 bundle(Desk, DeskStructure, DESK)
@@ -275,7 +279,7 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
 
 @kernel
 def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
-    """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,) with driven parts 0."""
+    """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,): driven parts 0."""
     for p in range(model.pair.shape[0]):
         for i in range(6):
             value = z[3 * model.pair[p, i // 3] + i % 3]

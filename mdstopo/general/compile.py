@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -46,9 +47,8 @@ class GeneralScene:
 def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[str, ...]]:
     """Responses and reductions of a load case: its objectives, then its constraints, each in the case's order."""
     found = [(o.response, o.over_time) for o in case.objectives if o.load_case == load_case]
-    for row in case.constraints:
-        if isinstance(row, ResponseRow) and row.load_case == load_case:
-            found.append((row.response, row.over_time))
+    rows = [row for row in case.constraints if isinstance(row, ResponseRow) and row.load_case == load_case]
+    found += [(row.response, row.over_time) for row in rows]
     return tuple(r for r, _ in found), tuple(o for _, o in found)
 
 
@@ -63,8 +63,8 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         q0[3 * i : 3 * i + 3] = *body.position, body.angle
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
-    records = [law for group in case.members for law in group.laws]
-    more = [t for law in records for t in laws.landings(law)] + motion_times(load_case)
+    more = [t for group in case.members for law in group.laws for t in laws.landings(law)]
+    more += motion_times(load_case)
     times = breakpoints(load_case, more)
     driven, drive = drives(load_case, times, q0, v0)
     free = np.ones(n, dtype=np.int64)
@@ -101,9 +101,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     )  # fmt: skip
 
 
-def _members(
-    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], times: FloatArray
-) -> dict[str, FloatArray | IndexArray]:
+def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], times: FloatArray) -> dict[str, Any]:
     """Blocks of one law each: a group with a list of laws has as many, which share its design variables."""
     blocks, powers, rows, active, level, columns = [], [], [], [], [], []
     curves: list[float] = []
@@ -173,14 +171,15 @@ def _reach(
     case: Case,
     index: dict[str, int],
     pairs: dict[tuple[int, int], int],
-    members: dict[str, FloatArray | IndexArray],
+    members: dict[str, Any],
 ) -> FloatArray:
     """Largest distance of an attachment point of the second body of each pair from its centre of mass, m."""
     reach = np.zeros(len(pairs))
     member = members["member"]
     for pair, start, stop, *_ in members["block"].tolist():
         reach[pair] = max(reach[pair], float(np.hypot(member[2, start:stop], member[3, start:stop]).max()))
-    for tie in (*case.joints, *case.bushings):
+    ties: tuple[Any, ...] = (*case.joints, *case.bushings)
+    for tie in ties:
         a, b = (index[name] for name in tie.bodies)
         pair = pairs[a, b]
         reach[pair] = max(reach[pair], float(np.hypot(*tie.at_second)), float(np.hypot(*tie.at_first)))
@@ -258,9 +257,11 @@ def _skipped(case: Case, load_case: LoadCase, damped: bool) -> tuple[str, ...]:
         notes.append("velocity terms: nothing depends on velocity")
     if not case.joints:
         notes.append("multipliers: there are no joints")
-    for motion in load_case.motions:
-        if None not in (motion.x, motion.y, motion.angle):
-            notes.append(f"equations of motion of {motion.body}: its motion is prescribed")
+    notes += [
+        f"equations of motion of {motion.body}: its motion is prescribed"
+        for motion in load_case.motions
+        if None not in (motion.x, motion.y, motion.angle)
+    ]
     fixed = sum(len(group) for group in case.members if not group.design)
     if fixed:
         notes.append(f"design gradient of {fixed} members that are no design variables")

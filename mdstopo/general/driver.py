@@ -1,6 +1,7 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
 import math
+from importlib import import_module
 from types import ModuleType
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
-from mdstopo.general.extremes import COLUMNS, SIGN, VALUE, peaks, ranked, sample
+from mdstopo.general.extremes import COLUMNS, RATE, SIGN, VALUE, peaks, ranked, sample
 from mdstopo.general.model import COUNT, GROUP, INERTER, START, pack_general
 from mdstopo.general.track import track_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
@@ -22,19 +23,15 @@ from mdstopo.status import Status
 ROWS = 6
 #: of what a reduction takes the peaks: of g, of -g, or of both
 SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
+#: reductions that are integrals over time: of g (1), of its square (2)
+INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
 #: misfit of a joint at the start, relative to the scene's size or speeds, up to which it fits
 FITS = 1e-8
 
 
 def load_method(name: str) -> ModuleType:
     """The compiled entries of a method for general scenes."""
-    if name == "generalized_alpha":
-        from mdstopo.general import generalized_alpha_entry
-
-        return generalized_alpha_entry
-    from mdstopo.general import runge_kutta_entry
-
-    return runge_kutta_entry
+    return import_module(f"mdstopo.general.{name}_entry")
 
 
 class GeneralDriver:
@@ -47,6 +44,7 @@ class GeneralDriver:
         model = scene.model
         self.ints, self.floats = pack_general(model)
         self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
+        self.reductions = np.zeros(len(scene.responses), dtype=np.int64)
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
         self._alpha = np.zeros(n_design)
@@ -125,15 +123,11 @@ class GeneralDriver:
         """Rows and gradients of response j, reduced over time."""
         t = self._states()[0][: count + 1].copy()
         rows = self.rows[j]
-        if reduction in ("mean", "rms", "integral"):
-            scale = 1.0 if reduction == "integral" else 1.0 / float(t[-1] - t[0])
-            square = reduction == "rms"
-            value = scale * self._pull(j, rows[0], 2 if square else 1, count, gradient, self.gradients[j, 0])
-            if square:
-                value = math.sqrt(max(value, 0.0))
-                scale = 0.5 * scale / value if value > 0.0 else 0.0
-            rows[0] = np.nan, value, 0.0, 0.0, 0.0, 1.0, -1.0
-            self.gradients[j, 0] *= scale
+        if reduction in INTEGRALS:
+            total = self._pull(j, rows[0], INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
+            value, slope = _reduced(reduction, total, float(t[-1] - t[0]))
+            rows[0] = np.nan, value, 0.0, 0.0, slope, 1.0, -1.0
+            self.gradients[j, 0] *= slope
             self.found[j] = 1
             return
 
@@ -155,6 +149,27 @@ class GeneralDriver:
                 self._pull(j, rows[r], 0, count, True, self.gradients[j, r])
                 self.gradients[j, r] *= flip
             rows[r, VALUE] *= flip
+
+    def differentiate(self, method: str, alpha: FloatArray, looked: Looked) -> FloatArray:
+        """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by `direct`."""
+        gradients = np.zeros_like(looked.gradients)
+        rows = looked.rows.copy()
+        before = self.work.copy()
+        _, count, _ = self.run(alpha, True)
+        self.work += before
+        for j, reduction in enumerate(self.scene.reductions):
+            for r in range(int(looked.found[j])):
+                integral = INTEGRALS.get(reduction, 0)
+                self.entry.push(
+                    self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count, j,
+                    integral, rows[j, r], self.room, self.room_ints, self.strength, self.padded, gradients[j, r],
+                    self.work,
+                )  # fmt: skip
+                if integral:
+                    gradients[j, r] *= rows[j, r, RATE]
+                elif reduction == "max_abs":
+                    gradients[j, r] *= rows[j, r, SIGN]
+        return gradients
 
     def _visit(
         self, j: int, places: FloatArray, exact: bool, count: int, steps: "GeneralSteps | None" = None
@@ -193,6 +208,12 @@ class GeneralDriver:
                 self._message = self._explain(code, time)
                 return code, count, time
             self._make_room(*(2 * int(size) for size in self.limits[1:4]))
+
+    def rate_at_start(self) -> float:
+        """Fastest vibration at the start, rad/s, with the design of the last run."""
+        from mdstopo.general.vibration import natural_frequencies
+
+        return float(natural_frequencies(self, self._alpha).max(initial=0.0))
 
     @property
     def message(self) -> str:
@@ -251,6 +272,16 @@ class GeneralDriver:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
         code, count, _ = self.run(alpha, False)
         return status_of(code), GeneralSteps(self, count)
+
+
+def _reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
+    """Mean, integral or rms from the integral over time (of the square), and its derivative by that."""
+    if reduction == "integral":
+        return total, 1.0
+    if reduction == "mean":
+        return total / span, 1.0 / span
+    value = math.sqrt(max(total / span, 0.0))
+    return value, 0.5 / (span * value) if value > 0.0 else 0.0
 
 
 def _size(case: Case) -> float:

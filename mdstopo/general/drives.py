@@ -34,7 +34,7 @@ def motion_times(load_case: LoadCase) -> list[float]:
 
 
 def drives(load_case: LoadCase, times: FloatArray, q0: FloatArray, v0: FloatArray) -> tuple[IndexArray, FloatArray]:
-    """The driven coordinates (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,)."""
+    """Driven coordinates (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,)."""
     parts = list(prescribed(load_case))
     cubics = np.zeros((len(times) - 1, len(parts), 4))
     for i, (d, _, part) in enumerate(parts):

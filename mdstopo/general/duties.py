@@ -10,7 +10,9 @@ The tag is a tuple of zeros whose length says which method is meant.
    from step to step beside the state.
 3. `step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk)`: changes pushed through
    step w, with forces (s, n) on its stages; changes (s, 3, n) and rows (s, n_row) of the stages come out.
-4. `weights_of(tag, model, tables, track, w, out)`: weights (s,) of the stages in the integral over step w.
+4. `beside(tag, track, k, c, e, q, v, a, q_out, v_out)`: the motion a little later (e < 0: earlier) than at fraction c
+   of step k, where it is q, v, a; `derivatives(tag)`: how many derivatives of the motion are those of the balance.
+5. `weights_of(tag, model, tables, track, w, out)`: weights (s,) of the stages in the integral over step w.
 """
 
 from collections.abc import Callable
@@ -18,7 +20,14 @@ from typing import Any
 
 from numba.extending import overload
 
-DUTIES: dict[str, dict[int, Any]] = {"point_of": {}, "step_back": {}, "step_forward": {}, "weights_of": {}}
+DUTIES: dict[str, dict[int, Any]] = {
+    "point_of": {},
+    "step_back": {},
+    "step_forward": {},
+    "beside": {},
+    "derivatives": {},
+    "weights_of": {},
+}
 
 
 def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
@@ -36,8 +45,18 @@ def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, ro
     raise NotImplementedError
 
 
-def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
     """Duty 4."""
+    raise NotImplementedError
+
+
+def derivatives(tag):  # type: ignore[no-untyped-def]
+    """Duty 4."""
+    raise NotImplementedError
+
+
+def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+    """Duty 5."""
     raise NotImplementedError
 
 
@@ -64,6 +83,16 @@ def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_
 @overload(step_forward)
 def _step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
     return _of("step_forward", tag)
+
+
+@overload(beside)
+def _beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+    return _of("beside", tag)
+
+
+@overload(derivatives)
+def _derivatives(tag):  # type: ignore[no-untyped-def]
+    return _of("derivatives", tag)
 
 
 @overload(weights_of)

@@ -106,7 +106,8 @@ def _refine(
 ) -> tuple[float, float, float, float]:
     """Fraction, value, rate and member where the rate vanishes: Illinois' rule on the method's own motion."""
     size, side = max(rise, -fall), 0
-    c = seen = last = np.nan
+    c = last = np.nan
+    seen = np.full(3, np.nan)
     for _ in range(60):
         c = (low * fall - high * rise) / (fall - rise)
         if not low < c < high:

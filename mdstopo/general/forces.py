@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from mdstopo.general.members import direction, general_sums
+from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangents

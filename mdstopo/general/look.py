@@ -30,7 +30,8 @@ def pull(  # type: ignore[no-untyped-def]
 ):
     """out (N,) = the derivative of one row of `extremes` by alpha (N,).
 
-    integral 1 (2): of the integral over time of response j (of its square), which is returned. Room: padded (M_padded,).
+    integral 1 (2): of the integral over time of response j (of its square), which is returned. Room: padded
+    (M_padded,).
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)

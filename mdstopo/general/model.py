@@ -5,7 +5,7 @@ coordinate is free, or driven: known as a cubic of time within each segment; gro
 joints are solved together with the accelerations (`balance`); rows that others imply are left out there.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,7 +32,7 @@ class GeneralModel(NamedTuple):
     q0, v0        (n,)              state at the start
     pair          (n_pair, 2)       the two bodies of each pair that members, joints or bushings connect
     reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
-    block         (n_block, 7)      pair, start, stop (padded), code of the law, first design variable or -1, count, group
+    block         (n_block, 7)      pair, start, stop (padded), code of the law, first design variable, count, group
     law           (n_block, 8)      the law's parameters (`mechanics.laws.table`)
     active        (n_seg, n_block)  whether the law acts during a segment
     level         (n_seg, n_block, 2)   a tabulated force at the segment's start, and its slope
@@ -88,6 +88,8 @@ class GeneralModel(NamedTuple):
 class ModelView:
     """A `GeneralModel` inside kernels, made by `unpack_general`."""
 
+    def __init__(self, *_arrays: Any) -> None: ...
+
 
 bundle(ModelView, ModelStructure, GeneralModel._fields)
 
@@ -99,10 +101,8 @@ def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
         len(model.times) - 1, len(model.load_body), len(model.bushing_pair), len(model.driven), len(model.joint),
         len(model.place), len(model.response),
     ]  # fmt: skip
-    ints = [np.asarray(sizes, dtype=np.int64)]
-    floats = []
-    for array in model:
-        (ints if array.dtype.kind == "i" else floats).append(array.ravel())
+    ints = [np.asarray(sizes, dtype=np.int64), *(each.ravel() for each in model if each.dtype.kind == "i")]
+    floats = [each.ravel() for each in model if each.dtype.kind == "f"]
     return np.concatenate(ints).astype(np.int64), np.concatenate(floats).astype(np.float64)
 
 

@@ -12,6 +12,8 @@ from mdstopo.general.balance import factor_matrix, gather, gather_multipliers, j
 from mdstopo.jit import kernel
 from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 
+#: misfit, relative to the scene, with which a joint counts as torn: its rows were taken for a repetition of others
+MISFIT = 1e-7
 #: corrections of the position at most; each squares the misfit
 MOST = 12
 
@@ -32,15 +34,15 @@ def misfit(model, phi, rows):  # type: ignore[no-untyped-def]
 def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
     """Move q, v (n,) onto the joints; mu, nu (n_row,) are the multipliers that did it.
 
-    scale: size of the scene, m. Returns the place of the unknown at which the joints are singular, or -1, and the
-    misfit that is left.
+    scale: size of the scene, m. Returns the place of the unknown at which the joints are singular, or -1; or, behind
+    all places, the number of a joint that the others do not let fit.
     """
     n = q.shape[0]
     n_row = mu.shape[0]
     mu[:] = 0.0
     nu[:] = 0.0
     if n_row == 0:
-        return -1, 0.0
+        return -1
     start = np.empty(n)
     shift = np.empty(n)
     which = np.zeros(1, np.int64)
@@ -58,7 +60,7 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
         last = worst
         singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
         if singular >= 0:
-            return singular, worst
+            return singular
         for d in range(n):
             shift[d] = model.mass[d] * (start[d] - q[d])
         for j in range(model.joint.shape[0]):
@@ -71,7 +73,7 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
     joint_state(model, q, v, desk)
     singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
     if singular >= 0:
-        return singular, worst
+        return singular
     for d in range(n):
         shift[d] = 0.0
     for j in range(model.joint.shape[0]):
@@ -85,7 +87,7 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
     solve_unknowns(model, desk, shift, nu)
     for d in range(n):
         v[d] += shift[d]
-    return -1, worst
+    return model.place.shape[0] + which[0] if worst > MISFIT * scale else -1
 
 
 @kernel

@@ -7,6 +7,7 @@ multipliers are at hand. A new response is one more kind here, with its slopes.
 import numpy as np
 
 from mdstopo.general.balance import balance, gather, gather_multipliers
+from mdstopo.general.duties import beside, derivatives
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.model import INERTER
@@ -36,7 +37,7 @@ APART = 3e-4
 
 @kernel
 def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  # type: ignore[no-untyped-def]
-    """f* of member i of a group, all its laws together; slopes (3, 6) by q, v, a of its two bodies; own: scratch (2, 6).
+    """f* of member i of a group, all its laws together; slopes (3, 6) by q, v, a of its bodies; own: scratch (2, 6).
 
     Returns f*, its pair.
     """
@@ -102,7 +103,7 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
             value += o[3]
             add_pair_force(model.pair, desk.rel, p, o[4], o[5], o[6], bars[0])
         return value
-    if kind == POINT or kind == ANGLE:
+    if kind in (POINT, ANGLE):
         slope = np.empty((6, 3))
         b = 3 * model.response[j, 1]
         r = 3 * model.response[j, 2]
@@ -155,7 +156,7 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
 
 @kernel
 def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # type: ignore[no-untyped-def]
-    """Slopes by q and v of an inerter's force, by sixth-order differences of its formula: six of each, rarely needed."""
+    """Slopes by q and v of an inerter's force, by sixth-order differences of its formula: rarely needed."""
     own = np.empty(6)
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != model.response[j, 5] or model.block[k, 3] != INERTER or model.active[segment, k] == 0:
@@ -182,31 +183,34 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # t
 
 
 @kernel
-def rated(model, strength, segment, j, who, t, h, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
-    """g_j and dg_j/dt at a state; a, lam, the desk and the slopes are those of it afterwards. near: scratch (4, n).
+def rated(tag, model, strength, track, k, c, j, who, t, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
+    """g_j and dg_j/dt at a state of step k; a, lam, the desk and the slopes are those of it afterwards.
 
     j < 0: no response is asked for.
-    where g depends on q and v alone, dg/dt = g_q v + g_v a; else it is differenced along the motion, h: the step.
+    Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, dg/dt = g_q v +
+    g_v a; else it is differenced along the method's own motion. near: scratch (4, n).
     """
     n = q.shape[0]
+    segment = track.index[k, 2]
+    h = track.t[k + 1] - track.t[k]
     no = np.bool_(False)
     rate = 0.0
     if j < 0:
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         return np.nan, np.nan
     kind = model.response[j, 0]
-    simple = kind == ENERGY or ((kind == POINT or kind == ANGLE) and model.response[j, 4] < 2)
+    simple = kind == ENERGY or (kind in (POINT, ANGLE) and model.response[j, 4] < derivatives(tag))
     if not simple:
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         for d in range(n):
             near[0, d] = a[d]
+            near[1, d] = q[d]
+            near[2, d] = v[d]
         apart = APART * h
         sides = np.zeros(2)
         for side in range(2):
             e = apart if side == 1 else -apart
-            for d in range(n):
-                near[1, d] = q[d] + e * (v[d] + 0.5 * e * near[0, d])
-                near[2, d] = v[d] + e * near[0, d]
+            beside(tag, track, k, c, e, q, v, near[0], near[1], near[2])
             balance(model, strength, segment, t + e, near[1], near[2], no, desk, near[3], lam)
             sides[side] = response(
                 model, strength, segment, j, who, t + e, near[1], near[2], near[3], lam, desk, bars, row_bar

@@ -1,8 +1,8 @@
 """Explicit Runge-Kutta steps of a general scene, adaptive, with joints and events.
 
-The method is that of `integrators.runge_kutta`: each stage's accelerations come from the balance with its joints, and the end of
-a step is moved onto the joints (`projection`), by no more than the step's error, so the order stays. A step that a
-switching member's margin does not survive is shortened until it ends at the event.
+The method is that of `integrators.runge_kutta`: each stage's accelerations come from the balance with its joints, and
+the end of a step is moved onto the joints (`projection`), by no more than the step's error, so the order stays. A step
+that a switching member's margin does not survive is shortened until it ends at the event.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from mdstopo.general.members import scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.track import carve_track, keep_stage, keep_state
-from mdstopo.integrators.runge_kutta import MARGIN, MOST, _error
+from mdstopo.integrators.runge_kutta import MOST, _error
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 from mdstopo.integrators.steps import (
     ACCEPTED,
@@ -35,6 +35,10 @@ from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
 
 TAG = (0,)
+#: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own
+MARGIN = 0.02
+#: what rounding leaves of a margin, relative to the scene's size
+ROUNDING = 4e-15
 #: events within a millionth of the simulated time after which the scene counts as chattering
 CHATTER = 400
 
@@ -81,8 +85,7 @@ def advance(  # type: ignore[no-untyped-def]
         ends[0, d] = position
         ends[1, d] = speed
     drive_state(model, segment, t + h, ends[0], ends[1])
-    singular, _ = project(model, size, ends[0], ends[1], desk, push[0], push[1])
-    return singular
+    return project(model, size, ends[0], ends[1], desk, push[0], push[1])
 
 
 @kernel
@@ -115,7 +118,7 @@ def start_modes(model, strength, desk, q, v, a, lam):  # type: ignore[no-untyped
 
 
 @kernel
-def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, work):  # type: ignore[no-untyped-def]
+def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, noise, work):  # type: ignore[no-untyped-def]
     """Switch every member whose margin is used up, one after the other; returns how many events there are now.
 
     -1: no room; a (n,) holds the accelerations behind the last one. The loop ends because each member switches at
@@ -128,7 +131,7 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
     done = 0
     while True:
         margin, who = smallest_margin(model, segment, strength, rel)
-        if not margin < 0.0 or done > 2 * strength.shape[1]:
+        if not margin < -noise or done > 2 * strength.shape[1]:
             return events
         if events >= track.event.shape[0]:
             return -1
@@ -183,6 +186,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     nowhere = np.int64(-1)
     keep = np.bool_(tangent)
     size = scene_size(model)
+    rounding = ROUNDING * size  # margins that count as none: a member that has just switched is there
     rel = np.empty((n_pair, POSE))
     rel0 = np.empty((n_pair, POSE))
     before = np.empty((n_pair, POSE))
@@ -255,7 +259,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 # what begins to act here may stand on either side
                 balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
                 first = events
-                events = log_switches(model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, work)
+                events = log_switches(
+                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, rounding, work
+                )
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
@@ -312,7 +318,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 margin, who = smallest_margin(model, segment, strength, rel)
                 relative_pose(pair, q0, v0, before)
                 high = h
-                if not margin < 0.0:
+                if not margin < -rounding:
                     dip = first_dip(model, segment, strength, before, rel, h)
                     if dip < 1.0:
                         high = dip * h
@@ -322,16 +328,17 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         )  # fmt: skip
                         relative_pose(pair, trial[0], trial[1], rel)
                         margin, who = smallest_margin(model, segment, strength, rel)
-                    if not margin < 0.0:
+                    if not margin < -rounding:
                         high = h
-                happens = margin < 0.0
+                happens = margin < -rounding
                 if happens:
                     low = 0.0
                     at_low, _ = smallest_margin(model, segment, strength, before)
                     at_high = margin
+                    at_low = max(at_low, rounding)
                     side = 0
                     for trial_count in range(100):
-                        if high - low <= 4e-16 * (abs(t) + h) or at_high > -1e-300:
+                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -1.01 * rounding:
                             break
                         middle = (low * at_high - high * at_low) / (at_high - at_low)
                         if trial_count % 3 == 2 and not (high - low < 1e-9 * h):
@@ -348,7 +355,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         )  # fmt: skip
                         relative_pose(pair, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, strength, rel)
-                        if value < 0.0:
+                        if value < -rounding:
                             high = middle
                             at_high = value
                             if side == 1:
@@ -384,7 +391,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             work[ACCEPTED] += 1
             if happens:
                 balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
-                events = log_switches(model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, work)
+                events = log_switches(
+                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, rounding, work
+                )
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0

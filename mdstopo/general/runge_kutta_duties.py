@@ -56,6 +56,20 @@ def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, ro
 
 
 @kernel
+def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+    """The parabola: the motion has the accelerations of its balance everywhere."""
+    for d in range(q.shape[0]):
+        q_out[d] = q[d] + e * (v[d] + 0.5 * e * a[d])
+        v_out[d] = v[d] + e * a[d]
+
+
+@kernel
+def derivatives(tag):  # type: ignore[no-untyped-def]
+    """Velocities and accelerations."""
+    return 2
+
+
+@kernel
 def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
     """An integral is the velocity of one more coordinate."""
     method = 1 if model.size[2] != 0 else 0
@@ -63,4 +77,12 @@ def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-de
         out[j] = (track.t[w + 1] - track.t[w]) * tables[method, 2, 2, j]
 
 
-implement(TAG, point_of=point_of, step_back=step_back, step_forward=step_forward, weights_of=weights_of)
+implement(
+    TAG,
+    point_of=point_of,
+    step_back=step_back,
+    step_forward=step_forward,
+    beside=beside,
+    derivatives=derivatives,
+    weights_of=weights_of,
+)

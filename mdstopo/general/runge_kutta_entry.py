@@ -1,8 +1,9 @@
 """What the driver calls of the explicit methods for general scenes."""
 
 import mdstopo.general.runge_kutta_duties  # noqa: F401  (enters the method's duties)
+from mdstopo.general.direct import push
 from mdstopo.general.look import pull
 from mdstopo.general.runge_kutta import TAG, simulate
 from mdstopo.general.visit import visit
 
-__all__ = ["TAG", "pull", "simulate", "visit"]
+__all__ = ["TAG", "pull", "push", "simulate", "visit"]

@@ -1,8 +1,7 @@
 """Bundles of arrays that kernels hand to each other as one pointer.
 
 A named tuple of thirty arrays is two hundred arguments to the compiler, at every call; a reference to a structure is
-one (three minutes of compilation became half of one). Inside kernels a structure is made and read like a named tuple;
-Python never sees one.
+one. Inside kernels a structure is made and read like a named tuple; Python never sees one.
 """
 
 from typing import Any

@@ -19,8 +19,9 @@ event     (E, 4) integers       the state at which it happened, member (padded),
 ========  ====================  ======================================================================
 """
 
-from mdstopo.general.structures import TrackStructure, bundle
+from typing import Any
 
+from mdstopo.general.structures import TrackStructure, bundle
 from mdstopo.jit import kernel
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
@@ -31,6 +32,8 @@ TRACK = ("t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass"
 
 class Track:
     """Made in kernels only, by `carve_track`."""
+
+    def __init__(self, *_arrays: Any) -> None: ...
 
 
 bundle(Track, TrackStructure, TRACK)

@@ -66,7 +66,9 @@ def visit(  # type: ignore[no-untyped-def]
         if j >= 0 and model.response[j, 0] == MEMBER_FORCE and who < 0:
             balance(model, strength, segment, t, q, v, no, desk, a, lam)
             seen[i, 2] = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
-        value, rate = rated(model, strength, segment, j, int(seen[i, 2]), t, h, q, v, desk, a, lam, bars, row_bar, near)
+        value, rate = rated(
+            tag, model, strength, track, k, c, j, int(seen[i, 2]), t, q, v, desk, a, lam, bars, row_bar, near
+        )
         seen[i, 0] = value
         seen[i, 1] = rate
         for m in range(model.driven.shape[0]):

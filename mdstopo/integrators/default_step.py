@@ -15,6 +15,7 @@ from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
     from mdstopo.integrators.driver import Driver
 
 #: error aimed at, in tolerances: the promise is ten, and other designs than the measured one are less kind
@@ -36,7 +37,7 @@ class _Run:
     rows: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]
 
 
-def default_step(driver: "Driver", alpha: FloatArray) -> float:
+def default_step(driver: "Driver | GeneralDriver", alpha: FloatArray) -> float:
     """What to put into `driver.settings[2]` so that errors are about `AIM` tolerances (settings[0]) at alpha (N,).
 
     Negative: radians of the fastest vibration a step (`generalized_alpha.longest_step`). The error meant is that
@@ -46,7 +47,7 @@ def default_step(driver: "Driver", alpha: FloatArray) -> float:
     span = float(times[-1] - times[0])
     step = min(span / FEWEST, float(np.max(np.diff(times))))
     found = _settle(lambda h: _run(driver, alpha, h), step, AIM * float(driver.settings[0]))
-    rate = _rate(driver)
+    rate = driver.rate_at_start()
     return -found * rate if rate * span > 1.0 else found
 
 
@@ -65,7 +66,7 @@ def _settle(run: Callable[[float], _Run | None], step: float, aim: float) -> flo
     return step
 
 
-def _run(driver: "Driver", alpha: FloatArray, step: float) -> _Run | None:
+def _run(driver: "Driver | GeneralDriver", alpha: FloatArray, step: float) -> _Run | None:
     """Simulate with a step, or None where that fails."""
     kept = driver.settings[2]
     driver.settings[2] = step
@@ -109,11 +110,3 @@ def _relative(a: FloatArray, b: FloatArray) -> float:
     if not np.isfinite(difference):
         return float("inf")
     return difference / size if size > 0.0 else 0.0
-
-
-def _rate(driver: "Driver") -> float:
-    """Fastest vibration at the start, rad/s, with the strengths of the last run."""
-    from mdstopo.integrators.generalized_alpha_entry import rate_at_start
-
-    packed = driver.packed
-    return float(rate_at_start(packed.ints, packed.floats, driver.strength, driver.scene.damped))

@@ -137,6 +137,12 @@ class Driver:
                 return code, count, time
             self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
 
+    def rate_at_start(self) -> float:
+        """Fastest vibration at the start, rad/s, with the strengths of the last run."""
+        from mdstopo.integrators.generalized_alpha_entry import rate_at_start
+
+        return float(rate_at_start(self.packed.ints, self.packed.floats, self.strength, self.scene.damped))
+
     def _simulate_arguments(self, tangent: bool) -> tuple[Any, ...]:
         return (
             self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped, tangent,

@@ -1,4 +1,4 @@
-"""What the format allows and the engine cannot compute yet, or not with the chosen method, refused by name and place."""
+"""What the format allows and the engine cannot compute, or not with the chosen method: refused by name and place."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from mdstopo.case.model import Case
 from mdstopo.scene.family import beyond_springs
 
 #: methods of the general kernels
-INTEGRATORS = frozenset({"auto", "runge_kutta"})
-SENSITIVITIES = frozenset({"auto", "adjoint"})
+INTEGRATORS = frozenset({"auto", "runge_kutta", "generalized_alpha"})
+SENSITIVITIES = frozenset({"auto", "adjoint", "direct"})
 
 
 def refusals(case: Case, optimizing: bool = False) -> list[Mistake]:

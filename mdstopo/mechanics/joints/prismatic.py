@@ -1,6 +1,6 @@
 """The prismatic joint: the second body slides along an axis that the first one carries, and does not turn against it.
 
-Phi = (n . (D), psi_B - psi_A - theta_0) with the normal n = R_A n_0 and D = x_B + c - x_A - p, p = R_A s_A, c = R_B s_B.
+Phi = (n . D, psi_B - psi_A - theta_0) with the normal n = R_A n_0, D = x_B + c - x_A - p, p = R_A s_A, c = R_B s_B.
 n . p is constant, so with E = x_B + c - x_A and m = n turned by a right angle
 
     Phi'_1 = n . E' + omega_A m . E,     Phi''_1 = n . E'' + 2 omega_A m . E' + omega_A' m . E - omega_A^2 n . E

@@ -1,4 +1,4 @@
-"""The revolute joint: two points coincide. Phi = x_B + c - x_A - p with the arms p = R_A s_A, c = R_B s_B (global axes).
+"""The revolute joint: two points coincide. Phi = x_B + c - x_A - p with arms p = R_A s_A, c = R_B s_B (global axes).
 
 Parameters: s_A (2), s_B (2). Used by the fixed joint too, which adds a row of its own.
 """

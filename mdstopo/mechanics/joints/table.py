@@ -118,7 +118,7 @@ def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignor
 @kernel
 def joint_stiffness(code, par, w, lam, k):  # type: ignore[no-untyped-def]
     """k (6, 6) += d(Phi_q^T lam)/dq."""
-    if code == REVOLUTE or code == FIXED:
+    if code in (REVOLUTE, FIXED):
         revolute_stiffness(par, w, lam, k)
     elif code == PRISMATIC:
         prismatic_stiffness(par, w, lam, k)
@@ -149,7 +149,7 @@ def joint_transmitted(code, par, w, lam, which, by_lam, by_q):  # type: ignore[n
     by_lam[:] = 0.0
     by_q[:] = 0.0
     if which == 0:
-        if code == REVOLUTE or code == FIXED:
+        if code in (REVOLUTE, FIXED):
             size = math.hypot(lam[0], lam[1])
             if size > 0.0:
                 by_lam[0] = lam[0] / size

@@ -61,6 +61,6 @@ def curve_data(points: Any, at: int) -> tuple[list[float], list[float]]:
     stored = np.concatenate([[0.0], np.cumsum(areas)])
     data = np.concatenate([x, c.ravel(), stored])
     parameters = np.array([0.0, len(x), 0.0])
-    parameters[2] = curve_force.py_func(parameters, 0.0, data)[3]
+    parameters[2] = curve_force.py_func(parameters, 0.0, data)[3]  # type: ignore[attr-defined]
     parameters[0] = at
     return parameters.tolist(), data.tolist()

@@ -25,14 +25,20 @@ def gap_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
+def _clips(p):  # type: ignore[no-untyped-def]
+    """Whether there is a force, and clip guards its sign."""
+    return p[4] != 0.0 and p[0] + p[1] > 0.0
+
+
+@inline
 def gap_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
-    """How far the mode is from its end: in m for opening and closing, in m of spring for clipping."""
+    """How far the mode is from its end: y in m, or the unclipped force by k + c, which may be all damping."""
     y = p[3] * x - p[2]
     if mode == OPEN:
         return -y
-    if p[4] == 0.0 or p[0] == 0.0:
+    if not _clips(p):
         return y
-    unclipped = y + p[1] * p[3] * xd / p[0]
+    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1])
     return min(y, unclipped) if mode == CLOSED else min(y, -unclipped)
 
 
@@ -42,39 +48,49 @@ def gap_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
     if mode == OPEN:
         return -p[3], 0.0
     y = p[3] * x - p[2]
-    if p[4] == 0.0 or p[0] == 0.0:
+    if not _clips(p):
         return p[3], 0.0
-    by_rate = p[1] * p[3] / p[0]
-    unclipped = y + by_rate * xd
+    by_x = p[0] * p[3] / (p[0] + p[1])
+    by_rate = p[1] * p[3] / (p[0] + p[1])
+    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1])
     if mode == CLOSED:
         if y <= unclipped:
             return p[3], 0.0
-        return p[3], by_rate
+        return by_x, by_rate
     if y <= -unclipped:
         return p[3], 0.0
-    return -p[3], -by_rate
+    return -by_x, -by_rate
 
 
 @inline
 def _closed(p, y, rate):  # type: ignore[no-untyped-def]
     """Closed, or clipped where damping would reverse the force."""
-    if p[4] != 0.0 and p[0] * y + p[1] * rate < 0.0:
+    if _clips(p) and p[0] * y + p[1] * rate < 0.0:
         return CLIPPED
     return CLOSED
 
 
 @inline
 def gap_next(p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
-    """The mode behind the end of this one: the side is that of the rate, then of the second derivative."""
+    """The mode to go to where this one's margin is negative.
+
+    Away from the gap its side decides, for a law may begin to act on a member that has moved meanwhile; at the gap
+    the rate does, then the second derivative. In contact only the force can have changed its sign: the other mode
+    follows without a second look, which might differ from the margin by rounding.
+    """
     y = p[3] * x - p[2]
     rate = p[3] * xd
+    near = NEAR * max(1.0, abs(p[2]))
+    if y > near:
+        if mode == OPEN:
+            return _closed(p, y, rate)
+        return CLIPPED if mode == CLOSED and _clips(p) else CLOSED
+    if y < -near:
+        return OPEN
     ahead = rate if rate != 0.0 else p[3] * xdd
     if mode == OPEN:
-        return _closed(p, max(y, 0.0), rate) if ahead > 0.0 else OPEN
-    near = NEAR * max(1.0, abs(p[2]))
-    if y <= near and ahead < 0.0:
-        return OPEN
-    return _closed(p, y, rate) if mode == CLIPPED or y <= near else CLIPPED
+        return CLOSED if ahead > 0.0 else OPEN
+    return OPEN if ahead < 0.0 else CLOSED
 
 
 @inline

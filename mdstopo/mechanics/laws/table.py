@@ -125,6 +125,8 @@ def parameters(record: Law, curves: list[float]) -> list[float]:
             row = [record.peak, record.rate, record.time]
         case TableLaw():
             row = []
+        case ActuatorLaw(limit=0.0):
+            row = []  # clipped to nothing
         case ActuatorLaw():
             limit = 0.0 if record.limit is None else record.limit
             row = [record.proportional, record.derivative, record.target, limit]

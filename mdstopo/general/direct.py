@@ -1,0 +1,195 @@
+"""The sensitivities of a general motion carried forward with it: the second way to the same gradients.
+
+Each step is a linear map of changes of the state and of a force at each stage. It is built once, by pushing unit
+changes through the step (`duties`), and then applied to the derivatives of the state by every alpha^mu, whose forces
+are each member's own. At events the derivatives jump by saltation. At the row's time its cotangents meet them.
+"""
+
+import numpy as np
+
+from mdstopo.general.adjoint import integral_cotangents, row_cotangents
+from mdstopo.general.balance import make_desk
+from mdstopo.general.duties import step_forward
+from mdstopo.general.events import member_rows
+from mdstopo.general.forces import inerter_force
+from mdstopo.general.members import unscale_general
+from mdstopo.general.model import INERTER, unpack_general
+from mdstopo.general.track import carve_track, restore_modes
+from mdstopo.jit import entry, kernel
+from mdstopo.mechanics.laws.table import law
+
+
+@kernel
+def step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, out):  # type: ignore[no-untyped-def]
+    """out (4 n + s n, 4 n + 1): what unit changes of q, v, the carried rows, and each stage's force, do at the end.
+
+    The last column is what they do to an integral with cotangents bars (s, 3, n), rows_bar (s, n_row) of the stages (no
+    rows: none).
+    """
+    n = model.mass.shape[0]
+    s = track.index[w + 1, 0] - track.index[w, 0]
+    dq = np.empty(n)
+    dv = np.empty(n)
+    dx = np.empty((2, n))
+    force = np.empty((s, n))
+    changes = np.empty((s, 3, n))
+    rows = np.empty((s, model.size[0]))
+    for b in range((4 + s) * n):
+        dq[:] = 0.0
+        dv[:] = 0.0
+        dx[:] = 0.0
+        force[:] = 0.0
+        out[b] = 0.0
+        if model.free[b % n] == 0:
+            continue
+        part = b // n
+        if part == 0:
+            dq[b % n] = 1.0
+        elif part == 1:
+            dv[b % n] = 1.0
+        elif part < 4:
+            dx[part - 2, b % n] = 1.0
+        else:
+            force[part - 4, b % n] = 1.0
+        step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk)
+        for d in range(n):
+            out[b, d] = dq[d]
+            out[b, n + d] = dv[d]
+            out[b, 2 * n + d] = dx[0, d]
+            out[b, 3 * n + d] = dx[1, d]
+        if bars.shape[0] > 0:
+            for j in range(s):
+                for part in range(3):
+                    for d in range(n):
+                        out[b, 4 * n] += bars[j, part, d] * changes[j, part, d]
+                for r in range(model.size[0]):
+                    out[b, 4 * n] += rows_bar[j, r] * rows[j, r]
+
+
+@kernel
+def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):  # type: ignore[no-untyped-def]
+    """f_i at unit strength of member i of block k, and B_i over its bodies into row (6,)."""
+    if model.block[k, 3] == INERTER:
+        return inerter_force(model, k, i, q, v, a, row)
+    x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+    value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
+    f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
+    return f
+
+
+@kernel
+def through_step(tag, model, tables, strength, track, w, c, bars, rows_bar, desk, column, matrix, spare):  # type: ignore[no-untyped-def]
+    """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
+
+    The last column sums up the derivative of an integral (`step_map`).
+    """
+    n = model.mass.shape[0]
+    o = track.index[w, 0]
+    s = track.index[w + 1, 0] - o
+    segment = track.index[w, 2]
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    restore_modes(track, track.index[w, 3], strength)
+    step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, matrix)
+    width = 4 * n + 1
+    for k in range(model.block.shape[0]):
+        if model.block[k, 4] < 0:
+            continue
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            spare[:] = 0.0
+            for b in range(4 * n):
+                value = column[i, b]
+                if value != 0.0:
+                    for d in range(width):
+                        spare[d] += value * matrix[b, d]
+            if model.active[segment, k] != 0:
+                for j in range(s):
+                    stage = track.stage[o + j]
+                    f = own_force(
+                        model, k, i, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], row, row_rate
+                    )
+                    for r in range(6):
+                        b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
+                        for d in range(width):
+                            spare[d] -= f * row[r] * matrix[b, d]
+            for d in range(4 * n):
+                column[i, d] = spare[d]
+            column[i, 4 * n] += spare[4 * n]
+
+
+@kernel
+def jump(model, track, state, column):  # type: ignore[no-untyped-def]
+    """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows."""
+    n = model.mass.shape[0]
+    if state == 0:
+        return
+    for e in range(track.index[state - 1, 3], track.index[state, 3]):
+        if track.event[e, 0] != state:
+            continue
+        for i in range(column.shape[0]):
+            later = 0.0
+            for d in range(n):
+                later -= track.salt[e, 0, d] * column[i, d] + track.salt[e, 1, d] * column[i, n + d]
+            for d in range(n):
+                column[i, n + d] += track.salt[e, 2, d] * later
+
+
+@entry
+def push(  # type: ignore[no-untyped-def]
+    tag,
+    ints,
+    floats,
+    tables,
+    alpha,
+    limits,
+    count,
+    j,
+    integral,
+    row,
+    room,
+    room_ints,
+    strength,
+    padded,
+    out,
+    work,
+):
+    """out (N,) = the derivative of one row of `extremes`, or of an integral, by alpha (N,), carried forward.
+
+    Arguments as those of `look.pull`.
+    """
+    model = unpack_general(ints, floats)
+    track = carve_track(model, limits, room, room_ints)
+    desk = make_desk(model)
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    column = np.zeros((padded.shape[0], 4 * n + 1))
+    matrix = np.empty((21 * n, 4 * n + 1))
+    spare = np.empty(4 * n + 1)
+    bars = np.zeros((3, n))
+    stages = track.index[count, 0] if integral > 0 else 0
+    stage_bars = np.zeros((stages, 3, n))
+    rows_bar = np.zeros((stages, n_row))
+    w = count
+    c = 1.0
+    last = count
+    if integral > 0:
+        integral_cotangents(
+            tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, desk, padded, work
+        )
+    else:
+        w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
+        last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
+    for k in range(last):
+        o = track.index[k, 0]
+        end = track.index[k + 1, 0]
+        own = stage_bars[o:end] if integral > 0 else stage_bars
+        own_rows = rows_bar[o:end] if integral > 0 else rows_bar
+        through_step(tag, model, tables, strength, track, k, 1.0, own, own_rows, desk, column, matrix, spare)
+        jump(model, track, k + 1, column)
+    if integral == 0 and w >= 0:
+        through_step(tag, model, tables, strength, track, w, c, stage_bars, rows_bar, desk, column, matrix, spare)
+    for i in range(padded.shape[0]):
+        padded[i] += column[i, 4 * n]
+        for d in range(n):
+            padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+    unscale_general(model.block, model.power, alpha, padded, out)

@@ -1,0 +1,207 @@
+"""The duties of generalized-alpha in general scenes: cubic motion between steps, reverse and tangent steps, weights.
+
+Between two steps q is the cubic through both ends with their velocities, and v its derivative. What a step takes over
+beside q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x and dx), unless it makes its own.
+"""
+
+import numpy as np
+
+from mdstopo.general.duties import implement
+from mdstopo.general.generalized_alpha import TAG
+from mdstopo.general.projection import project_back, project_forward
+from mdstopo.general.step_linear import stage_back, stage_forward
+from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
+from mdstopo.integrators.generalized_alpha_linear import hermite
+from mdstopo.integrators.steps import REVERSE
+from mdstopo.jit import kernel
+
+
+@kernel
+def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+    """The cubic between the ends of step k, and its derivative."""
+    h = track.t[k + 1] - track.t[k]
+    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
+    start = track.state[k]
+    end = track.state[k + 1]
+    for d in range(q.shape[0]):
+        q[d] = q0 * start[0, d] + q1 * end[0, d] + h * (v0 * start[1, d] + v1 * end[1, d])
+        v[d] = (dq0 * start[0, d] + dq1 * end[0, d]) / h + dv0 * start[1, d] + dv1 * end[1, d]
+    return k
+
+
+@kernel
+def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+    """Further along the cubic."""
+    h = track.t[k + 1] - track.t[k]
+    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c + e / h)
+    start = track.state[k]
+    end = track.state[k + 1]
+    for d in range(q.shape[0]):
+        q_out[d] = q0 * start[0, d] + q1 * end[0, d] + h * (v0 * start[1, d] + v1 * end[1, d])
+        v_out[d] = (dq0 * start[0, d] + dq1 * end[0, d]) / h + dv0 * start[1, d] + dv1 * end[1, d]
+
+
+@kernel
+def derivatives(tag):  # type: ignore[no-untyped-def]
+    """Velocities only: the cubic's second derivative is not the acceleration."""
+    return 1
+
+
+@kernel
+def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+    """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion."""
+    h = track.t[w + 1] - track.t[w]
+    out[:] = 0.0
+    last = track.index[w + 1, 0] - track.index[w, 0] - 1
+    out[last] = 0.5 * h
+    if last > 0:
+        out[0] = 0.5 * h
+    # a following step without a stage at its start leaves that half to this step's end
+    if track.index[w + 2, 0] - track.index[w + 1, 0] == 1:
+        out[last] += 0.5 * (track.t[w + 2] - track.t[w + 1])
+
+
+@kernel
+def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+    """Duty 2."""
+    n = lam_q.shape[0]
+    o = track.index[w, 0]
+    last = track.index[w + 1, 0] - 1 - o
+    h = track.t[w + 1] - track.t[w]
+    e1, e2, e3, beta, gamma, lag = alpha_weights(tables[0])
+    spread = bars.shape[0] > 0
+    bar_q = np.zeros(n)
+    bar_v = np.zeros(n)
+    bar_a = np.zeros(n)
+    bar_x = np.zeros(n)
+    start_q = np.zeros(n)
+    start_v = np.zeros(n)
+    work[REVERSE] += 1
+    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
+    for d in range(n):
+        start_q[d] = q0 * lam_q[d] + dq0 / h * lam_v[d]
+        start_v[d] = h * v0 * lam_q[d] + dv0 * lam_v[d]
+        bar_q[d] = q1 * lam_q[d] + dq1 / h * lam_v[d]
+        bar_v[d] = h * v1 * lam_q[d] + dv1 * lam_v[d]
+    state = track.state[w + 1]
+    push = track.push[w + 1]
+    project_back(model, state[0], state[1], push[0], push[1], desk, bar_q, bar_v)
+    for j in range(last, -1, -1):
+        x = z[j]
+        y[:] = 0.0
+        if j < last:
+            bar_q[:] = 0.0
+            bar_v[:] = 0.0
+        if spread:
+            for d in range(n):
+                bar_q[d] += bars[j, 0, d]
+                bar_v[d] += bars[j, 1, d]
+            for r in range(y.shape[0]):
+                y[r] = rows_bar[j, r]
+        for d in range(n):
+            if j == last:
+                x[d] = lam_x[0, d] + e1 * (lam_x[1, d] + h * (h * beta * bar_q[d] + gamma * bar_v[d]))
+            else:
+                x[d] = bar_a[d] if j == 0 else -bar_x[d]
+            if spread:
+                x[d] += bars[j, 2, d]
+        w_q = h * h * beta * e1 if j == last else 0.0
+        w_v = h * gamma * e1 if j == last else 0.0
+        stage_back(model, track, o + j, w_q, w_v, desk, x, y, bar_q, bar_v)
+        for i in range(model.driven.shape[0]):
+            bar_q[model.driven[i]] = 0.0
+            bar_v[model.driven[i]] = 0.0
+        for d in range(n):
+            start_q[d] += bar_q[d]
+            start_v[d] += bar_v[d]
+            if j == last:
+                reach_q = h * h * bar_q[d]
+                reach_v = h * bar_v[d]
+                start_v[d] += h * bar_q[d]
+                carried = lam_x[1, d] + beta * reach_q + gamma * reach_v
+                bar_a[d] = e2 * carried
+                bar_x[d] = (0.5 - beta) * reach_q + (1.0 - gamma) * reach_v - e3 * carried
+                if last == 1:
+                    bar_a[d] += bar_x[d]
+                elif last == 2:
+                    bar_a[d] += 2.0 * bar_x[d]
+            elif j == 1:
+                ahead = lag * h
+                start_v[d] += ahead * bar_q[d]
+                bar_a[d] += ahead * (0.5 * ahead * bar_q[d] + bar_v[d])
+    for d in range(n):
+        free = model.free[d] != 0
+        lam_q[d] = start_q[d] if free else 0.0
+        lam_v[d] = start_v[d] if free else 0.0
+        lam_x[0, d] = bar_a[d] if last == 0 and free else 0.0
+        lam_x[1, d] = bar_x[d] if last == 0 and free else 0.0
+
+
+@kernel
+def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+    """Duty 3."""
+    n = dq.shape[0]
+    o = track.index[w, 0]
+    last = track.index[w + 1, 0] - 1 - o
+    h = track.t[w + 1] - track.t[w]
+    e1, e2, e3, beta, gamma, lag = alpha_weights(tables[0])
+    da = dx[0]
+    aux = dx[1]
+    end_q = np.empty(n)
+    end_v = np.empty(n)
+    for j in range(last + 1):
+        x = changes[j, 0]
+        u = changes[j, 1]
+        f = changes[j, 2]
+        rows[j] = 0.0
+        for d in range(n):
+            f[d] = force[j, d]
+            if j == last:
+                carry = e2 * da[d] - e3 * aux[d]
+                x[d] = dq[d] + h * (dv[d] + h * ((0.5 - beta) * aux[d] + beta * carry))
+                u[d] = dv[d] + h * ((1.0 - gamma) * aux[d] + gamma * carry)
+            elif j == 0:
+                x[d] = dq[d]
+                u[d] = dv[d]
+            else:
+                x[d] = dq[d] + lag * h * (dv[d] + 0.5 * lag * h * da[d])
+                u[d] = dv[d] + lag * h * da[d]
+            if model.free[d] == 0:
+                x[d] = 0.0
+                u[d] = 0.0
+        w_q = h * h * beta * e1 if j == last else 0.0
+        w_v = h * gamma * e1 if j == last else 0.0
+        stage_forward(model, track, o + j, w_q, w_v, desk, x, u, f, rows[j])
+        for d in range(n):
+            if j == last:
+                x[d] += w_q * f[d]
+                u[d] += w_v * f[d]
+                aux[d] = e1 * f[d] + e2 * da[d] - e3 * aux[d]
+                da[d] = f[d]
+            elif j == 0:
+                da[d] = f[d]
+                aux[d] = f[d]
+            else:
+                aux[d] = 2.0 * da[d] - f[d]
+    for d in range(n):
+        end_q[d] = changes[last, 0, d]
+        end_v[d] = changes[last, 1, d]
+    state = track.state[w + 1]
+    push = track.push[w + 1]
+    project_forward(model, state[0], state[1], push[0], push[1], desk, end_q, end_v)
+    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
+    for d in range(n):
+        start = dq[d]
+        dq[d] = q0 * start + q1 * end_q[d] + h * (v0 * dv[d] + v1 * end_v[d])
+        dv[d] = (dq0 * start + dq1 * end_q[d]) / h + dv0 * dv[d] + dv1 * end_v[d]
+
+
+implement(
+    TAG,
+    point_of=point_of,
+    step_back=step_back,
+    step_forward=step_forward,
+    beside=beside,
+    derivatives=derivatives,
+    weights_of=weights_of,
+)

@@ -1,0 +1,40 @@
+"""What the tests of general scenes share."""
+
+from pathlib import Path
+
+import numpy as np
+
+import mdstopo
+
+CASES = Path(__file__).parent / "cases"
+
+
+def load(name, **overrides):
+    """A case of this folder, with overrides of the solver's keys."""
+    return mdstopo.load_case(
+        CASES / f"{name}.yaml", overrides={f"solver.{key}": str(value) for key, value in overrides.items()}
+    )
+
+
+def design_of(case, seed=0):
+    """A random design around the initial one."""
+    return np.array(case.initial) * np.random.default_rng(seed).uniform(0.7, 1.3, case.n_design)
+
+
+def slopes(case, alpha, direction, h):
+    """Derivatives of all objectives along a direction, by sixth-order central differences of whole evaluations."""
+    total = {}
+    for m, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+        for sign in (1.0, -1.0):
+            found = mdstopo.evaluate(case, alpha + sign * m * h * direction, gradient=False)
+            assert found.status.ok, found.message
+            for name, value in found.objectives.items():
+                total[name] = total.get(name, 0.0) + sign * weight * value / h
+    return total
+
+
+def simulate_text(text, **solver):
+    """The trajectory of a case given as text."""
+    from mdstopo.case.reader import read_case
+
+    return mdstopo.simulate(read_case(text, overrides={f"solver.{k}": str(v) for k, v in solver.items()}))

@@ -1,0 +1,54 @@
+"""The two families of kernels check each other on scenes that both compute."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.general.compile import compile_general
+from mdstopo.general.driver import GeneralDriver
+from mdstopo.integrators.choice import method_of
+
+CASE = """
+format: 1
+gravity: [0, -9.8]
+time: {end: 0.3}
+bodies:
+  torso: {mass: 60, inertia: 10, position: [0, 0], velocity: [0.1, 0], angular_velocity: 0.2}
+  vehicle: {mass: 2000, inertia: 6000, position: [0, -1], angle: 0.1}
+points:
+  a: {body: torso, grid: {rectangle: {center: [0, 0], size: [0.5, 0.5], count: 5}}}
+  b: {body: vehicle, grid: {line: {from: [-1, -0.8], to: [1, -0.8], count: 4}}}
+members:
+  belts: {from: a, to: b, law: {type: spring, stiffness: 900, damping: 30, preload: 5}}
+  ties: {from: {body: ground, at: [0, 1]}, to: a, law: {type: spring, stiffness: 300}, design: false}
+loads:
+  - {body: vehicle, acceleration: {table: [[0, 9.8, 0], [0.1, 4, 2], [0.3, 0, 0]]}, angular_acceleration: 20}
+  - {body: torso, force: [30, 10], at: [0.1, 0.2], frame: body}
+design: {initial: 0.4, power: 1.5}
+objectives: {G: {response: energy, over_time: max}}
+"""
+
+
+@pytest.mark.parametrize("over_time", ["max", "min", "mean", "integral", "final"])
+def test_values_and_gradients_agree(over_time):
+    case = read_case(CASE, overrides={"objectives.G.over_time": over_time, "solver.tolerance": "1e-11"})
+    expected = mdstopo.evaluate(case)
+    driver = GeneralDriver(
+        case, compile_general(case, case.load_cases[0]), method_of("runge_kutta", case.solver), 1e-11, 0.0
+    )
+    found = driver.evaluate(case.initial, True)
+    assert found.status.ok
+    gradient = expected.gradients["G"]
+    assert found.rows[0, 0, 1] == pytest.approx(expected.objectives["G"], rel=1e-9)
+    assert np.abs(found.gradients[0, 0] - gradient).max() <= 1e-8 * np.abs(gradient).max()
+
+
+def test_a_scene_of_springs_keeps_its_own_kernels():
+    assert Evaluator(read_case(CASE)).beyond == ""
+    case = read_case(CASE)
+    looking = replace(case, objectives=(replace(case.objectives[0], over_time="rms"),))
+    assert Evaluator(looking).beyond == "over_time: rms"

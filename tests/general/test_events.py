@@ -1,0 +1,127 @@
+"""Members that switch: located exactly, with the right jump, and never a hang."""
+
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.reader import read_case
+from tests.general.support import load, simulate_text
+
+FALL = """
+format: 1
+gravity: [0, -10]
+time: {{end: 2}}
+bodies: {{ball: {{mass: 2, inertia: 1, position: [0, 1]}}}}
+motions: [{{body: ball, x: {{velocity: 0}}, angle: {{velocity: 0}}}}]
+members:
+  floor:
+    from: {{body: ground, at: [0, -1]}}
+    to: {{body: ball, at: [0, 1]}}
+    law: {{type: gap, stiffness: {k}, damping: {c}, gap: 0.8, side: compression}}
+"""
+
+
+def test_a_fall_into_a_contact_spring_bounces_as_the_closed_form_says():
+    k, m, g = 5000.0, 2.0, 10.0
+    motion = simulate_text(FALL.format(k=k, c=0), tolerance=1e-11)
+    fall = np.sqrt(2.0 * 0.8 / g)
+    speed, omega = g * fall, np.sqrt(k / m)
+    # in contact: y = -g/w^2 + g/w^2 cos wt - v/w sin wt, until y = 0 again
+    contact = 2.0 * (np.pi - np.arctan2(speed * omega, g)) / omega
+    assert motion.at([fall]).q[0, 1] == pytest.approx(0.2, abs=1e-10)
+    again = motion.at([fall + contact])
+    assert again.q[0, 1] == pytest.approx(0.2, abs=1e-9)
+    assert again.v[0, 1] == pytest.approx(speed, abs=1e-8)
+    assert motion.at([2.0 * fall + contact]).q[0, 1] == pytest.approx(1.0, abs=1e-8)
+
+
+def test_a_collision_through_a_gap_keeps_momentum():
+    text = """
+format: 1
+time: {end: 1}
+bodies:
+  a: {mass: 2, inertia: 0.1, position: [0, 0], velocity: [2, 0], angular_velocity: 0.5}
+  b: {mass: 3, inertia: 0.2, position: [1, 0.02]}
+members:
+  hit: {from: {body: a, at: [0.1, 0.1]}, to: {body: b, at: [0.9, 0]}, law: {type: gap, stiffness: 4000, damping: 8, gap: 0.6, side: compression}}
+"""
+    motion = simulate_text(text)
+    momentum = motion.v.reshape(-1, 2, 3)[:, :, :2].transpose(0, 2, 1) @ np.array([2.0, 3.0])
+    assert np.abs(motion.v[-1, 3]) > 0.5
+    assert np.abs(momentum - momentum[0]).max() <= 1e-13
+
+
+@pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
+def test_a_hundred_members_that_switch_together_are_one_event_in_time(integrator):
+    text = FALL.format(k=50, c=0.05).replace(
+        "{body: ground, at: [0, -1]}", "low"
+    ).replace("{body: ball, at: [0, 1]}", "high").replace(
+        "members:",
+        "points:\n  low: {body: ground, grid: {line: {from: [-1, -1], to: [1, -1], count: 100}}}\n"
+        "  high: {body: ball, grid: {line: {from: [-1, 1], to: [1, 1], count: 100}}}\nmembers:",
+    ).replace("    law:", "    connect: pairs\n    law:")
+    settings = {} if integrator == "runge_kutta" else {"step": 0.005}
+    many = simulate_text(text, integrator=integrator, **settings)
+    one = simulate_text(FALL.format(k=5000, c=5), integrator=integrator, **settings)
+    assert many.status.ok
+    assert many.q[-1, 1] == pytest.approx(one.q[-1, 1], abs=1e-7)
+    assert len(many.t) <= 3 * len(one.t)
+
+
+def test_a_scene_that_chatters_is_reported_and_ends():
+    """A pull towards the switch from both sides: an unstable controller across a damped contact."""
+    text = """
+format: 1
+time: {end: 1}
+bodies: {ball: {mass: 1, inertia: 1, position: [0, 1], velocity: [0, -1]}}
+motions: [{body: ball, x: {velocity: 0}, angle: {velocity: 0}}]
+loads: [{body: ball, force: [0, 20]}]
+members:
+  pull: {from: {body: ground, at: [0, -1]}, to: {body: ball, at: [0, 1]}, law: {type: gap, stiffness: 0, damping: 1e9, gap: -0.1}}
+"""
+    motion = simulate_text(text)
+    assert motion.t[-1] <= 1.0
+    assert motion.status.ok or "pull" in motion.message
+
+
+def test_a_contact_that_begins_late_and_moves_apart_is_closed():
+    """A law that starts to act deep in contact acts at once, whichever way its ends move."""
+    text = FALL.format(k=40, c=0).replace("side: compression", "side: compression, active_from: 0.9")
+    motion = simulate_text(text.replace("gap: 0.8", "gap: -3"), tolerance=1e-10)
+    before, after = motion.at([0.9 - 1e-9]).a[0, 1], motion.at([0.9]).a[0, 1]
+    assert before == pytest.approx(-10.0)
+    drop = 0.5 * 10.0 * 0.81
+    assert after == pytest.approx(-10.0 + 40.0 / 2.0 * (drop + 3.0), rel=1e-9)
+
+
+def test_the_gradient_holds_on_both_sides_of_an_event():
+    """A peak that passes through the touch-off when the design changes: near it, on either side, to 1e-5."""
+    case = load("bouncing", tolerance=1e-11)
+    base = np.array(case.initial)
+    rng = np.random.default_rng(4)
+    for scale in (0.98, 1.0, 1.02):
+        alpha = base * scale
+        found = mdstopo.evaluate(case, alpha)
+        direction = rng.normal(size=len(alpha)) * alpha
+        h = 1e-6
+        plus, minus = (mdstopo.evaluate(case, alpha + s * h * direction, gradient=False) for s in (1, -1))
+        for name, gradient in found.gradients.items():
+            slope = (plus.objectives[name] - minus.objectives[name]) / (2 * h)
+            assert abs(slope - gradient @ direction) <= 1e-5 * np.abs(gradient * direction).max(), name
+
+
+def test_a_saturated_actuator_holds_its_limit():
+    text = """
+format: 1
+time: {end: 1}
+bodies: {ball: {mass: 1, inertia: 1, position: [0, 1]}}
+motions: [{body: ball, x: {velocity: 0}, angle: {velocity: 0}}]
+members:
+  act: {from: {body: ground, at: [0, 0]}, to: {body: ball, at: [0, 1]}, law: {type: actuator, proportional: 100, target: 0.5, limit: 3}}
+objectives: {F: {response: {member_force: {group: act}}, over_time: max}}
+"""
+    assert mdstopo.evaluate(read_case(text)).objectives["F"] == pytest.approx(3.0, abs=1e-12)
+    # full thrust until the force has fallen to the limit, at x = 0.47
+    motion = simulate_text(text, tolerance=1e-11)
+    reached = np.sqrt(2.0 * 0.47 / 3.0)
+    assert motion.at([reached]).q[0, 1] == pytest.approx(1.47, abs=1e-9)
