@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow, TableLaw
 from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
@@ -85,6 +86,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     responses, reductions = looked_at(case, load_case.name)
     response, response_par = _responses(case, responses, index, q0)
     rows, place, size, redundant = arrange(case, joint, joint_par, free, mass, q0, pair)
+    _refuse_redundant(case, load_case, redundant)
     damped = _damped(case, responses, reductions)
     model = GeneralModel(
         free=free, mass=mass, q0=q0, v0=v0, pair=pair, reach=reach, **members, times=times, force=force,
@@ -99,6 +101,24 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), redundant, responses,
         reductions,
     )  # fmt: skip
+
+
+def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:
+    """A joint that others imply has no force of its own to look at (CaseError)."""
+    mistakes = []
+    rows: list[tuple[str, Any]] = [(f"objectives.{o.name}", o) for o in case.objectives]
+    rows += [(f"constraints[{i}]", row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
+    for path, looked in rows:
+        name = looked.response.joint
+        if looked.load_case == load_case.name and name in redundant:
+            mistakes.append(
+                case.marks.mistake(
+                    f"{path}.response",
+                    f"joint {name} has rows that others imply at the start; what it transmits is not determined",
+                )
+            )
+    if mistakes:
+        raise CaseError(mistakes, str(case.path or case.name))
 
 
 def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], times: FloatArray) -> dict[str, Any]:

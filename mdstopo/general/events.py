@@ -15,7 +15,10 @@ import numpy as np
 
 from mdstopo.general.members import direction
 from mdstopo.general.model import INERTER
+from mdstopo.integrators.generalized_alpha_linear import hermite
+from mdstopo.integrators.steps import deflection
 from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import relative_pose
 from mdstopo.mechanics.laws.table import law_margin, law_margin_slopes, law_next, law_switches
 
 
@@ -91,6 +94,61 @@ def first_dip(model, segment, strength, rel0, rel1, h):  # type: ignore[no-untyp
             if c > 0.0 and c < 1.0 and s0 + c * (d0 + c * (square + c * cube)) < 0.0:
                 best = min(best, c)
     return best
+
+
+@kernel
+def probes_needed(model, segment, rel0, rel1):  # type: ignore[no-untyped-def]
+    """In how many parts a step is looked through: more where the bodies move far compared with a member's length."""
+    needed = 4.0
+    for k in range(model.block.shape[0]):
+        code = model.block[k, 3]
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+            continue
+        p = model.block[k, 0]
+        moved = deflection(rel1, rel0, model.reach, p)
+        lo = model.block[k, 1]
+        for i in range(lo, lo + model.block[k, 5]):
+            for r in (rel0[p], rel1[p]):
+                length, _, _, _, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+                needed = max(needed, min(8.0 * moved / max(length, 1e-300), 200.0))
+            turn = abs(rel1[p, 6]) + abs(rel0[p, 6])
+            needed = max(needed, min(4.0 * turn, 8.0))
+    return int(needed)
+
+
+@kernel
+def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):  # type: ignore[no-untyped-def]
+    """The earliest fraction of a step at which a member seems to leave its mode and come back before the end, or 2.
+
+    Looked for on the cubic through the states at both ends (n,), in as many parts as the motion asks for, and in each
+    part by `first_dip`.
+    """
+    n = q0.shape[0]
+    parts = probes_needed(model, segment, rel0, rel1)
+    q = np.empty(n)
+    v = np.empty(n)
+    before = rel0.copy()
+    rel = np.empty(rel0.shape)
+    for part in range(1, parts + 1):
+        c = part / parts
+        if part == parts:
+            relative_pose(model.pair, q1, v1, rel)
+        else:
+            a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
+            for d in range(n):
+                q[d] = a0 * q0[d] + a1 * q1[d] + h * (b0 * v0[d] + b1 * v1[d])
+                v[d] = (da0 * q0[d] + da1 * q1[d]) / h + db0 * v0[d] + db1 * v1[d]
+            relative_pose(model.pair, q, v, rel)
+            margin, _ = smallest_margin(model, segment, strength, rel)
+            if margin < -noise:
+                return c
+        dip = first_dip(model, segment, strength, before, rel, h / parts)
+        if dip < 1.0:
+            return (part - 1 + dip) / parts
+        for p in range(rel.shape[0]):
+            for i in range(rel.shape[1]):
+                before[p, i] = rel[p, i]
+    return 2.0
 
 
 @kernel

@@ -13,7 +13,7 @@ is left of the segment is divided anew.
 import numpy as np
 
 from mdstopo.general.balance import balance, factor_matrix, make_desk, solve_unknowns
-from mdstopo.general.events import first_dip, has_switches, smallest_margin
+from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.forces import drive_state
 from mdstopo.general.members import scale_general
 from mdstopo.general.model import unpack_general
@@ -328,7 +328,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 relative_pose(model.pair, q, v, before)
                 high = h
                 if not margin < -rounding:
-                    dip = first_dip(model, segment, strength, before, rel, h)
+                    dip = first_sign(model, segment, strength, q, v, ends[0], ends[1], before, rel, h, rounding)
                     if dip < 1.0:
                         high = dip * h
                         copy_state(state, kept)

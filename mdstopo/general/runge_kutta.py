@@ -8,7 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.events import block_of, first_dip, has_switches, smallest_margin, switch_of
+from mdstopo.general.events import block_of, first_sign, has_switches, smallest_margin, switch_of
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.members import scale_general, set_modes
 from mdstopo.general.model import unpack_general
@@ -319,7 +319,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 relative_pose(pair, q0, v0, before)
                 high = h
                 if not margin < -rounding:
-                    dip = first_dip(model, segment, strength, before, rel, h)
+                    dip = first_sign(model, segment, strength, q0, v0, ends[0], ends[1], before, rel, h, rounding)
                     if dip < 1.0:
                         high = dip * h
                         advance(

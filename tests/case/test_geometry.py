@@ -70,9 +70,7 @@ def test_the_rectangle_walks_counter_clockwise_from_the_lower_left_corner() -> N
 def test_rectangle_points_lie_on_the_perimeter_evenly_spaced_along_it(w: float, h: float, n: int) -> None:
     x, y = grid(f"{{rectangle: {{center: [0, 0], size: [{w!r}, {h!r}], count: {n}}}}}").T
     scale = w + h
-    on_side = np.isclose(np.abs(x), w / 2, atol=1e-12 * scale) | np.isclose(
-        np.abs(y), h / 2, atol=1e-12 * scale
-    )
+    on_side = np.isclose(np.abs(x), w / 2, atol=1e-12 * scale) | np.isclose(np.abs(y), h / 2, atol=1e-12 * scale)
     assert on_side.all()
     near = 1e-9 * scale
     walked = np.where(

@@ -170,9 +170,7 @@ ONE = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "at", "key", "words"), ONE, ids=[f"{i}-{c[3]}" for i, c in enumerate(ONE)]
-)
+@pytest.mark.parametrize(("old", "new", "at", "key", "words"), ONE, ids=[f"{i}-{c[3]}" for i, c in enumerate(ONE)])
 def test_a_single_mistake_is_told_once_with_place_key_found_and_allowed(
     old: str, new: str, at: str, key: str, words: list[str]
 ) -> None:
@@ -246,9 +244,7 @@ def test_line_breaks_in_names_stay_within_their_line() -> None:
     assert all("\n" not in m.located("x.yaml") for m in found)
 
 
-@pytest.mark.parametrize(
-    "data", [b"format: \xff\n", b"format: 1\ntitle: \xe9t\xe9\n", "format: 1".encode("utf-16")]
-)
+@pytest.mark.parametrize("data", [b"format: \xff\n", b"format: 1\ntitle: \xe9t\xe9\n", "format: 1".encode("utf-16")])
 def test_a_file_that_is_not_utf8_is_refused_at_the_byte(tmp_path: Path, data: bytes) -> None:
     path = tmp_path / "x.yaml"
     path.write_bytes(data)

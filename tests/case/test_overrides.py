@@ -99,6 +99,4 @@ def test_an_override_leaves_aliases_of_the_same_value_alone() -> None:
 def test_a_refusal_of_an_overridden_key_names_the_option() -> None:
     case = read_case(SMALL, overrides={"members.belts.law": "{type: inerter, inertance: 1}"})
     (refusal,) = refusals(case)
-    assert refusal.located("x.yaml").startswith(
-        "--set members.belts.law: members.belts.law.type: the law inerter"
-    )
+    assert refusal.located("x.yaml").startswith("--set members.belts.law: members.belts.law.type: the law inerter")

@@ -150,9 +150,7 @@ def test_a_start_angle_that_is_not_stated_is_taken_from_the_motion() -> None:
     np.testing.assert_allclose(case.points["p"].local[1], [math.sin(0.5), math.cos(0.5)])
     own = f"load_cases: {{one: {{}}, two: {{{motion.strip()}}}}}\n"
     found = mistakes(
-        changed(
-            SMALL, ("loads:", own + "loads:"), ("{response: energy}", "{response: energy, load_case: one}")
-        )
+        changed(SMALL, ("loads:", own + "loads:"), ("{response: energy}", "{response: energy, load_case: one}"))
     )
     assert [m.path_key for m in found] == ["load_cases.two.motions[0]"]
 

@@ -36,9 +36,7 @@ def test_every_part_that_is_not_computed_is_named_at_its_place() -> None:
 
 
 def test_several_objectives_are_refused_only_where_one_is_needed() -> None:
-    two = (
-        "  G: {response: energy}\n  H: {response: energy, over_time: mean}\ncombine: {weights: {G: 1, H: 1}}"
-    )
+    two = "  G: {response: energy}\n  H: {response: energy, over_time: mean}\ncombine: {weights: {G: 1, H: 1}}"
     case = read_case(changed(SMALL, ("  G: {response: energy}", two)))
     assert refusals(case) == []
     assert [m.path_key for m in refusals(case, optimizing=True)] == ["combine"]

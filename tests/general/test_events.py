@@ -43,7 +43,10 @@ bodies:
   a: {mass: 2, inertia: 0.1, position: [0, 0], velocity: [2, 0], angular_velocity: 0.5}
   b: {mass: 3, inertia: 0.2, position: [1, 0.02]}
 members:
-  hit: {from: {body: a, at: [0.1, 0.1]}, to: {body: b, at: [0.9, 0]}, law: {type: gap, stiffness: 4000, damping: 8, gap: 0.6, side: compression}}
+  hit:
+    from: {body: a, at: [0.1, 0.1]}
+    to: {body: b, at: [0.9, 0]}
+    law: {type: gap, stiffness: 4000, damping: 8, gap: 0.6, side: compression}
 """
     motion = simulate_text(text)
     momentum = motion.v.reshape(-1, 2, 3)[:, :, :2].transpose(0, 2, 1) @ np.array([2.0, 3.0])
@@ -53,13 +56,17 @@ members:
 
 @pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
 def test_a_hundred_members_that_switch_together_are_one_event_in_time(integrator):
-    text = FALL.format(k=50, c=0.05).replace(
-        "{body: ground, at: [0, -1]}", "low"
-    ).replace("{body: ball, at: [0, 1]}", "high").replace(
-        "members:",
-        "points:\n  low: {body: ground, grid: {line: {from: [-1, -1], to: [1, -1], count: 100}}}\n"
-        "  high: {body: ball, grid: {line: {from: [-1, 1], to: [1, 1], count: 100}}}\nmembers:",
-    ).replace("    law:", "    connect: pairs\n    law:")
+    text = (
+        FALL.format(k=50, c=0.05)
+        .replace("{body: ground, at: [0, -1]}", "low")
+        .replace("{body: ball, at: [0, 1]}", "high")
+        .replace(
+            "members:",
+            "points:\n  low: {body: ground, grid: {line: {from: [-1, -1], to: [1, -1], count: 100}}}\n"
+            "  high: {body: ball, grid: {line: {from: [-1, 1], to: [1, 1], count: 100}}}\nmembers:",
+        )
+        .replace("    law:", "    connect: pairs\n    law:")
+    )
     settings = {} if integrator == "runge_kutta" else {"step": 0.005}
     many = simulate_text(text, integrator=integrator, **settings)
     one = simulate_text(FALL.format(k=5000, c=5), integrator=integrator, **settings)
@@ -68,29 +75,39 @@ def test_a_hundred_members_that_switch_together_are_one_event_in_time(integrator
     assert len(many.t) <= 3 * len(one.t)
 
 
-def test_a_scene_that_chatters_is_reported_and_ends():
-    """A pull towards the switch from both sides: an unstable controller across a damped contact."""
+def test_a_ball_that_bounces_to_rest_on_a_damped_floor_does_not_hang():
+    motion = simulate_text(FALL.format(k=5000, c=20).replace("end: 2", "end: 12"), tolerance=1e-8)
+    assert motion.status.ok
+    assert motion.q[-1, 1] == pytest.approx(0.2 - 20.0 / 5000.0, abs=1e-6)
+    assert len(motion.t) < 5000
+
+
+def test_two_bodies_that_fly_through_each_other_do_not_miss_their_contact():
+    """Without forces a step could take the whole time; the contact in its middle is found all the same."""
     text = """
 format: 1
-time: {end: 1}
-bodies: {ball: {mass: 1, inertia: 1, position: [0, 1], velocity: [0, -1]}}
-motions: [{body: ball, x: {velocity: 0}, angle: {velocity: 0}}]
-loads: [{body: ball, force: [0, 20]}]
+time: {end: 10}
+bodies:
+  a: {mass: 1, inertia: 0.1, position: [0, 0], velocity: [2, 0]}
+  b: {mass: 1, inertia: 0.2, position: [1, 0]}
 members:
-  pull: {from: {body: ground, at: [0, -1]}, to: {body: ball, at: [0, 1]}, law: {type: gap, stiffness: 0, damping: 1e9, gap: -0.1}}
+  hit:
+    from: {body: a, at: [0, 0]}
+    to: {body: b, at: [1, 0]}
+    law: {type: gap, stiffness: 4000, gap: 0.6, side: compression}
 """
     motion = simulate_text(text)
-    assert motion.t[-1] <= 1.0
-    assert motion.status.ok or "pull" in motion.message
+    # equal masses exchange their velocities
+    assert motion.v[-1, [0, 3]] == pytest.approx([0.0, 2.0], abs=1e-7)
 
 
 def test_a_contact_that_begins_late_and_moves_apart_is_closed():
     """A law that starts to act deep in contact acts at once, whichever way its ends move."""
-    text = FALL.format(k=40, c=0).replace("side: compression", "side: compression, active_from: 0.9")
+    text = FALL.format(k=40, c=0).replace("side: compression", "side: compression, active_from: 0.3")
     motion = simulate_text(text.replace("gap: 0.8", "gap: -3"), tolerance=1e-10)
-    before, after = motion.at([0.9 - 1e-9]).a[0, 1], motion.at([0.9]).a[0, 1]
+    before, after = motion.at([0.3 - 1e-9]).a[0, 1], motion.at([0.3]).a[0, 1]
     assert before == pytest.approx(-10.0)
-    drop = 0.5 * 10.0 * 0.81
+    drop = 0.5 * 10.0 * 0.09
     assert after == pytest.approx(-10.0 + 40.0 / 2.0 * (drop + 3.0), rel=1e-9)
 
 
@@ -117,7 +134,11 @@ time: {end: 1}
 bodies: {ball: {mass: 1, inertia: 1, position: [0, 1]}}
 motions: [{body: ball, x: {velocity: 0}, angle: {velocity: 0}}]
 members:
-  act: {from: {body: ground, at: [0, 0]}, to: {body: ball, at: [0, 1]}, law: {type: actuator, proportional: 100, target: 0.5, limit: 3}}
+  act:
+    from: {body: ground, at: [0, 0]}
+    to: {body: ball, at: [0, 1]}
+    law: {type: actuator, proportional: 100, target: 0.5, limit: 3}
+design: {initial: 1}
 objectives: {F: {response: {member_force: {group: act}}, over_time: max}}
 """
     assert mdstopo.evaluate(read_case(text)).objectives["F"] == pytest.approx(3.0, abs=1e-12)

@@ -77,7 +77,7 @@ def test_a_redundant_link_changes_no_motion_and_shares_the_load(integrator):
 def test_a_response_on_a_redundant_joint_is_refused():
     extra = "  - {name: middle, type: distance, bodies: [ground, coupler], at: [[0.5, 0], [0.5, -1]]}"
     text = PARALLELOGRAM.format(extra=extra) + "objectives: {F: {response: {joint_force: {joint: middle}}}}\n"
-    with pytest.raises(mdstopo.CaseError, match="middle.*others imply"):
+    with pytest.raises(mdstopo.CaseError, match="middle has rows that others imply"):
         mdstopo.evaluate(read_case(text))
 
 
@@ -104,7 +104,7 @@ joints: [{name: pin, type: revolute, bodies: [bob, ground], at: {bob: [0, 0.01],
     assert motion.status.ok
     x, y, angle = motion.q[0]
     arm = np.array([np.cos(angle) * -1.0 - np.sin(angle) * 0.01, np.sin(angle) * -1.0 + np.cos(angle) * 0.01])
-    assert np.abs([x, y] + arm).max() <= 1e-14
+    assert np.abs(np.array([x, y]) + arm).max() <= 1e-14
 
 
 def chain(n):
@@ -112,9 +112,7 @@ def chain(n):
     joints = "\n".join(
         f"  - {{type: revolute, bodies: [{'ground' if i == 0 else f'b{i - 1}'}, b{i}], at: [{i}, 0]}}" for i in range(n)
     )
-    return (
-        f"format: 1\ngravity: [0, -9.81]\ntime: {{end: 0.2}}\nbodies:\n{bodies}\njoints:\n{joints}\n"
-    )
+    return f"format: 1\ngravity: [0, -9.81]\ntime: {{end: 0.2}}\nbodies:\n{bodies}\njoints:\n{joints}\n"
 
 
 def test_a_hanging_chain_keeps_its_energy():

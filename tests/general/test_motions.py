@@ -61,9 +61,7 @@ def test_a_driven_vehicle_moves_as_an_infinitely_heavy_one():
     case = mdstopo.load_case("cases/fig6-motion.yaml")
     seen = mdstopo.simulate(case).at([0.05, 0.1, 0.2])
     heavy = mdstopo.simulate(
-        mdstopo.load_case(
-            "cases/fig6.yaml", overrides={"bodies.vehicle.mass": "2e9", "bodies.vehicle.inertia": "6e9"}
-        )
+        mdstopo.load_case("cases/fig6.yaml", overrides={"bodies.vehicle.mass": "2e9", "bodies.vehicle.inertia": "6e9"})
     ).at([0.05, 0.1, 0.2])
     assert loads.n_design == case.n_design
     assert seen.q == pytest.approx(heavy.q, abs=2e-6)

@@ -84,9 +84,7 @@ def test_energy_is_kept_at_radius_one_and_only_falls_below_it():
 def test_internal_forces_leave_the_momentum_alone():
     scene = random_scene([Group(0, 1, 40, damping=2.0)], MASSES, times=(0.0, 3.0), load=0.0, spin=0.4)
     bench = solved(scene, np.ones(40), step=0.01, gradient=False)
-    momentum = np.array(
-        [(bench.state[:, 1, axis::3] / scene.model.inv_mass[axis::3]).sum(axis=1) for axis in range(2)]
-    )
+    momentum = np.array([(bench.state[:, 1, axis::3] / scene.model.inv_mass[axis::3]).sum(axis=1) for axis in range(2)])
     assert np.abs(momentum - momentum[:, :1]).max() <= 1e-11 * np.abs(momentum).max()
 
 

@@ -59,9 +59,7 @@ def test_following_only_the_highest_peak_is_worse():
     results = {}
     for peaks in (1, 4):
         problem, _, _ = two_peaks()
-        results[peaks] = run(
-            Gsao(problem, settings(overrides={"peaks": peaks}, max_iterations=25))
-        ).best_objective
+        results[peaks] = run(Gsao(problem, settings(overrides={"peaks": peaks}, max_iterations=25))).best_objective
     assert results[4] < 0.999 * results[1]
 
 
@@ -198,9 +196,7 @@ def test_steps_shrink_towards_the_iterate_while_evaluations_fail(preset):
 
 def test_a_run_whose_evaluations_keep_failing_gives_up_with_the_reason_and_the_best():
     problem, _ = compliance_problem()
-    state = run(
-        Gsao(failing(problem, set(range(3, 100))), settings(overrides={"failures": 3}, max_iterations=99))
-    )
+    state = run(Gsao(failing(problem, set(range(3, 100))), settings(overrides={"failures": 3}, max_iterations=99)))
     assert state.status == "failed"
     assert Status.ZERO_LENGTH.value in state.reason
     assert "belts[3]" in state.reason
@@ -252,9 +248,7 @@ def test_the_iteration_limit_counts_evaluations_after_the_first():
 
 def test_small_decreases_twice_running_stop_the_run():
     problem, _ = compliance_problem()
-    state = run(
-        Gsao(problem, settings(overrides={"decrease_tolerance": 0.01}, max_iterations=99, tolerance=0.0))
-    )
+    state = run(Gsao(problem, settings(overrides={"decrease_tolerance": 0.01}, max_iterations=99, tolerance=0.0)))
     assert state.status == "converged"
     assert "twice running" in state.reason
 

@@ -71,9 +71,7 @@ def test_a_feasible_design_stays_to_the_bit():
 
 def test_fixed_variables_and_empty_rows_are_no_trouble():
     lower, upper = np.array([0.5, 0.0, 0.0]), np.array([0.5, 1.0, 1.0])
-    linear = LinearRows(
-        np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]]), np.array([1.5, 0.0]), np.array([True, True])
-    )
+    linear = LinearRows(np.array([[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]]), np.array([1.5, 0.0]), np.array([True, True]))
     np.testing.assert_allclose(project(np.zeros(3), lower, upper, linear), [0.5, 0.5, 0.5], atol=1e-12)
 
 

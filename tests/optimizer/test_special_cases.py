@@ -17,9 +17,9 @@ def wavy(n, seed):
     w, k, c = rng.uniform(0.1, 2.0, n), rng.uniform(-3.0, 3.0, n), rng.uniform(0.5, 2.0, n)
 
     def functions(x):
-        return np.array([np.sum(w / (x + 0.2) + k * x + np.sin(c * x))]), (
-            -w / (x + 0.2) ** 2 + k + c * np.cos(c * x)
-        )[None, :]
+        return np.array([np.sum(w / (x + 0.2) + k * x + np.sin(c * x))]), (-w / (x + 0.2) ** 2 + k + c * np.cos(c * x))[
+            None, :
+        ]
 
     return functions
 
@@ -104,9 +104,7 @@ def test_conlin_is_reciprocal_where_the_function_falls_and_linear_where_it_rises
     def update(multiplier):
         with np.errstate(divide="ignore"):
             falling = x * np.sqrt(np.maximum(-slope, 0.0) / multiplier)
-        return np.clip(
-            np.where(slope < 0.0, falling, np.where(slope + multiplier > 0.0, 0.05, 1.0)), 0.05, 1.0
-        )
+        return np.clip(np.where(slope < 0.0, falling, np.where(slope + multiplier > 0.0, 0.05, 1.0)), 0.05, 1.0)
 
     a, b = 1e-12, 1e12
     for _ in range(300):
@@ -143,8 +141,6 @@ def test_slp_solves_the_linear_programme(seed):
 
 def test_slp_with_one_peak_and_one_row_fills_up_the_steepest():
     slopes = np.array([-3.0, -1.0, -2.0, 1.0])
-    problem = Toy(
-        lambda x: (np.array([slopes @ x]), slopes[None, :]), np.full(4, 0.5), 0.0, 1.0, volume(4, 2.0, True)
-    )
+    problem = Toy(lambda x: (np.array([slopes @ x]), slopes[None, :]), np.full(4, 0.5), 0.0, 1.0, volume(4, 2.0, True))
     state = Gsao(problem, settings("slp", {"trust_start": 0.4})).start()
     np.testing.assert_allclose(state.trial, [0.9, 0.1, 0.9, 0.1], atol=1e-12)

@@ -34,9 +34,7 @@ def jacobian(model, x):
     """The rows' derivatives from their formula, written out independently of the solver."""
     below, above = model.x - model.below, model.x + model.above
     falling = ((x - below) / (model.x - below)) ** (model.power - 1)
-    rising = (
-        ((x - above) / (model.x - above)) ** (model.power - 1) if not model.linear_above else np.ones_like(x)
-    )
+    rising = ((x - above) / (model.x - above)) ** (model.power - 1) if not model.linear_above else np.ones_like(x)
     return np.where(model.slopes < 0, model.slopes * falling, model.slopes * rising)
 
 
