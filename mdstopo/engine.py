@@ -161,6 +161,13 @@ class Evaluator:
 
         return StructureProblem(self)
 
+    def degrees_of_freedom(self, load_case: str) -> int:
+        """Coordinates that are free, less the independent rows of joints."""
+        scene = self.scenes[load_case]
+        if isinstance(scene, Scene):
+            return scene.n
+        return int(scene.model.free.sum()) - int(scene.model.size[0])
+
     def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
         """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
         if self.beyond:
@@ -296,7 +303,10 @@ def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked:
 
     if isinstance(driver, Driver):
         return differentiate(method, driver, design, looked)
-    return Differentiated(Status.OK, "", driver.differentiate(method, design, looked))
+    from mdstopo.general.methods import differentiate as differentiate_general
+
+    gradients, message = differentiate_general(driver, method, design, looked)
+    return Differentiated(Status.OK, message, gradients)
 
 
 def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:

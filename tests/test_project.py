@@ -40,16 +40,19 @@ def test_readme_python_runs_and_gives_what_it_says(snippet, monkeypatch, capsys)
 
 def test_readme_has_a_python_snippet_and_a_case():
     assert len(blocks("runs")) == 1
-    assert len(blocks("case")) == 1
+    assert len(blocks("case")) == 2
 
 
-def test_readme_case_can_be_optimised():
+@pytest.mark.parametrize(("number", "members"), [(0, 20 * 17), (1, 6 * 5)])
+def test_readme_cases_can_be_optimised(number, members):
+    import mdstopo
     from mdstopo.case.reader import read_case
     from mdstopo.scene.refusals import refusals
 
-    case = read_case(blocks("case")[0])
-    assert case.n_design == 20 * 17
+    case = read_case(blocks("case")[number])
+    assert case.n_design == members
     assert refusals(case, optimizing=True) == []
+    assert mdstopo.evaluate(case).status.ok
 
 
 def test_readme_names_all_commands_and_no_others():

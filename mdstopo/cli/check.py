@@ -38,6 +38,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         output.notice(f"warning: {remark.located(str(case_path))}")
     output.say(f"{case.title or case.name} ({case_path})")
     _say_bodies(output, case)
+    _say_joints(output, case)
     _say_members(output, case)
     sums = totals(case)
     output.say("totals")
@@ -50,7 +51,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "command": "check",
         "case": case.name,
         "title": case.title,
-        "degrees_of_freedom": 3 * len(case.bodies),
+        "joints": [joint.name for joint in case.joints],
         "members": case.n_members,
         "design_variables": case.n_design,
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
@@ -63,6 +64,10 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         from mdstopo.engine import Evaluator
 
         engine = Evaluator(case, beside=False)
+        freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}
+        for name, freedom in freedoms.items():
+            output.say(f"load case {name}: {freedom} degrees of freedom")
+        document["degrees_of_freedom"] = max(freedoms.values())
         found = frequencies(case, engine)
         _say_frequencies(output, found)
         output.say("left out, because nothing asks for it")
@@ -77,11 +82,22 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
 
 
 def _say_bodies(output: Output, case: "Case") -> None:
-    output.say(f"{len(case.bodies)} bodies, {3 * len(case.bodies)} degrees of freedom")
+    output.say(f"{len(case.bodies)} bodies")
     rows = [["body", "mass, kg", "inertia, kg m2", "x, m", "y, m", "angle, rad"]]
     for body in case.bodies:
         values = (body.mass, body.inertia, *body.position, body.angle)
         rows.append([body.name, *(number(value) for value in values)])
+    output.table(rows)
+
+
+def _say_joints(output: Output, case: "Case") -> None:
+    if not case.joints:
+        return
+    rows = [["joint", "type", "between", "at, m"]]
+    for joint in case.joints:
+        at = ", ".join(number(value) for value in joint.at_first)
+        rows.append([joint.name, joint.type, ", ".join(joint.bodies), f"({at}) on {joint.bodies[0]}"])
+    output.say(f"{len(case.joints)} joints")
     output.table(rows)
 
 

@@ -20,7 +20,7 @@ from mdstopo.mechanics.laws.table import law
 
 
 @kernel
-def step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, out):  # type: ignore[no-untyped-def]
+def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out):  # type: ignore[no-untyped-def]
     """out (4 n + s n, 4 n + 1): what unit changes of q, v, the carried rows, and each stage's force, do at the end.
 
     The last column is what they do to an integral with cotangents bars (s, 3, n), rows_bar (s, n_row) of the stages (no
@@ -34,6 +34,7 @@ def step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, out):  # typ
     force = np.empty((s, n))
     changes = np.empty((s, 3, n))
     rows = np.empty((s, model.size[0]))
+    settled = True
     for b in range((4 + s) * n):
         dq[:] = 0.0
         dv[:] = 0.0
@@ -51,7 +52,8 @@ def step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, out):  # typ
             dx[part - 2, b % n] = 1.0
         else:
             force[part - 4, b % n] = 1.0
-        step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk)
+        if not step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
+            settled = False
         for d in range(n):
             out[b, d] = dq[d]
             out[b, n + d] = dv[d]
@@ -64,6 +66,7 @@ def step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, out):  # typ
                         out[b, 4 * n] += bars[j, part, d] * changes[j, part, d]
                 for r in range(model.size[0]):
                     out[b, 4 * n] += rows_bar[j, r] * rows[j, r]
+    return settled
 
 
 @kernel
@@ -78,7 +81,7 @@ def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):  # typ
 
 
 @kernel
-def through_step(tag, model, tables, strength, track, w, c, bars, rows_bar, desk, column, matrix, spare):  # type: ignore[no-untyped-def]
+def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, desk, column, matrix, spare):  # type: ignore[no-untyped-def]
     """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
 
     The last column sums up the derivative of an integral (`step_map`).
@@ -90,7 +93,7 @@ def through_step(tag, model, tables, strength, track, w, c, bars, rows_bar, desk
     row = np.empty(6)
     row_rate = np.empty(6)
     restore_modes(track, track.index[w, 3], strength)
-    step_map(tag, model, tables, track, w, c, bars, rows_bar, desk, matrix)
+    settled = step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, matrix)
     width = 4 * n + 1
     for k in range(model.block.shape[0]):
         if model.block[k, 4] < 0:
@@ -115,6 +118,7 @@ def through_step(tag, model, tables, strength, track, w, c, bars, rows_bar, desk
             for d in range(4 * n):
                 column[i, d] = spare[d]
             column[i, 4 * n] += spare[4 * n]
+    return settled
 
 
 @kernel
@@ -145,6 +149,7 @@ def push(  # type: ignore[no-untyped-def]
     count,
     j,
     integral,
+    sweeps,
     row,
     room,
     room_ints,
@@ -155,7 +160,8 @@ def push(  # type: ignore[no-untyped-def]
 ):
     """out (N,) = the derivative of one row of `extremes`, or of an integral, by alpha (N,), carried forward.
 
-    Arguments as those of `look.pull`.
+    Arguments as those of `look.pull`. sweeps > 0: by the iterative method, with so many sweeps at most; returns the
+    step in which they did not settle, or -1.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -184,12 +190,23 @@ def push(  # type: ignore[no-untyped-def]
         end = track.index[k + 1, 0]
         own = stage_bars[o:end] if integral > 0 else stage_bars
         own_rows = rows_bar[o:end] if integral > 0 else rows_bar
-        through_step(tag, model, tables, strength, track, k, 1.0, own, own_rows, desk, column, matrix, spare)
+        settled = through_step(
+            tag, model, tables, strength, track, k, 1.0, sweeps, own, own_rows, desk, column, matrix, spare
+        )
+        if not settled:
+            return k
         jump(model, track, k + 1, column)
-    if integral == 0 and w >= 0:
-        through_step(tag, model, tables, strength, track, w, c, stage_bars, rows_bar, desk, column, matrix, spare)
+    if (
+        integral == 0
+        and w >= 0
+        and not through_step(
+            tag, model, tables, strength, track, w, c, sweeps, stage_bars, rows_bar, desk, column, matrix, spare
+        )
+    ):
+        return last
     for i in range(padded.shape[0]):
         padded[i] += column[i, 4 * n]
         for d in range(n):
             padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
     unscale_general(model.block, model.power, alpha, padded, out)
+    return -1

@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
-from mdstopo.general.extremes import COLUMNS, RATE, SIGN, VALUE, peaks, ranked, sample
+from mdstopo.general.extremes import COLUMNS, SIGN, VALUE, peaks, ranked, sample
 from mdstopo.general.model import COUNT, GROUP, INERTER, START, pack_general
 from mdstopo.general.track import track_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
@@ -121,18 +121,18 @@ class GeneralDriver:
 
     def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
         """Rows and gradients of response j, reduced over time."""
-        t = self._states()[0][: count + 1].copy()
+        t = self.states()[0][: count + 1].copy()
         rows = self.rows[j]
         if reduction in INTEGRALS:
             total = self._pull(j, rows[0], INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
-            value, slope = _reduced(reduction, total, float(t[-1] - t[0]))
+            value, slope = reduced(reduction, total, float(t[-1] - t[0]))
             rows[0] = np.nan, value, 0.0, 0.0, slope, 1.0, -1.0
             self.gradients[j, 0] *= slope
             self.found[j] = 1
             return
 
         def see(places: FloatArray, exact: bool) -> FloatArray:
-            return self._visit(j, places, exact, count)[2]
+            return self.visit(j, places, exact, count)[2]
 
         if reduction == "final":
             value, rate, who = see(np.array([[count - 1.0, 1.0]]), True)[0]
@@ -150,28 +150,7 @@ class GeneralDriver:
                 self.gradients[j, r] *= flip
             rows[r, VALUE] *= flip
 
-    def differentiate(self, method: str, alpha: FloatArray, looked: Looked) -> FloatArray:
-        """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by `direct`."""
-        gradients = np.zeros_like(looked.gradients)
-        rows = looked.rows.copy()
-        before = self.work.copy()
-        _, count, _ = self.run(alpha, True)
-        self.work += before
-        for j, reduction in enumerate(self.scene.reductions):
-            for r in range(int(looked.found[j])):
-                integral = INTEGRALS.get(reduction, 0)
-                self.entry.push(
-                    self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count, j,
-                    integral, rows[j, r], self.room, self.room_ints, self.strength, self.padded, gradients[j, r],
-                    self.work,
-                )  # fmt: skip
-                if integral:
-                    gradients[j, r] *= rows[j, r, RATE]
-                elif reduction == "max_abs":
-                    gradients[j, r] *= rows[j, r, SIGN]
-        return gradients
-
-    def _visit(
+    def visit(
         self, j: int, places: FloatArray, exact: bool, count: int, steps: "GeneralSteps | None" = None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """q, v, a (3, K, n), multipliers (K, n_row + n_driven) and (K, 3) value, rate, member at places (K, 2)."""
@@ -188,10 +167,14 @@ class GeneralDriver:
         )  # fmt: skip
         return out, lam, seen
 
+    def steps_arguments(self, count: int) -> tuple[Any, ...]:
+        """What every entry that differentiates begins with."""
+        return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
+
     def _pull(self, j: int, row: FloatArray, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
         total: float = self.entry.pull(
-            self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count, j, integral,
-            gradient, row, self.room, self.room_ints, self.strength, self.padded, out, self.work,
+            *self.steps_arguments(count), j, integral, gradient, row, self.room, self.room_ints, self.strength,
+            self.padded, out, self.work,
         )  # fmt: skip
         return total
 
@@ -229,18 +212,18 @@ class GeneralDriver:
         if code == CHATTERING:
             return f"{self.member(int(self.where[0]))}, {when}"
         n, count = len(self.scene.model.mass), self._steps_until(time)
-        speed = np.abs(self._states()[1][count, 1, : self.scene.n]).reshape(-1, 3).max(axis=1)
+        speed = np.abs(self.states()[1][count, 1, : self.scene.n]).reshape(-1, 3).max(axis=1)
         wild = np.flatnonzero(~np.isfinite(speed))
         body = self.scene.bodies[int(wild[0]) if wild.size else int(speed.argmax())] if n > 3 else "ground"
         return f"{when}; the fastest body is {body}"
 
-    def _states(self) -> tuple[FloatArray, FloatArray]:
+    def states(self) -> tuple[FloatArray, FloatArray]:
         """Times and states in the driver's room, with the room for more behind them."""
         steps, n = int(self.limits[1]) + 1, len(self.scene.model.mass)
         return self.room[:steps], self.room[steps : steps + 2 * n * steps].reshape(steps, 2, n)
 
     def _steps_until(self, time: float) -> int:
-        return int(np.argmin(np.abs(self._states()[0] - time)))
+        return int(np.argmin(np.abs(self.states()[0] - time)))
 
     def _singular(self, place: int) -> str:
         """The joint whose row stands at a place of the matrix, or the body whose coordinate does."""
@@ -274,7 +257,7 @@ class GeneralDriver:
         return status_of(code), GeneralSteps(self, count)
 
 
-def _reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
+def reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
     """Mean, integral or rms from the integral over time (of the square), and its derivative by that."""
     if reduction == "integral":
         return total, 1.0
@@ -312,7 +295,7 @@ class GeneralSteps:
         self._driver = driver
         self.kept = driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.strength.copy()
         self.count = count
-        t, state = driver._states()
+        t, state = driver.states()
         self.t: FloatArray = t[: count + 1].copy()
         self.state: FloatArray = state[: count + 1].copy()
 
@@ -324,7 +307,7 @@ class GeneralSteps:
         fraction = (times - self.t[step]) / (self.t[step + 1] - self.t[step])
         fraction[times == self.t[step + 1]] = 1.0
         places = np.stack([step.astype(np.float64), fraction], axis=1)
-        out, solved, _ = self._driver._visit(-1, places, True, self.count, self)
+        out, solved, _ = self._driver.visit(-1, places, True, self.count, self)
         return out, self._all_rows(out[0], solved)
 
     def at(self, times: FloatArray) -> FloatArray:

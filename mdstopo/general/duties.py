@@ -8,8 +8,9 @@ The tag is a tuple of zeros whose length says which method is meant.
    the end of step w (of its fraction c where that is below 1) pulled back to its start, in place, with explicit ones of
    the stages; z (s, n) are the virtual displacements of the stages' balances. lam_x (2, n): what a method carries
    from step to step beside the state.
-3. `step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk)`: changes pushed through
-   step w, with forces (s, n) on its stages; changes (s, 3, n) and rows (s, n_row) of the stages come out.
+3. `step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk)`: changes pushed
+   through step w, by fixed-point sweeps where sweeps > 0 (returns whether they settled), with forces (s, n) on its
+   stages; changes (s, 3, n) and rows (s, n_row) of the stages come out.
 4. `beside(tag, track, k, c, e, q, v, a, q_out, v_out)`: the motion a little later (e < 0: earlier) than at fraction c
    of step k, where it is q, v, a; `derivatives(tag)`: how many derivatives of the motion are those of the balance.
 5. `weights_of(tag, model, tables, track, w, out)`: weights (s,) of the stages in the integral over step w.
@@ -40,7 +41,7 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
     raise NotImplementedError
 
 
-def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
     """Duty 3."""
     raise NotImplementedError
 
@@ -81,7 +82,7 @@ def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_
 
 
 @overload(step_forward)
-def _step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def _step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
     return _of("step_forward", tag)
 
 

@@ -76,13 +76,15 @@ def advance(  # type: ignore[no-untyped-def]
     track,
     ends,
     push,
-    weight,
+    extent,
+    rel0,
     work,
 ):
     """One step of length h from state (4, n) = q, v, a, x to ends (4, n) of the same; q, v of the end on the joints.
 
     starting: whether a and x are to be made here. guess (3, n): x of the three steps before, for the first iterate.
-    weight (n,): of a change of each coordinate relative to the motion. push (2, n_row). With o >= 0 the stages are kept
+    extent (2, n_pair): how far each pair has moved so far from its pose rel0 at the start, and its noise, m. push
+    (2, n_row). With o >= 0 the stages are kept
     from there on. Returns (code, stages, place of a singular unknown).
     """
     n = state.shape[1]
@@ -99,6 +101,8 @@ def advance(  # type: ignore[no-untyped-def]
     delta = np.empty(n)
     lam = np.zeros(n_row)
     row = np.empty(n_row)
+    weight = np.empty(n)
+    scale = np.empty(model.pair.shape[0])
     stages = 0
     if starting:
         copy_vector(state[0], q)
@@ -167,6 +171,12 @@ def advance(  # type: ignore[no-untyped-def]
             model, desk, desk.k, desk.c, desk.turn, desk.mass, h * h * beta * e1, h * gamma * e1, np.bool_(False)
         )
         solve_unknowns(model, desk, delta, row)
+        rounding = 1e-8
+        for p in range(model.pair.shape[0]):
+            reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
+            scale[p] = max(reached, 1e3 * extent[1, p])
+            rounding = max(rounding, 100.0 * extent[1, p] / scale[p])
+        motion_weights(model.pair, rel0, model.reach, scale, weight)
         e = 0.0
         for d in range(n):
             moved = h * h * beta * e1 * delta[d]
@@ -177,7 +187,7 @@ def advance(  # type: ignore[no-untyped-def]
             change = weight[d] * abs(moved)
             if not change <= e and not np.isnan(e):
                 e = change
-        if e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-8):
+        if e <= newton_tolerance or (e >= 0.5 * previous and e < rounding):
             break
         previous = e
         if newton >= MOST or (newton >= RESTART and not e < np.inf):
@@ -230,7 +240,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     push = np.zeros((2, n_row))
     lam = np.zeros(n_row)
     a0 = np.zeros(n)
-    weight = np.empty(n)
     q = state[0]
     v = state[1]
     copy_vector(model.q0, q)
@@ -249,9 +258,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         where[0] = singular
         return SINGULAR, 0, 0, t
     relative_pose(model.pair, q, v, rel0)
-    motion = np.zeros(n_pair)
-    noise = np.empty(n_pair)
-    scale = np.empty(n_pair)
+    extent = np.zeros((2, n_pair))
+    motion = extent[0]
+    noise = extent[1]
     for p in range(n_pair):
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + model.reach[p]) + 1e-300
         stiffness = desk.sums[p, 7] + desk.sums[p, 11]
@@ -310,12 +319,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 return STEP_TOO_SMALL, count, events, t
             lands = done + 1.0 >= pieces
             starting = np.bool_(known == 0)
-            for p in range(n_pair):
-                scale[p] = max(motion[p], 1e3 * noise[p])
-            motion_weights(model.pair, rel0, model.reach, scale, weight)
             code, used, singular = advance(
                 model, tables[0], strength, segment, t, h, starting, state, guess, newton_tolerance, size, stages, desk,
-                track, ends, push, weight, work,
+                track, ends, push, extent, rel0, work,
             )  # fmt: skip
             if code != OK:
                 where[0] = singular
@@ -334,7 +340,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         copy_state(state, kept)
                         code, _, singular = advance(
                             model, tables[0], strength, segment, t, high, starting, kept, guess, newton_tolerance,
-                            size, nowhere, desk, track, trial, push, weight, work,
+                            size, nowhere, desk, track, trial, push, extent, rel0, work,
                         )  # fmt: skip
                         relative_pose(model.pair, trial[0], trial[1], rel)
                         margin, who = smallest_margin(model, segment, strength, rel)
@@ -358,7 +364,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         copy_state(state, kept)
                         code, _, singular = advance(
                             model, tables[0], strength, segment, t, middle, starting, kept, guess, newton_tolerance,
-                            size, nowhere, desk, track, trial, push, weight, work,
+                            size, nowhere, desk, track, trial, push, extent, rel0, work,
                         )  # fmt: skip
                         if code != OK:
                             where[0] = singular
@@ -381,7 +387,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     lands = lands and t + h >= end
                     code, used, singular = advance(
                         model, tables[0], strength, segment, t, h, starting, state, guess, newton_tolerance, size,
-                        stages, desk, track, ends, push, weight, work,
+                        stages, desk, track, ends, push, extent, rel0, work,
                     )  # fmt: skip
                 relative_pose(model.pair, ends[0], ends[1], rel)
             finite = True

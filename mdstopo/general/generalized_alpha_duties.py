@@ -138,7 +138,7 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
 
 
 @kernel
-def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
     """Duty 3."""
     n = dq.shape[0]
     o = track.index[w, 0]
@@ -149,6 +149,7 @@ def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, ro
     aux = dx[1]
     end_q = np.empty(n)
     end_v = np.empty(n)
+    settled = True
     for j in range(last + 1):
         x = changes[j, 0]
         u = changes[j, 1]
@@ -171,7 +172,7 @@ def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, ro
                 u[d] = 0.0
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
-        stage_forward(model, track, o + j, w_q, w_v, desk, x, u, f, rows[j])
+        settled = stage_forward(model, track, o + j, w_q, w_v, sweeps, desk, x, u, f, rows[j]) and settled
         for d in range(n):
             if j == last:
                 x[d] += w_q * f[d]
@@ -194,6 +195,7 @@ def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, ro
         start = dq[d]
         dq[d] = q0 * start + q1 * end_q[d] + h * (v0 * dv[d] + v1 * end_v[d])
         dv[d] = (dq0 * start + dq1 * end_q[d]) / h + dv0 * dv[d] + dv1 * end_v[d]
+    return settled
 
 
 implement(

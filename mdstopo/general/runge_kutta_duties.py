@@ -50,9 +50,10 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
 
 
 @kernel
-def step_forward(tag, model, tables, track, w, c, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
-    """Duty 3."""
+def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+    """Duty 3; nothing is implicit here."""
     explicit_forward(model, tables, track, w, dq, dv, force, changes, rows, desk)
+    return True
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Steps of a general scene, linearised: the reverse step and the tangent step of the explicit methods."""
+"""Stages and explicit steps of a general scene, linearised: what reverse and tangent steps are made of."""
 
 import numpy as np
 
@@ -8,6 +8,9 @@ from mdstopo.general.track import mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
+
+#: change of a sweep of the iterative method, relative, at which it has settled
+SETTLED = 1e-12
 
 
 @kernel
@@ -106,7 +109,7 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
             x[1, d] = speed if model.free[d] != 0 else 0.0
             x[2, d] = force[i, d]
         row_changes[i] = 0.0
-        stage_forward(model, track, o + i, 0.0, 0.0, desk, x[0], x[1], x[2], row_changes[i])
+        stage_forward(model, track, o + i, 0.0, 0.0, 0, desk, x[0], x[1], x[2], row_changes[i])
     for d in range(n):
         dq[d] += h * dv[d]
         for j in range(s):
@@ -121,10 +124,58 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
 
 
 @kernel
-def stage_forward(model, track, o, w_q, w_v, desk, dq, dv, force, row):  # type: ignore[no-untyped-def]
+def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):  # type: ignore[no-untyped-def]
     """force (n,) and row (n_row,), changes of the balance, become those of the accelerations and multipliers of stage o
-    whose state changes by dq, dv."""
+    whose state changes by dq, dv.
+
+    sweeps > 0: what the stage's own acceleration changes in its state goes through W alone by so many fixed-point
+    sweeps at most (the iterative method), until they change by less than SETTLED; returns whether they did.
+    """
     lay_out(model, track, o, desk)
     push_forward(model, desk, track.K[o], track.C[o], track.turn[o], dq, dv, force, row)
+    if sweeps > 0 and (w_q != 0.0 or w_v != 0.0):
+        return _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row)
     factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(False))
     solve_unknowns(model, desk, force, row)
+    return True
+
+
+@kernel
+def _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row):  # type: ignore[no-untyped-def]
+    """[M Phi^T; Phi 0] x = rhs - (w_q K + w_v C) x by fixed-point sweeps; force, row: the right side, then x."""
+    n = force.shape[0]
+    n_row = row.shape[0]
+    none = track.K[o]
+    factor_matrix(model, desk, none, none, track.turn[o], mass_of(track, o), 0.0, 0.0, np.bool_(False))
+    x = np.zeros(n)
+    y = np.zeros(n_row)
+    dq = np.empty(n)
+    dv = np.empty(n)
+    right = force.copy()
+    right_row = row.copy()
+    last = np.inf
+    for _ in range(sweeps):
+        for d in range(n):
+            dq[d] = w_q * x[d]
+            dv[d] = w_v * x[d]
+            force[d] = right[d]
+        for r in range(n_row):
+            row[r] = right_row[r]
+        push_forward(model, desk, track.K[o], track.C[o], track.turn[o], dq, dv, force, row)
+        solve_unknowns(model, desk, force, row)
+        change = 0.0
+        size = 0.0
+        for d in range(n):
+            change = max(change, abs(force[d] - x[d]))
+            size = max(size, abs(force[d]))
+            x[d] = force[d]
+        for r in range(n_row):
+            change = max(change, abs(row[r] - y[r]))
+            size = max(size, abs(row[r]))
+            y[r] = row[r]
+        if not change < np.inf or change > 1e6 * last:
+            return False
+        if change <= SETTLED * size:
+            return True
+        last = min(last, change)
+    return False

@@ -10,7 +10,6 @@ from mdstopo.scene.family import beyond_springs
 
 #: methods of the general kernels
 INTEGRATORS = frozenset({"auto", "runge_kutta", "generalized_alpha"})
-SENSITIVITIES = frozenset({"auto", "adjoint", "direct"})
 
 
 def refusals(case: Case, optimizing: bool = False) -> list[Mistake]:
@@ -30,8 +29,6 @@ def _refused(case: Case, optimizing: bool) -> Iterator[tuple[str, str]]:
             "solver.integrator",
             f"{solver.integrator} does not compute {beyond}; runge_kutta does, and auto takes it",
         )
-    if beyond and solver.sensitivity not in SENSITIVITIES:
-        yield "solver.sensitivity", f"{solver.sensitivity} does not compute {beyond} yet; adjoint does"
     if optimizing and len(case.objectives) > 1:
         path = "combine" if "combine" in case.marks else "objectives"
         yield path, "an optimisation of several objectives is not computed yet"

@@ -163,7 +163,8 @@ def test_check_says_what_is_in_the_case(capsys: pytest.CaptureFixture[str]) -> N
     status, out, _ = call(capsys, "check", "probe.yaml")
     assert status == 0
     for word in (
-        "2 bodies, 6 degrees of freedom",
+        "2 bodies",
+        "load case default: 6 degrees of freedom",
         "12 members",
         "2060 kg",
         "omega t1",
@@ -178,12 +179,13 @@ def test_check_says_what_is_in_the_case(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_check_describes_what_cannot_be_computed_and_refuses_it(capsys: pytest.CaptureFixture[str]) -> None:
-    Path("joint.yaml").write_text(CASE + "joints:\n  - {type: revolute, bodies: [torso, ground], at: [0, 0]}\n")
+    joints = "joints:\n  - {type: revolute, bodies: [torso, ground], at: [0, 0]}\n"
+    Path("joint.yaml").write_text(CASE + joints + "solver: {integrator: gauss}\n")
     status, out, err = call(capsys, "check", "joint.yaml")
     assert status == 2
     assert "2 bodies" in out
     assert err.startswith("joint.yaml:")
-    assert "joints (revolute) are not computed yet" in err
+    assert "gauss does not compute joints; runge_kutta does" in err
 
 
 def test_simulate_says_where_the_bodies_end(capsys: pytest.CaptureFixture[str]) -> None:

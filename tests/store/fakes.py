@@ -4,7 +4,7 @@ import hashlib
 import os
 import signal
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -116,6 +116,7 @@ class FakeMotion:
     a: Floats
     lam: Floats
     status: Status = Status.OK
+    reactions: dict[str, Floats] = field(default_factory=dict)
 
 
 class FakeEngine:

@@ -95,7 +95,7 @@ def gap_next(p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
 
 @inline
 def gap_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
-    """The mode at the start."""
+    """The mode at the start; what rests exactly at the gap has reached it."""
     y = p[3] * x - p[2]
     rate = p[3] * xd
     near = NEAR * max(1.0, abs(p[2]))
@@ -103,7 +103,7 @@ def gap_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
         return OPEN
     if y <= near:
         ahead = rate if rate != 0.0 else p[3] * xdd
-        return _closed(p, max(y, 0.0), rate) if ahead > 0.0 else OPEN
+        return _closed(p, max(y, 0.0), rate) if ahead >= 0.0 else OPEN
     return _closed(p, y, rate)
 
 

@@ -9,7 +9,7 @@ from mdstopo.jit import inline
 def pulse_force(p, t):  # type: ignore[no-untyped-def]
     """f, f_x, f_xd, V, V_x."""
     s = t - p[2]
-    return p[0] * math.exp(-min(p[1] * s * s, 745.0)), 0.0, 0.0, 0.0, 0.0
+    return p[0] * math.exp(-min(p[1] * min(s * s, 1e300), 745.0)), 0.0, 0.0, 0.0, 0.0
 
 
 def pulse_landings(rate: float, time: float) -> list[float]:

@@ -54,7 +54,9 @@ def law(code, p, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
         return pulse_force(p, t)
     if code == TABLE:
         return value, 0.0, 0.0, 0.0, 0.0
-    return actuator_force(p, x, xd, mode)
+    if code == ACTUATOR:
+        return actuator_force(p, x, xd, mode)
+    return np.nan, np.nan, np.nan, np.nan, np.nan  # an inerter has no place here
 
 
 @inline

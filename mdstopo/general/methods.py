@@ -1,0 +1,87 @@
+"""The methods beside the adjoint one, by name: they differentiate the rows that a general driver has found."""
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mdstopo.general.driver import INTEGRALS, reduced
+from mdstopo.general.extremes import RATE, SIGN
+from mdstopo.integrators.driver import Looked
+from mdstopo.scene.model import FloatArray
+from mdstopo.sensitivity.constant_load import DROPPED
+from mdstopo.sensitivity.methods import FALLBACK
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
+
+#: sweeps of the iterative method before it counts as not contracting
+SWEEPS = 200
+
+
+def differentiate(driver: "GeneralDriver", method: str, alpha: FloatArray, looked: Looked) -> tuple[FloatArray, str]:
+    """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by direct, iterative or
+    constant_load; and what the user should know although it worked."""
+    gradients, message = np.zeros_like(looked.gradients), ""
+    rows = looked.rows.copy()
+    before = driver.work.copy()
+    _, count, _ = driver.run(alpha, True)
+    driver.work += before
+    for j, reduction in enumerate(driver.scene.reductions):
+        for r in range(int(looked.found[j])):
+            integral = INTEGRALS.get(reduction, 0)
+            if method == "constant_load":
+                gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
+                continue
+            sweeps = SWEEPS if method == "iterative" else 0
+            stopped = driver.entry.push(
+                *driver.steps_arguments(count), j, integral, sweeps, rows[j, r], driver.room, driver.room_ints,
+                driver.strength, driver.padded, gradients[j, r], driver.work,
+            )  # fmt: skip
+            if stopped >= 0:
+                message = FALLBACK.format(float(driver.states()[0][stopped]))
+                return differentiate(driver, "direct", alpha, looked)[0], message
+            if integral:
+                gradients[j, r] *= rows[j, r, RATE]
+            elif reduction == "max_abs":
+                gradients[j, r] *= rows[j, r, SIGN]
+    return gradients, message
+
+
+def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, count: int) -> FloatArray:
+    """A row's gradient (N,) by constant dynamic loading; an integral's at the steps' ends, by the trapezoidal rule."""
+    t = driver.states()[0][: count + 1].copy()
+    if reduction not in INTEGRALS:
+        sign = row[SIGN] if reduction == "max_abs" else 1.0
+        gradient: FloatArray = sign * _held_at(driver, j, row, count)
+        return gradient
+    total = np.zeros(len(driver._alpha))
+    values = np.zeros(count + 1)
+    for k in range(count + 1):
+        place = np.array([[min(k, count - 1), float(k == count)]])
+        seen = driver.visit(j, place, True, count)[2][0]
+        weight = 0.5 * (t[min(k + 1, count)] - t[max(k - 1, 0)])
+        at = np.array([t[k], seen[0], place[0, 0], place[0, 1], seen[1], 1.0, seen[2]])
+        factor = 2.0 * seen[0] if reduction == "rms" else 1.0
+        values[k] = weight * (seen[0] ** 2 if reduction == "rms" else seen[0])
+        total += weight * factor * _held_at(driver, j, at, count)
+    return total * reduced(reduction, float(values.sum()), float(t[-1] - t[0]))[1]
+
+
+def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> FloatArray:
+    """The gradient (N,) at one time by constant dynamic loading."""
+    from mdstopo.general import constant_load
+
+    hold: Any = constant_load.hold
+
+    model = driver.scene.model
+    n, size = len(model.mass), len(model.mass) + int(model.size[0])
+    matrix, right, out = np.zeros((size, size)), np.zeros(size), np.zeros(len(driver._alpha))
+    arguments = (
+        *driver.steps_arguments(count), j, row.copy(), driver.room, driver.room_ints, driver.strength,
+    )  # fmt: skip
+    hold(*arguments, np.zeros(0), matrix, right, driver.padded, out, driver.work)
+    moving = np.concatenate([np.flatnonzero(model.free), np.arange(n, size)])
+    z = np.zeros(size)
+    z[moving] = np.linalg.pinv(matrix[np.ix_(moving, moving)], rcond=DROPPED).T @ right[moving]
+    hold(*arguments, z[:n].copy(), matrix, right, driver.padded, out, driver.work)
+    return out
