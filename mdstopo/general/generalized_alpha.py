@@ -352,10 +352,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     at_high = margin
                     side = 0
                     for visit in range(100):
-                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -1.01 * rounding:
+                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -50.0 * rounding:
                             break
-                        middle = (low * at_high - high * at_low) / (at_high - at_low)
-                        if visit % 3 == 2 and not (high - low < 1e-9 * h):
+                        aim = 5.0 * rounding  # behind the switch, by more than rounding
+                        middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
+                        if visit > 15 and visit % 2 == 0:
                             middle = 0.5 * (low + high)
                         if middle <= low or middle >= high:
                             middle = 0.5 * (low + high)

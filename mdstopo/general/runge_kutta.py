@@ -338,10 +338,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     at_low = max(at_low, rounding)
                     side = 0
                     for trial_count in range(100):
-                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -1.01 * rounding:
+                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -50.0 * rounding:
                             break
-                        middle = (low * at_high - high * at_low) / (at_high - at_low)
-                        if trial_count % 3 == 2 and not (high - low < 1e-9 * h):
+                        aim = 5.0 * rounding  # behind the switch, by more than rounding
+                        middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
+                        if trial_count > 15 and trial_count % 2 == 0:
                             middle = 0.5 * (low + high)
                         # a hair beyond the root, so that it ends between two neighbours
                         middle = min(max(middle, low + 1e-16 * h), high)

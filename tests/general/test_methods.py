@@ -40,7 +40,7 @@ solver: {integrator: generalized_alpha, step: 0.01}
 
 
 def test_constant_load_is_the_static_answer_of_a_slow_pull():
-    """A hinged bar on two springs, loaded so slowly that statics is right; what the load's own lever changes is left out."""
+    """A hinged bar on springs, loaded so slowly that statics is right; what the load's lever changes is left out."""
     text = """
 format: 1
 time: {end: 200}
