@@ -17,6 +17,7 @@ SECTIONS = {
     "process": "the whole process: start, 50 iterations, file; help; the first run",
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
+    "chain": "cost of a step against the number of jointed bodies",
     "peers": "the same beside other programs (needs --peers)",
 }
 
