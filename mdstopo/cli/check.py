@@ -60,7 +60,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "refused": [mistake.located(str(case_path)) for mistake in refused],
     }
     if not refused:
-        announce_compilation(output)
+        announce_compilation(output, case)
         from mdstopo.engine import Evaluator
 
         engine = Evaluator(case, beside=False)

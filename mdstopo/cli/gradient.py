@@ -88,7 +88,7 @@ def command(
     path = result_path(out, case, "gradient")
     line = shlex.join(["mdstopo", *sys.argv[1:]])
     with output_file(path, case, "gradient", overwrite=overwrite, notify=output.notice, command=line) as file:
-        announce_compilation(output)
+        announce_compilation(output, case)
         from mdstopo.engine import Evaluator
         from mdstopo.status import RunStatus
         from mdstopo.store.contents import sensitivity_part

@@ -113,9 +113,9 @@ def result_path(out: Path | None, case: "Case", kind: str = "") -> Path:
     return Path("results") / (f"{case.name}.{kind}.h5" if kind else f"{case.name}.h5")
 
 
-def announce_compilation(output: Output) -> None:
+def announce_compilation(output: Output, case: "Case") -> None:
     """Say that the first run takes longer, before it does."""
-    from mdstopo.session.engine import COMPILING, compilation_due
+    from mdstopo.session.engine import compilation_due, compiling
 
-    if compilation_due():
-        output.notice(COMPILING)
+    if compilation_due(case):
+        output.notice(compiling(case))

@@ -56,7 +56,7 @@ def command(
     from mdstopo.store.output import output_file
 
     with output_file(path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line) as file:
-        announce_compilation(output)
+        announce_compilation(output, case)
         from mdstopo.engine import Evaluator
         from mdstopo.status import RunStatus, Status
         from mdstopo.store.contents import trajectory_part
@@ -67,9 +67,9 @@ def command(
         ready = time.perf_counter()
         motions = {name: engine.trajectory(alpha, name) for name in chosen}
         ended = time.perf_counter()
-        failed = [motion.status for motion in motions.values() if motion.status is not Status.OK]
+        failed = [motion for motion in motions.values() if motion.status is not Status.OK]
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
-        reason = failed[0].value if failed else "done"
+        reason = f"{failed[0].status.value}: {failed[0].message}" if failed else "done"
         file.write(
             status.value,
             reason,

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import Problem
+from mdstopo.scene.family import beyond_springs
 from mdstopo.status import Status
 from mdstopo.store.contents import Motion
 
@@ -51,14 +52,18 @@ class Engine(Protocol):
 MakeEngine = Callable[[Case], Engine]
 
 
-COMPILING = "compiling the kernels, once for this version: up to half a minute"
+def compiling(case: Case) -> str:
+    """What is said before the kernels for such a case are compiled for the first time."""
+    how_long = "some two minutes" if beyond_springs(case) else "up to half a minute"
+    return f"compiling the kernels, once for this version: {how_long}"
 
 
-def compilation_due() -> bool:
-    """Whether the kernels of this version have never been compiled here."""
+def compilation_due(case: Case) -> bool:
+    """Whether the kernels of this version have never been compiled here for such a case."""
     from mdstopo.jit import cache_folder
 
-    return next(cache_folder().rglob("*.nbi"), None) is None
+    pattern = "general_*/*.nbi" if beyond_springs(case) else "integrators_*/*.nbi"
+    return next(cache_folder().glob(pattern), None) is None
 
 
 def make_engine(case: Case) -> Engine:

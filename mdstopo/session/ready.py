@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
-from mdstopo.session.engine import COMPILING, Engine, make_engine
+from mdstopo.scene.family import beyond_springs
+from mdstopo.session.engine import Engine, compiling, make_engine
 from mdstopo.session.starts import first_design, make_optimizer
 from mdstopo.store.contents import Motion
 
@@ -37,7 +38,7 @@ def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
         writable = os.access(marker.parent, os.W_OK)
     except OSError:
         writable = False
-    notify(COMPILING)
+    notify(compiling(case))
     if not writable:
         notify(f"{marker.parent} cannot be written: kernels are compiled anew in every run, which is slow")
         return
@@ -96,7 +97,8 @@ def _marker(case: Case) -> Path:
     """An empty file that says that the kernels for such cases are cached."""
     from mdstopo.jit import cache_folder
 
-    return cache_folder() / f"ready-{case.solver.integrator}-{case.solver.sensitivity}"
+    family = "general" if beyond_springs(case) else "springs"
+    return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"
 
 
 def _main() -> None:
