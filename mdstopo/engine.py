@@ -241,7 +241,9 @@ class Evaluator:
         if result.status.ok and result.meeting < 0:
             return Status.OK, ""
         if result.status.ok:
-            return Status.ZERO_LENGTH, self._culprit(name).member(result.meeting)
+            driver = self.driver(name)
+            culprit = self._culprit(name) if isinstance(driver, Driver) else driver
+            return Status.ZERO_LENGTH, culprit.member(result.meeting)
         status, steps = self.driver(name).simulate(design)
         return self._explain(name, design, status, float(steps.t[-1]), steps.state[-1])
 

@@ -68,6 +68,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     more += motion_times(load_case)
     times = breakpoints(load_case, more)
     driven, drive = drives(load_case, times, q0, v0)
+    _refuse_impacts(case, load_case, driven, drive, times)
     free = np.ones(n, dtype=np.int64)
     free[-3:] = 0
     free[driven] = 0
@@ -101,6 +102,27 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), redundant, responses,
         reductions,
     )  # fmt: skip
+
+
+def _refuse_impacts(case: Case, load_case: LoadCase, driven: IndexArray, drive: FloatArray, times: FloatArray) -> None:
+    """A driven velocity that jumps would need an infinite force in a joint (CaseError)."""
+    names = [body.name for body in case.bodies]
+    jointed = {name for joint in case.joints for name in joint.bodies}
+    h = np.diff(times)[:-1, None]
+    before = drive[:-1, :, 1] + h * (2.0 * drive[:-1, :, 2] + 3.0 * h * drive[:-1, :, 3])
+    jump = np.abs(drive[1:, :, 1] - before)
+    size = np.abs(drive[:, :, 1]).max(axis=0, initial=0.0) + 1e-300
+    mistakes = []
+    for i, d in enumerate(driven.tolist()):
+        name = names[d // 3]
+        if name in jointed and len(jump) and jump[:, i].max() > 1e-9 * size[i]:
+            when = times[1 + int(jump[:, i].argmax())]
+            places = [f"load_cases.{load_case.name}.motions", "motions"]
+            path = next((path for path in places if path in case.marks), "motions")
+            message = f"the prescribed velocity of {name} jumps at t = {when:g} s, but it is jointed: that is an impact"
+            mistakes.append(case.marks.mistake(path, message))
+    if mistakes:
+        raise CaseError(mistakes, str(case.path or case.name))
 
 
 def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...]) -> None:

@@ -117,7 +117,7 @@ class GeneralDriver:
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, -1)
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]))
 
     def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
         """Rows and gradients of response j, reduced over time."""

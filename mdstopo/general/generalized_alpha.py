@@ -15,7 +15,7 @@ import numpy as np
 from mdstopo.general.balance import balance, factor_matrix, make_desk, solve_unknowns
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.forces import drive_state
-from mdstopo.general.members import scale_general
+from mdstopo.general.members import meeting, scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_size, start_modes
@@ -245,6 +245,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     copy_vector(model.q0, q)
     copy_vector(model.v0, v)
     where[0] = -1
+    where[1] = -1
     t = times[0]
     drive_state(model, np.int64(0), t, q, v)
     switching = has_switches(model)
@@ -398,6 +399,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 return NON_FINITE, count, events, t
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, model.reach, p))
+            if where[1] < 0:
+                relative_pose(model.pair, q, v, before)
+                where[1] = meeting(model, segment, t, strength, before, rel)
             done += 1.0
             known += 1
             t = end if lands else (t + h if happens else begin + h * done)

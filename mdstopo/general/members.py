@@ -11,8 +11,6 @@ the member is in (`strength` row 1); the integrators keep modes fixed within a s
 
 import math
 
-import numpy as np
-
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
@@ -198,13 +196,30 @@ def unscale_general(block, power, alpha, padded, out):  # type: ignore[no-untype
 
 
 @kernel
-def lengths_collapse(model, strength, rel):  # type: ignore[no-untyped-def]
-    """Padded index of a member without length that would carry a force at these poses, or -1."""
+def meeting(model, segment, t, strength, before, after):  # type: ignore[no-untyped-def]
+    """Padded index of a member whose ends meet between two relative poses while it would carry a force, or -1."""
     for k in range(model.block.shape[0]):
-        r = rel[model.block[k, 0]]
+        if model.active[segment, k] == 0 or model.block[k, 3] == INERTER:
+            continue
+        r = before[model.block[k, 0]]
+        w = after[model.block[k, 0]]
+        m = model.member
         lo = model.block[k, 1]
+        value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
         for i in range(lo, lo + model.block[k, 5]):
-            length, _, _, _, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
-            if length <= 1e-9 * model.member[4, i] and strength[0, i] != 0.0 and np.isfinite(length):
+            x = r[0] + r[2] * m[2, i] - r[3] * m[3, i] - m[0, i]
+            y = r[1] + r[3] * m[2, i] + r[2] * m[3, i] - m[1, i]
+            ux = w[0] + w[2] * m[2, i] - w[3] * m[3, i] - m[0, i] - x
+            uy = w[1] + w[3] * m[2, i] + w[2] * m[3, i] - m[1, i] - y
+            u2 = ux * ux + uy * uy
+            along = -(x * ux + y * uy)
+            across = x * uy - y * ux
+            met = u2 > 0.0 and along >= 0.0 and along <= u2 and across * across <= 1e-18 * u2 * u2
+            if not met and x * x + y * y > ZERO_LENGTH_SQUARED:
+                continue
+            f, _, _, _, _ = law(
+                model.block[k, 3], model.law[k], -m[4, i], 0.0, int(strength[1, i]), t, value, model.curves
+            )
+            if f * strength[0, i] != 0.0:
                 return i
     return -1

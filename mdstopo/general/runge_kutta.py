@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import block_of, first_sign, has_switches, smallest_margin, switch_of
 from mdstopo.general.forces import drive_state, pose_acceleration
-from mdstopo.general.members import scale_general, set_modes
+from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.track import carve_track, keep_stage, keep_state
@@ -162,7 +162,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
 
     Arguments as `integrators.runge_kutta.simulate`'s, limits and rooms those of `track`. where (2,): the member or the
-    unknown that is to blame where it ends early.
+    unknown that is to blame where it ends early; a member whose ends have met, or -1.
     """
     model = unpack_general(ints, floats)
     tolerance = MARGIN * settings[0]
@@ -205,6 +205,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         q0[d] = model.q0[d]
         v0[d] = model.v0[d]
     where[0] = -1
+    where[1] = -1
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model)
@@ -377,6 +378,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(pair, ends[0], ends[1], rel)
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
+            if where[1] < 0:
+                relative_pose(pair, q0, v0, before)
+                where[1] = meeting(model, segment, t, strength, before, rel)
             happened = events
             t = end if lands else t + h
             for d in range(n):
