@@ -5,10 +5,10 @@ objectives, differentiate, look at the constraints. Each load case is one scene;
 simulation.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     from mdstopo.general.compile import GeneralScene
     from mdstopo.general.driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
+    from mdstopo.optimizer.scalarisation import Scalarisation
     from mdstopo.sensitivity.methods import Differentiated
 
-    AnyScene = Scene | GeneralScene
-    AnyDriver = Driver | GeneralDriver
+    AnyScene: TypeAlias = Scene | GeneralScene
+    AnyDriver: TypeAlias = Driver | GeneralDriver
 
 #: the motion is computed to the tolerance of what is looked at, and never looser than this: at 1e-4 a gradient may
 #: exceed ten tolerances on scenes whose members turn fast
@@ -77,6 +78,7 @@ class Evaluator:
             for name in self.scenes
         }
         self._work = np.zeros(WORK, dtype=np.int64)
+        self._narrower: dict[tuple[str, ...], Evaluator] = {}
 
     # -- what a run asks
 
@@ -106,7 +108,7 @@ class Evaluator:
         edge = self._without_slope(design) if gradient else ""
         gradient = gradient and not edge
         exact = gradient and method == "adjoint"
-        status, message = Status.OK, ""
+        status, message, grazing = Status.OK, "", ""
         looked: dict[str, tuple[Peak, ...]] = {}
         counts = np.zeros(WORK, dtype=np.int64)
         for name, objectives in self._by_load_case.items():
@@ -119,6 +121,8 @@ class Evaluator:
                 message = culprit
                 counts += driver.work
                 break
+            if result.grazing >= 0:
+                grazing = self._member(name, result.grazing)
             for j, key in enumerate(objectives):
                 looked[key] = _peaks(result, j, exact)
             if gradient and not exact:
@@ -136,6 +140,8 @@ class Evaluator:
         work = dict(zip(WORK_NAMES, counts.tolist(), strict=True))
         if edge and status.ok:
             status, message = Status.NO_GRADIENT, edge
+        if grazing and gradient and status.ok:
+            status, message = Status.GRAZING, grazing
         return self._evaluation(design, looked, gradient, work, status, message)
 
     @cached_property
@@ -155,11 +161,33 @@ class Evaluator:
         work = dict(zip(WORK_NAMES, driver.work.tolist(), strict=True))
         return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
 
-    def problem(self) -> "Problem":
-        """The case as the optimiser sees it."""
+    def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
+        """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`."""
+        load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
+        driver = self.driver(load_case)
+        if isinstance(driver, Driver):
+            from mdstopo.sensitivity.methods import histories
+
+            return histories(driver, self.design(alpha))
+        from mdstopo.general.methods import histories as histories_general
+
+        return histories_general(driver, self.design(alpha), list(self._by_load_case[load_case]).index(objective))
+
+    def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":
+        """The case as the optimiser sees it; several objectives need a scalarisation."""
         from mdstopo.optimizer.structure import StructureProblem
 
-        return StructureProblem(self)
+        return StructureProblem(self, scalarisation)
+
+    def looking_at(self, objectives: Sequence[str]) -> "Evaluator":
+        """The evaluator of the same case with some of its objectives alone: the others cost nothing."""
+        names = tuple(objectives)
+        if names == tuple(objective.name for objective in self.case.objectives):
+            return self
+        if names not in self._narrower:
+            chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
+            self._narrower[names] = Evaluator(replace(self.case, objectives=chosen), beside=False)
+        return self._narrower[names]
 
     def degrees_of_freedom(self, load_case: str) -> int:
         """Coordinates that are free, less the independent rows of joints."""
@@ -241,11 +269,14 @@ class Evaluator:
         if result.status.ok and result.meeting < 0:
             return Status.OK, ""
         if result.status.ok:
-            driver = self.driver(name)
-            culprit = self._culprit(name) if isinstance(driver, Driver) else driver
-            return Status.ZERO_LENGTH, culprit.member(result.meeting)
+            return Status.ZERO_LENGTH, self._member(name, result.meeting)
         status, steps = self.driver(name).simulate(design)
         return self._explain(name, design, status, float(steps.t[-1]), steps.state[-1])
+
+    def _member(self, name: str, padded: int) -> str:
+        """A member of a load case's scene in words."""
+        driver = self.driver(name)
+        return (self._culprit(name) if isinstance(driver, Driver) else driver).member(padded)
 
     def _evaluation(
         self,
@@ -257,7 +288,7 @@ class Evaluator:
         message: str,
     ) -> Evaluation:
         names = [objective.name for objective in self.case.objectives]
-        if not status.ok:
+        if not status.usable:
             lost = (Peak(np.nan, np.nan, None),)
             keys = [*names, *self._limited]
             looked = {key: looked.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}

@@ -30,8 +30,9 @@ class Evaluation:
 
     objectives: raw G; gradients: dG/dalpha (N,), at tied peaks the highest's, the earliest if equal; peak_times: t_n in
     s (NaN for mean and integral); peaks: all that compete, highest first; constraints (n_con,): h_j - h_0j in the
-    case's order; constraint_gradients (n_con, N); work: counts of what was done; status: anything but OK leaves values
-    NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all that compete.
+    case's order; constraint_gradients (n_con, N); work: counts of what was done; status: what is not `usable`
+    leaves values NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all
+    that compete.
     """
 
     objectives: Mapping[str, float]

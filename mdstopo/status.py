@@ -20,11 +20,18 @@ class Status(enum.Enum):
     SINGULAR = "the joints have become singular: they contradict or repeat each other in this configuration"
     CHATTERING = "a member switches again and again within next to no time"
     NO_GRADIENT = "the objective has a value but no gradient here"
+    NOT_POSITIVE = "an objective is not positive"
+    GRAZING = "a member only just touches, or only just does not: the gradient holds on one side only"
 
     @property
     def ok(self) -> bool:
         """Whether values and gradients can be trusted."""
         return self is Status.OK
+
+    @property
+    def usable(self) -> bool:
+        """Whether values can be trusted, and gradients at least on one side."""
+        return self in (Status.OK, Status.GRAZING)
 
 
 class RunStatus(enum.StrEnum):

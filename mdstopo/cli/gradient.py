@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from mdstopo.case.model import Case
     from mdstopo.engine import Evaluator
+    from mdstopo.evaluation import Evaluation
 
     Gradients = dict[str, NDArray[np.float64]]
 
@@ -144,19 +145,23 @@ def _all_methods(
     results: dict[str, dict[str, Any]] = {}
     for method in methods:
         evaluation = engine.evaluate(alpha, sensitivity=method)
-        if not evaluation.status.ok:
-            words = f" ({evaluation.message})" if evaluation.message else ""
-            return results, f"{method}: {evaluation.status.value}{words}"
+        if not evaluation.status.usable:
+            return results, f"{method}: {_in_words(evaluation)}"
         gradients = dict(evaluation.gradients)
         reference = results[methods[0]]["gradients"] if results else gradients
         results[method] = {
             "objectives": dict(evaluation.objectives),
             "gradients": gradients,
             "seconds": timed(partial(engine.evaluate, alpha, sensitivity=method)),
-            "message": evaluation.message,
+            "message": evaluation.message if evaluation.status.ok else _in_words(evaluation),
             "disagreement": {name: disagreement(gradients[name], reference[name]) for name in gradients},
         }
     return results, ""
+
+
+def _in_words(evaluation: "Evaluation") -> str:
+    """The status, and whose it is."""
+    return evaluation.status.value + (f" ({evaluation.message})" if evaluation.message else "")
 
 
 def _difference(
@@ -187,15 +192,10 @@ def _difference(
 
 def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", datasets: dict[str, Any]) -> str:
     """Add the histories dg(t)/dalpha; why there are none, where there are none."""
-    from mdstopo.integrators.driver import Driver
-    from mdstopo.sensitivity.methods import histories
     from mdstopo.store.contents import sensitivity_part
 
     for objective in case.objectives:
-        driver = engine.driver(objective.load_case)
-        if not isinstance(driver, Driver):
-            return f"history: not computed with {engine.beyond}"
-        status, t, rows = histories(driver, engine.design(alpha))
+        status, t, rows = engine.histories(alpha, objective.name)
         if not status.ok:
             return f"history: {status.value}"
         datasets[f"trajectories/{objective.load_case}/t"] = t

@@ -210,3 +210,37 @@ def push(  # type: ignore[no-untyped-def]
             padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
     unscale_general(model.block, model.power, alpha, padded, out)
     return -1
+
+
+@entry
+def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, work):  # type: ignore[no-untyped-def]
+    """out (count + 1, N) = dg_j/dalpha at the start and at the end of every step, the time held fixed.
+
+    Arguments as those of `push`; who (count + 1,): the member looked at. At an event the values before it.
+    """
+    model = unpack_general(ints, floats)
+    track = carve_track(model, limits, room, room_ints)
+    desk = make_desk(model)
+    n = model.mass.shape[0]
+    column = np.zeros((padded.shape[0], 4 * n + 1))
+    matrix = np.empty((21 * n, 4 * n + 1))
+    spare = np.empty(4 * n + 1)
+    bars = np.zeros((3, n))
+    nothing = np.zeros((0, 3, n))
+    no_rows = np.zeros((0, model.size[0]))
+    row = np.zeros(7)
+    for k in range(count + 1):
+        row[2] = max(k - 1, 0)
+        row[3] = 1.0 if k > 0 else 0.0
+        row[6] = who[k]
+        if k > 0:
+            through_step(
+                tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, desk, column, matrix, spare
+            )
+        row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
+        for i in range(padded.shape[0]):
+            for d in range(n):
+                padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+        unscale_general(model.block, model.power, alpha, padded, out[k])
+        if k > 0:
+            jump(model, track, k, column)

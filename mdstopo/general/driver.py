@@ -10,9 +10,10 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
-from mdstopo.general.extremes import COLUMNS, SIGN, VALUE, peaks, ranked, sample
+from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
 from mdstopo.general.model import COUNT, GROUP, INERTER, START, pack_general
-from mdstopo.general.track import track_room
+from mdstopo.general.rivals import compete, members_peaks
+from mdstopo.general.track import GRAZES, track_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
@@ -53,7 +54,7 @@ class GeneralDriver:
         self.rows = np.zeros((count, ROWS, COLUMNS))
         self.found = np.zeros(count, dtype=np.int64)
         self.gradients = np.zeros((count, ROWS, n_design))
-        self.where = np.zeros(2, dtype=np.int64)
+        self.where = np.full(3, -1, dtype=np.int64)
         self.events = 0
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
         self._entry: Any = None
@@ -117,7 +118,19 @@ class GeneralDriver:
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]))
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]), self._grazing())
+
+    def _grazing(self) -> int:
+        """A member (padded) that grazes where something is looked at, or -1."""
+        if self.where[2] >= 0:
+            return int(self.where[2])
+        steps, events = int(self.limits[1]), int(self.limits[3])
+        event = self.room_ints[4 * (steps + 1) :].reshape(events, 5)[: self.events]
+        for state, member, *_ in event[event[:, GRAZES] != 0].tolist():
+            for rows, found in zip(self.rows, self.found, strict=True):
+                if np.any(rows[:found, STEP] + rows[:found, FRACTION] == state):
+                    return int(member)
+        return -1
 
     def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
         """Rows and gradients of response j, reduced over time."""
@@ -134,13 +147,15 @@ class GeneralDriver:
         def see(places: FloatArray, exact: bool) -> FloatArray:
             return self.visit(j, places, exact, count)[2]
 
-        if reduction == "final":
+        if compete(self.scene.model.response[j, 0], reduction):
+            found = ranked(members_peaks(self, j, t, reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
+        elif reduction == "final":
             value, rate, who = see(np.array([[count - 1.0, 1.0]]), True)[0]
             found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
         else:
             samples = sample(t, see)
             found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, CLOSENESS)]
-            found = ranked(found, CLOSENESS, ROWS)
+            found = ranked(found, CLOSENESS, ROWS, t[-1] - t[0])
         self.found[j] = len(found)
         for r, row in enumerate(found):
             flip = row[SIGN] if reduction == "max_abs" else 1.0
@@ -151,9 +166,18 @@ class GeneralDriver:
             rows[r, VALUE] *= flip
 
     def visit(
-        self, j: int, places: FloatArray, exact: bool, count: int, steps: "GeneralSteps | None" = None
+        self,
+        j: int,
+        places: FloatArray,
+        exact: bool,
+        count: int,
+        steps: "GeneralSteps | None" = None,
+        who: int = -1,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q, v, a (3, K, n), multipliers (K, n_row + n_driven) and (K, 3) value, rate, member at places (K, 2)."""
+        """q, v, a (3, K, n), multipliers (K, n_row + n_driven) and (K, 3) value, rate, member at places (K, 2).
+
+        who: the member whose force is looked at; -1: at each place the one with the largest.
+        """
         model = self.scene.model
         limits, room, ints, strength = (
             (self.limits, self.room, self.room_ints, self.strength) if steps is None else steps.kept
@@ -163,7 +187,7 @@ class GeneralDriver:
         seen = np.zeros((len(places), 3))
         self.entry.visit(
             self.entry.TAG, self.ints, self.floats, self.method.tables, limits, count, room, ints, strength, exact, j,
-            -1, places, out, lam, seen, self.work,
+            who, places, out, lam, seen, self.work,
         )  # fmt: skip
         return out, lam, seen
 

@@ -7,6 +7,9 @@ member changes its mode and, where the force jumps, the accelerations with it. T
     dt_e = -(s_q dq + s_v dv) / s',      and behind it  dv+ = dv- + (a- - a+) dt_e      (saltation).
 
 With L' = B v, dL'/dq is dB/dt, so s_q = s_x B + s_xd dB/dt, s_v = s_xd B, s' = s_x x' + s_xd x''.
+
+Where a margin only just falls below zero, or only just does not, the derivative may be another one on either side:
+s'^2 / (2 |s''|) is how far it goes beyond. Less than the motion is accurate to, and it grazes (`law_grazes`).
 """
 
 import math
@@ -20,6 +23,10 @@ from mdstopo.integrators.steps import deflection
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import relative_pose
 from mdstopo.mechanics.laws.table import law_margin, law_margin_slopes, law_next, law_switches
+
+#: error of the cubic through both ends of a step, relative to the square of its length times the second derivative:
+#: (h omega)^2 / 384 of a vibration
+SLACK = 0.03
 
 
 @kernel
@@ -53,11 +60,16 @@ def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-d
 
 
 @kernel
-def first_dip(model, segment, strength, rel0, rel1, h):  # type: ignore[no-untyped-def]
+def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[no-untyped-def]
     """The earliest fraction of a step at which the cubic through a margin's values and rates at both ends has a
     minimum below zero although both ends are not; 2 where there is none. For members that come and go within a step.
+
+    Also the fraction of the lowest minimum that may be below zero in truth, and its value: parts (a number): of how
+    many parts of a step this is one, whose cubic the poses were taken from.
     """
     best = 2.0
+    near = 2.0
+    low = np.inf
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
         if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
@@ -91,9 +103,15 @@ def first_dip(model, segment, strength, rel0, rel1, h):  # type: ignore[no-untyp
             cube = d0 + d1 - 2.0 * (s1 - s0)
             root = math.sqrt(max(square * square - 3.0 * cube * d0, 0.0))
             c = -d0 / (square + root) if square + root > 0.0 else 0.5
-            if c > 0.0 and c < 1.0 and s0 + c * (d0 + c * (square + c * cube)) < 0.0:
+            if not (c > 0.0 and c < 1.0):
+                continue
+            dip = s0 + c * (d0 + c * (square + c * cube))
+            if dip < 0.0:
                 best = min(best, c)
-    return best
+            elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
+                low = dip
+                near = c
+    return best, near, low
 
 
 @kernel
@@ -121,7 +139,7 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
     """The earliest fraction of a step at which a member seems to leave its mode and come back before the end, or 2.
 
     Looked for on the cubic through the states at both ends (n,), in as many parts as the motion asks for, and in each
-    part by `first_dip`.
+    part by `first_dip`. Also the fraction of the lowest margin that may be below zero in truth, or 2.
     """
     n = q0.shape[0]
     parts = probes_needed(model, segment, rel0, rel1)
@@ -129,6 +147,8 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
     v = np.empty(n)
     before = rel0.copy()
     rel = np.empty(rel0.shape)
+    near = 2.0
+    low = np.inf
     for part in range(1, parts + 1):
         c = part / parts
         if part == parts:
@@ -141,14 +161,17 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
             relative_pose(model.pair, q, v, rel)
             margin, _ = smallest_margin(model, segment, strength, rel)
             if margin < -noise:
-                return c
-        dip = first_dip(model, segment, strength, before, rel, h / parts)
+                return c, near
+        dip, may, lowest = first_dip(model, segment, strength, before, rel, h / parts, parts)
         if dip < 1.0:
-            return (part - 1 + dip) / parts
+            return (part - 1 + dip) / parts, near
+        if lowest < low:
+            low = lowest
+            near = (part - 1 + may) / parts
         for p in range(rel.shape[0]):
             for i in range(rel.shape[1]):
                 before[p, i] = rel[p, i]
-    return 2.0
+    return 2.0, near
 
 
 @kernel
@@ -195,7 +218,10 @@ def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-de
 
 @kernel
 def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[no-untyped-def]
-    """The mode that member i of block k goes to, its margin's rate s', and slopes (2, n) = s_q / s', s_v / s'."""
+    """The mode that member i of block k goes to, s'^2 / (2 |s''|), and slopes (2, n) = s_q / s', s_v / s'.
+
+    How far it goes is told of margins of Delta alone (infinite for others).
+    """
     n = q.shape[0]
     p = model.block[k, 0]
     code = model.block[k, 3]
@@ -217,7 +243,9 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
             d = 3 * model.pair[p, r // 3] + r % 3
             slopes[0, d] = (by_x * row[r] + by_rate * row_rate[r]) / speed
             slopes[1, d] = by_rate * row[r] / speed
-    return law_next(code, model.law[k], x, rate, second, mode), speed
+    bend = 2.0 * abs(by_x * second)
+    beyond = speed * speed / bend if by_rate == 0.0 and bend > 0.0 else np.inf
+    return law_next(code, model.law[k], x, rate, second, mode), beyond
 
 
 @kernel

@@ -21,6 +21,8 @@ FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LAST = len(FRACTIONS) - 1
 #: values or rates that differ by less than this, relative to the largest, differ by rounding
 ROUNDING = 1e-13
+#: peaks nearer than this in time (relative to what was simulated) and value are one
+RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 
 #: places (K, 2), exact -> (K, 3) value, rate, member
 See = Callable[[FloatArray, bool], FloatArray]
@@ -58,11 +60,27 @@ def peaks(samples: Samples, see: See, sign: float, closeness: float) -> list[Flo
     return found
 
 
-def ranked(rows: list[FloatArray], closeness: float, most: int) -> list[FloatArray]:
-    """Those within `closeness` of the highest, highest first, the earlier first where equal; at most so many."""
+def ranked(rows: list[FloatArray], closeness: float, most: int, span: float) -> list[FloatArray]:
+    """Those within `closeness` of the highest, highest first, the earlier first where equal; at most so many.
+
+    Peaks that are one in truth, and more only by what the method leaves of ripple over a small part of the simulated
+    time `span`, count as one.
+    """
     order = sorted(rows, key=lambda row: (-row[SIGN] * row[VALUE], row[TIME]))
     best = order[0][SIGN] * order[0][VALUE]
-    return [row for row in order if row[SIGN] * row[VALUE] >= best - closeness * abs(best)][:most]
+    kept: list[FloatArray] = []
+    for row in order:
+        if row[SIGN] * row[VALUE] < best - closeness * abs(best) or len(kept) == most:
+            break
+        if not any(
+            row[WHO] == other[WHO]
+            and row[SIGN] == other[SIGN]
+            and abs(row[TIME] - other[TIME]) <= RIPPLE_TIME * span
+            and abs(row[VALUE] - other[VALUE]) <= RIPPLE * abs(best)
+            for other in kept
+        ):
+            kept.append(row)
+    return kept
 
 
 def _row(samples: Samples, w: int, c: float, value: float, rate: float, sign: float, who: float) -> FloatArray:

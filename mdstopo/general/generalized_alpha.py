@@ -12,199 +12,31 @@ is left of the segment is divided anew.
 
 import numpy as np
 
-from mdstopo.general.balance import balance, factor_matrix, make_desk, solve_unknowns
+from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.forces import drive_state
+from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
+from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general
 from mdstopo.general.model import unpack_general
-from mdstopo.general.projection import project
 from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_size, start_modes
-from mdstopo.general.track import carve_track, copy_vector, keep_stage, keep_state
-from mdstopo.integrators.gauss import fastest_rate
-from mdstopo.integrators.generalized_alpha import FEWEST, MOST, RESOLVED, RESTART, weights_of
+from mdstopo.general.track import carve_track, copy_vector, keep_state
+from mdstopo.integrators.generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,
-    FORCES,
     NEEDS_ROOM,
-    NEWTON,
-    NEWTON_FAILED,
     NON_FINITE,
     OK,
     SINGULAR,
     STEP_LIMIT,
     STEP_TOO_SMALL,
-    TANGENTS,
     deflection,
-    motion_weights,
 )
-from mdstopo.jit import entry, kernel
+from mdstopo.jit import entry
 from mdstopo.mechanics.geometry import POSE, relative_pose
 
 TAG = (0, 0)
-
-
-@kernel
-def rate_of(model, desk):  # type: ignore[no-untyped-def]
-    """Angular frequency of the fastest vibration at the balanced state on the desk, rad/s (an estimate)."""
-    n = model.mass.shape[0]
-    n_pair = model.pair.shape[0]
-    inverse = np.zeros(n)
-    for d in range(n):
-        if model.free[d] != 0:
-            inverse[d] = 1.0 / model.mass[d]
-    return fastest_rate(
-        model.pair, inverse, desk.k.reshape((1, n_pair, 6, 6)), desk.c.reshape((1, n_pair, 6, 6)), np.bool_(True)
-    )
-
-
-@kernel
-def advance(  # type: ignore[no-untyped-def]
-    model,
-    radius,
-    strength,
-    segment,
-    t,
-    h,
-    starting,
-    state,
-    guess,
-    newton_tolerance,
-    size,
-    o,
-    desk,
-    track,
-    ends,
-    push,
-    extent,
-    rel0,
-    work,
-):
-    """One step of length h from state (4, n) = q, v, a, x to ends (4, n) of the same; q, v of the end on the joints.
-
-    starting: whether a and x are to be made here. guess (3, n): x of the three steps before, for the first iterate.
-    extent (2, n_pair): how far each pair has moved so far from its pose rel0 at the start, and its noise, m. push
-    (2, n_row). With o >= 0 the stages are kept
-    from there on. Returns (code, stages, place of a singular unknown).
-    """
-    n = state.shape[1]
-    n_row = model.size[0]
-    e1, e2, e3, beta, gamma, lag = weights_of(radius)
-    yes = np.bool_(True)
-    q = np.empty(n)
-    v = np.empty(n)
-    a = state[2]
-    x = state[3]
-    now = np.empty(n)
-    x_now = np.empty(n)
-    balanced = np.empty(n)
-    delta = np.empty(n)
-    lam = np.zeros(n_row)
-    row = np.empty(n_row)
-    weight = np.empty(n)
-    scale = np.empty(model.pair.shape[0])
-    stages = 0
-    if starting:
-        copy_vector(state[0], q)
-        copy_vector(state[1], v)
-        singular = balance(model, strength, segment, t, q, v, yes, desk, a, lam)
-        work[FORCES] += 1
-        work[TANGENTS] += 1
-        if singular >= 0:
-            return SINGULAR, stages, singular
-        if o >= 0:
-            keep_stage(track, o, t, q, v, a, lam, desk, yes)
-        stages = 1
-        copy_vector(a, x)
-        if lag > 0.0 and h * rate_of(model, desk) < RESOLVED:
-            ahead = lag * h
-            for d in range(n):
-                q[d] = state[0, d] + ahead * (state[1, d] + 0.5 * ahead * a[d])
-                v[d] = state[1, d] + ahead * a[d]
-            singular = balance(model, strength, segment, t + ahead, q, v, yes, desk, balanced, lam)
-            work[FORCES] += 1
-            work[TANGENTS] += 1
-            if singular >= 0:
-                return SINGULAR, stages, singular
-            if o >= 0:
-                keep_stage(track, o + 1, t + ahead, q, v, balanced, lam, desk, yes)
-            stages = 2
-            for d in range(n):
-                x[d] = 2.0 * a[d] - balanced[d]
-    previous = np.inf
-    newton = 0
-    while True:
-        if newton == 0 or newton == RESTART:
-            for d in range(n):
-                x_now[d] = x[d]
-                if newton == 0 and not starting:
-                    x_now[d] = 4.0 * (x[d] + guess[1, d]) - 6.0 * guess[0, d] - guess[2, d]
-                now[d] = (x_now[d] - e2 * a[d] + e3 * x[d]) / e1
-                q[d] = state[0, d] + h * (state[1, d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
-                v[d] = state[1, d] + h * ((1.0 - gamma) * x[d] + gamma * x_now[d])
-            previous = np.inf
-        singular = balance(model, strength, segment, t + h, q, v, yes, desk, balanced, lam)
-        work[FORCES] += 1
-        work[TANGENTS] += 1
-        work[NEWTON] += 1
-        if singular >= 0:
-            return SINGULAR, stages, singular
-        for d in range(n):
-            if model.free[d] == 0:
-                now[d] = balanced[d]
-            balanced[d] -= now[d]
-            delta[d] = model.mass[d] * balanced[d]
-        row[:] = 0.0
-        for p in range(model.pair.shape[0]):
-            for i in range(6):
-                total = 0.0
-                for j in range(6):
-                    total += desk.mass[p, i, j] * balanced[3 * model.pair[p, j // 3] + j % 3]
-                delta[3 * model.pair[p, i // 3] + i % 3] += total
-        for j in range(model.joint.shape[0]):
-            for r in range(3):
-                if model.row[j, r] >= 0:
-                    for i in range(6):
-                        column = 3 * model.joint[j, 1 + i // 3] + i % 3
-                        row[model.row[j, r]] += desk.jac[j, r, i] * balanced[column]
-        factor_matrix(
-            model, desk, desk.k, desk.c, desk.turn, desk.mass, h * h * beta * e1, h * gamma * e1, np.bool_(False)
-        )
-        solve_unknowns(model, desk, delta, row)
-        rounding = 1e-8
-        for p in range(model.pair.shape[0]):
-            reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
-            scale[p] = max(reached, 1e3 * extent[1, p])
-            rounding = max(rounding, 100.0 * extent[1, p] / scale[p])
-        motion_weights(model.pair, rel0, model.reach, scale, weight)
-        e = 0.0
-        for d in range(n):
-            moved = h * h * beta * e1 * delta[d]
-            now[d] += delta[d]
-            x_now[d] = e1 * now[d] + e2 * a[d] - e3 * x[d]
-            q[d] += moved
-            v[d] += h * gamma * e1 * delta[d]
-            change = weight[d] * abs(moved)
-            if not change <= e and not np.isnan(e):
-                e = change
-        if e <= newton_tolerance or (e >= 0.5 * previous and e < rounding):
-            break
-        previous = e
-        if newton >= MOST or (newton >= RESTART and not e < np.inf):
-            return (NEWTON_FAILED if e < np.inf else NON_FINITE), stages, -1
-        newton = RESTART if not e < np.inf else newton + 1
-    drive_state(model, segment, t + h, q, v)
-    if o >= 0:
-        # the multipliers that belong to the corrected accelerations
-        for r in range(n_row):
-            lam[r] += row[r]
-        keep_stage(track, o + stages, t + h, q, v, now, lam, desk, yes)
-    copy_vector(q, ends[0])
-    copy_vector(v, ends[1])
-    copy_vector(now, ends[2])
-    copy_vector(x_now, ends[3])
-    singular = project(model, size, ends[0], ends[1], desk, push[0], push[1])
-    return (SINGULAR if singular >= 0 else OK), stages + 1, singular
 
 
 @entry
@@ -236,6 +68,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     ends = np.zeros((4, n))
     guess = np.zeros((3, n))
     trial = np.zeros((4, n))
+    cut = np.empty(CUTS + 1)
+    beyond = np.zeros((CUTS + 1, 4, n))
+    left = np.zeros((4, n))
     kept = np.zeros((4, n))
     push = np.zeros((2, n_row))
     lam = np.zeros(n_row)
@@ -244,8 +79,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     v = state[1]
     copy_vector(model.q0, q)
     copy_vector(model.v0, v)
-    where[0] = -1
-    where[1] = -1
+    for i in range(where.shape[0]):
+        where[i] = -1
+    graze = settings[0] * size
     t = times[0]
     drive_state(model, np.int64(0), t, q, v)
     switching = has_switches(model)
@@ -282,6 +118,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 track.event[events, 1] = i
                 track.event[events, 2] = 0
                 track.event[events, 3] = int(strength[1, i])
+                track.event[events, 4] = 0
                 track.salt[events] = 0.0
                 events += 1
         strength[1, strength.shape[1] - 1] = events
@@ -300,8 +137,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 balance(model, strength, segment, t, q, v, no, desk, a0, lam)
                 first = events
                 events = log_switches(
-                    model, strength, segment, t, q, v, desk, a0, lam, track, count, events, rounding, work
-                )
+                    model, strength, segment, t, q, v, desk, a0, lam, track, count, events, -1.0, rounding,
+                    work, where,
+                )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
@@ -332,37 +170,59 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             who = nowhere
             if switching:
                 margin, who = smallest_margin(model, segment, strength, rel)
-                relative_pose(model.pair, q, v, before)
+                low = 0.0
                 high = h
-                if not margin < -rounding:
-                    dip = first_sign(model, segment, strength, q, v, ends[0], ends[1], before, rel, h, rounding)
-                    if dip < 1.0:
-                        high = dip * h
-                        copy_state(state, kept)
-                        code, _, singular = advance(
-                            model, tables[0], strength, segment, t, high, starting, kept, guess, newton_tolerance,
-                            size, nowhere, desk, track, trial, push, extent, rel0, work,
-                        )  # fmt: skip
-                        relative_pose(model.pair, trial[0], trial[1], rel)
-                        margin, who = smallest_margin(model, segment, strength, rel)
+                top = 0
+                cuts = 0
+                cut[0] = h
+                copy_state(ends, beyond[0])
+                copy_state(state, left)
+                while top >= 0:  # as `runge_kutta.simulate` does
+                    relative_pose(model.pair, left[0], left[1], before)
+                    relative_pose(model.pair, beyond[top, 0], beyond[top, 1], rel)
+                    dip, near = first_sign(
+                        model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
+                        cut[top] - low, rounding,
+                    )  # fmt: skip
+                    middle = cut_at(dip, near, low, cut[top])
+                    if middle < 0.0 or cuts == CUTS:
+                        if top == 0 and margin < -rounding:
+                            break
+                        low = cut[top]
+                        copy_state(beyond[top], left)
+                        top -= 1
+                        continue
+                    cuts += 1
+                    top += 1
+                    cut[top] = middle
+                    copy_state(state, kept)
+                    code, _, singular = advance(
+                        model, tables[0], strength, segment, t, middle, starting, kept, guess, newton_tolerance,
+                        size, nowhere, desk, track, beyond[top], push, extent, rel0, work,
+                    )  # fmt: skip
+                    if code != OK:
+                        where[0] = singular
+                        return code, count, events, t
+                    relative_pose(model.pair, beyond[top, 0], beyond[top, 1], rel)
+                    value, near_who = smallest_margin(model, segment, strength, rel)
+                    if value < -rounding:
+                        high = middle
+                        margin = value
+                        who = near_who
+                        break
+                    if value < graze and matters(model, strength, near_who):
+                        where[2] = near_who
+                relative_pose(model.pair, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
-                    low = 0.0
                     at_low, _ = smallest_margin(model, segment, strength, before)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
-                    for visit in range(100):
-                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -50.0 * rounding:
+                    for look in range(LOOKS):
+                        middle = next_look(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
+                        if middle < 0.0:
                             break
-                        aim = 5.0 * rounding  # behind the switch, by more than rounding
-                        middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
-                        if visit > 15 and visit % 2 == 0:
-                            middle = 0.5 * (low + high)
-                        if middle <= low or middle >= high:
-                            middle = 0.5 * (low + high)
-                            if middle <= low or middle >= high:
-                                break
                         copy_state(state, kept)
                         code, _, singular = advance(
                             model, tables[0], strength, segment, t, middle, starting, kept, guess, newton_tolerance,
@@ -373,18 +233,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             return code, count, events, t
                         relative_pose(model.pair, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, strength, rel)
-                        if value < -rounding:
-                            high = middle
-                            at_high = value
-                            if side == 1:
-                                at_low *= 0.5
-                            side = 1
-                        else:
-                            low = middle
-                            at_low = max(value, rounding)
-                            if side == -1:
-                                at_high *= 0.5
-                            side = -1
+                        low, high, at_low, at_high, side = narrowed(
+                            low, high, at_low, at_high, middle, value, rounding, side
+                        )
                     h = high
                     lands = lands and t + h >= end
                     code, used, singular = advance(
@@ -428,8 +279,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if happens:
                 balance(model, strength, segment, t, q, v, no, desk, a0, lam)
                 events = log_switches(
-                    model, strength, segment, t, q, v, desk, a0, lam, track, count, events, rounding, work
-                )
+                    model, strength, segment, t, q, v, desk, a0, lam, track, count, events, graze, rounding,
+                    work, where,
+                )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0
@@ -445,11 +297,3 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             track.index[count, 3] = events
     track.index[count + 1, 0] = stages  # no step follows (`weights_of`)
     return OK, count, events, t
-
-
-@kernel
-def copy_state(source, target):  # type: ignore[no-untyped-def]
-    """target (4, n) = source."""
-    for i in range(4):
-        for d in range(source.shape[1]):
-            target[i, d] = source[i, d]

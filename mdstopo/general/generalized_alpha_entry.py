@@ -1,9 +1,9 @@
 """What the driver calls of generalized-alpha for general scenes."""
 
 import mdstopo.general.generalized_alpha_duties  # noqa: F401  (enters the method's duties)
-from mdstopo.general.direct import push
+from mdstopo.general.direct import follow, push
 from mdstopo.general.generalized_alpha import TAG, simulate
 from mdstopo.general.look import pull
-from mdstopo.general.visit import visit
+from mdstopo.general.visit import compare, visit
 
-__all__ = ["TAG", "pull", "push", "simulate", "visit"]
+__all__ = ["TAG", "compare", "follow", "pull", "push", "simulate", "visit"]

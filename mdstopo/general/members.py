@@ -65,7 +65,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
     lo = model.block[k, 1]
     for i in range(lo, lo + model.block[k, 5]):
         length, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
-        if y == 0.0:
+        if length == 0.0:  # not where y is: that is so infinitely far away, too
             continue
         rate = bx * vx + by * vy + bt * vt
         scale = strength[0, i]
@@ -173,8 +173,8 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
     value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
     lo = model.block[k, 1]
     for i in range(lo, lo + model.block[k, 5]):
-        length, bx, by, bt, y, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
-        if y == 0.0:
+        length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
+        if length == 0.0:
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
         f, _, _, energy, _ = law(code, p, length - member[4, i], rate, int(modes_of[i]), t, value, model.curves)

@@ -7,9 +7,11 @@ import numpy as np
 from mdstopo.general.driver import INTEGRALS, reduced
 from mdstopo.general.extremes import RATE, SIGN
 from mdstopo.integrators.driver import Looked
+from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray
 from mdstopo.sensitivity.constant_load import DROPPED
 from mdstopo.sensitivity.methods import FALLBACK
+from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
@@ -85,3 +87,19 @@ def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> Fl
     z[moving] = np.linalg.pinv(matrix[np.ix_(moving, moving)], rcond=DROPPED).T @ right[moving]
     hold(*arguments, z[:n].copy(), matrix, right, driver.padded, out, driver.work)
     return out
+
+
+def histories(driver: "GeneralDriver", alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
+    """Times (T,) of the steps and dg_j/dalpha (T, N) at them by `direct`; of member forces, the largest member's."""
+    code, count, _ = driver.run(alpha, True)
+    if code != OK:
+        return status_of(code), np.zeros(0), np.zeros((0, len(alpha)))
+    places = np.stack([np.maximum(np.arange(count + 1.0) - 1.0, 0.0), np.ones(count + 1)], axis=1)
+    places[0, 1] = 0.0
+    who = driver.visit(j, places, True, count)[2][:, 2].copy()
+    lines = np.zeros((count + 1, len(alpha)))
+    driver.entry.follow(
+        *driver.steps_arguments(count), j, who, driver.room, driver.room_ints, driver.strength, driver.padded, lines,
+        driver.work,
+    )  # fmt: skip
+    return Status.OK, driver.states()[0][: count + 1].copy(), lines

@@ -10,10 +10,11 @@ import numpy as np
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import block_of, first_sign, has_switches, smallest_margin, switch_of
 from mdstopo.general.forces import drive_state, pose_acceleration
+from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
-from mdstopo.general.track import carve_track, keep_stage, keep_state
+from mdstopo.general.track import carve_track, copy_vector, keep_stage, keep_state
 from mdstopo.integrators.runge_kutta import MOST, _error
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 from mdstopo.integrators.steps import (
@@ -28,11 +29,13 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
+    copy_rows,
     deflection,
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.laws.table import law_grazes
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own
@@ -118,11 +121,11 @@ def start_modes(model, strength, desk, q, v, a, lam):  # type: ignore[no-untyped
 
 
 @kernel
-def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, noise, work):  # type: ignore[no-untyped-def]
+def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, graze, noise, work, where):  # type: ignore[no-untyped-def]
     """Switch every member whose margin is used up, one after the other; returns how many events there are now.
 
     -1: no room; a (n,) holds the accelerations behind the last one. The loop ends because each member switches at
-    most twice here.
+    most twice here. where: as `simulate`'s, for members that go less than `graze` beyond.
     """
     n = q.shape[0]
     n_pair = model.pair.shape[0]
@@ -137,12 +140,16 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
             return -1
         k = block_of(model, who)
         salt = track.salt[events]
-        new, _ = switch_of(model, segment, strength, q, v, a, who, k, salt)
+        new, beyond = switch_of(model, segment, strength, q, v, a, who, k, salt)
         old = int(strength[1, who])
+        kind = law_grazes(model.block[k, 3], model.law[k], old) if strength[0, who] != 0.0 else 0
+        if beyond < graze and kind == 2:
+            where[2] = who
         track.event[events, 0] = state
         track.event[events, 1] = who
         track.event[events, 2] = old
         track.event[events, 3] = new
+        track.event[events, 4] = 1 if beyond < graze and kind > 0 else 0
         strength[1, who] = new
         events += 1
         strength[1, strength.shape[1] - 1] = events
@@ -161,8 +168,9 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
 def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):  # type: ignore[no-untyped-def]
     """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
 
-    Arguments as `integrators.runge_kutta.simulate`'s, limits and rooms those of `track`. where (2,): the member or the
-    unknown that is to blame where it ends early; a member whose ends have met, or -1.
+    Arguments as `integrators.runge_kutta.simulate`'s, limits and rooms those of `track`. where (3,), each -1 where
+    there is none: the member or the unknown that is to blame for an early end; a member whose ends have met; one that
+    grazes so that the motion has no derivative.
     """
     model = unpack_general(ints, floats)
     tolerance = MARGIN * settings[0]
@@ -197,6 +205,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     push = np.zeros((2, n_row))
     ends = np.empty((2, n))
     trial = np.empty((2, n))
+    cut = np.empty(CUTS + 1)
+    beyond = np.empty((CUTS + 1, 2, n))
+    left = np.empty((2, n))
     weight = np.empty(n)
     a0 = np.zeros(n)
     q0 = np.empty(n)
@@ -204,8 +215,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     for d in range(n):
         q0[d] = model.q0[d]
         v0[d] = model.v0[d]
-    where[0] = -1
-    where[1] = -1
+    for i in range(where.shape[0]):
+        where[i] = -1
+    graze = settings[0] * size
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model)
@@ -239,6 +251,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 track.event[events, 1] = i
                 track.event[events, 2] = 0
                 track.event[events, 3] = int(strength[1, i])
+                track.event[events, 4] = 0
                 track.salt[events] = 0.0
                 events += 1
         strength[1, strength.shape[1] - 1] = events
@@ -261,8 +274,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
                 first = events
                 events = log_switches(
-                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, rounding, work
-                )
+                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, -1.0, rounding,
+                    work, where,
+                )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
@@ -317,65 +331,73 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             happens = False
             if switching:
                 margin, who = smallest_margin(model, segment, strength, rel)
-                relative_pose(pair, q0, v0, before)
+                low = 0.0
                 high = h
-                if not margin < -rounding:
-                    dip = first_sign(model, segment, strength, q0, v0, ends[0], ends[1], before, rel, h, rounding)
-                    if dip < 1.0:
-                        high = dip * h
-                        advance(
-                            model, table, s, strength, segment, t, high, q0, v0, no, nowhere, desk, lam, q, v, a, track,
-                            trial, push, size, work,
-                        )  # fmt: skip
-                        relative_pose(pair, trial[0], trial[1], rel)
-                        margin, who = smallest_margin(model, segment, strength, rel)
-                    if not margin < -rounding:
-                        high = h
+                # pieces of the step that are still to be looked at, the next one last: from `low` to cut[top]
+                top = 0
+                cuts = 0
+                cut[0] = h
+                copy_rows(ends, beyond[0])
+                copy_vector(q0, left[0])
+                copy_vector(v0, left[1])
+                while top >= 0:
+                    relative_pose(pair, left[0], left[1], before)
+                    relative_pose(pair, beyond[top, 0], beyond[top, 1], rel)
+                    dip, near = first_sign(
+                        model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
+                        cut[top] - low, rounding,
+                    )  # fmt: skip
+                    middle = cut_at(dip, near, low, cut[top])
+                    if middle < 0.0 or cuts == CUTS:
+                        if top == 0 and margin < -rounding:
+                            break
+                        low = cut[top]
+                        copy_rows(beyond[top], left)
+                        top -= 1
+                        continue
+                    cuts += 1
+                    top += 1
+                    cut[top] = middle
+                    advance(
+                        model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
+                        track, beyond[top], push, size, work,
+                    )  # fmt: skip
+                    relative_pose(pair, beyond[top, 0], beyond[top, 1], rel)
+                    value, near_who = smallest_margin(model, segment, strength, rel)
+                    if value < -rounding:
+                        high = middle
+                        margin = value
+                        who = near_who
+                        break
+                    if value < graze and matters(model, strength, near_who):
+                        where[2] = near_who
+                relative_pose(pair, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
-                    low = 0.0
                     at_low, _ = smallest_margin(model, segment, strength, before)
-                    at_high = margin
                     at_low = max(at_low, rounding)
+                    at_high = margin
                     side = 0
-                    for trial_count in range(100):
-                        if high - low <= 4e-16 * (abs(t) + h) or at_high >= -50.0 * rounding:
+                    for look in range(LOOKS):
+                        middle = next_look(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
+                        if middle < 0.0:
                             break
-                        aim = 5.0 * rounding  # behind the switch, by more than rounding
-                        middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
-                        if trial_count > 15 and trial_count % 2 == 0:
-                            middle = 0.5 * (low + high)
-                        # a hair beyond the root, so that it ends between two neighbours
-                        middle = min(max(middle, low + 1e-16 * h), high)
-                        if middle <= low or middle >= high:
-                            middle = 0.5 * (low + high)
-                            if middle <= low or middle >= high:
-                                break
                         advance(
                             model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
                             track, trial, push, size, work,
                         )  # fmt: skip
                         relative_pose(pair, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, strength, rel)
-                        if value < -rounding:
-                            high = middle
-                            at_high = value
-                            if side == 1:
-                                at_low *= 0.5
-                            side = 1
-                        else:
-                            low = middle
-                            at_low = value
-                            if side == -1:
-                                at_high *= 0.5
-                            side = -1
+                        low, high, at_low, at_high, side = narrowed(
+                            low, high, at_low, at_high, middle, value, rounding, side
+                        )
                     h = high
                     lands = lands and h >= end - t
                     singular = advance(
                         model, table, s, strength, segment, t, h, q0, v0, keep, stages, desk, lam, q, v, a,
                         track, ends, push, size, work,
                     )  # fmt: skip
-                    relative_pose(pair, ends[0], ends[1], rel)
+                relative_pose(pair, ends[0], ends[1], rel)
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
             if where[1] < 0:
@@ -397,8 +419,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if happens:
                 balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
                 events = log_switches(
-                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, rounding, work
-                )
+                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, graze, rounding,
+                    work, where,
+                )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 crowd = crowd + 1 if t - crowd_time < 1e-6 * span else 0

@@ -15,7 +15,8 @@ lam       (S, n_row)            multipliers of the joints
 K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters
 turn      (S, n)                slope of the turning loads
 salt      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
-event     (E, 4) integers       the state at which it happened, member (padded), mode before and after
+event     (E, 5) integers       the state at which it happened, member (padded), mode before and after; whether it
+                                only just happened, so that forces at it have no derivative
 ========  ====================  ======================================================================
 """
 
@@ -25,7 +26,7 @@ from mdstopo.general.structures import TrackStructure, bundle
 from mdstopo.jit import kernel
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
-STATE, MEMBER, OLD, NEW = range(4)
+STATE, MEMBER, OLD, NEW, GRAZES = range(5)
 
 TRACK = ("t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "salt", "event")
 
@@ -45,7 +46,7 @@ def track_room(
     """Lengths of the flat arrays of floats and integers that `carve_track` needs."""
     per_stage = 1 + 4 * n + n_row + 72 * n_pair
     floats = (steps + 1) * (1 + 2 * n + 2 * n_row) + stages * per_stage + events * 3 * n
-    return floats + 36 * n_pair * (stages if inertial else 1), 4 * (steps + 1) + 4 * events
+    return floats + 36 * n_pair * (stages if inertial else 1), 4 * (steps + 1) + 5 * events
 
 
 @kernel
@@ -58,7 +59,7 @@ def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
     stages = limits[2]
     events = limits[3]
     index = ints[: 4 * (steps + 1)].reshape((steps + 1, 4))
-    event = ints[4 * (steps + 1) : 4 * (steps + 1) + 4 * events].reshape((events, 4))
+    event = ints[4 * (steps + 1) : 4 * (steps + 1) + 5 * events].reshape((events, 5))
     t = floats[: steps + 1]
     f = steps + 1
     state = floats[f : f + 2 * n * (steps + 1)].reshape((steps + 1, 2, n))

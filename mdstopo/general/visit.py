@@ -3,10 +3,10 @@
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.duties import point_of
+from mdstopo.general.duties import beside, point_of
 from mdstopo.general.forces import drive_state
 from mdstopo.general.model import unpack_general
-from mdstopo.general.responses import MEMBER_FORCE, largest_force, rated
+from mdstopo.general.responses import APART, MEMBER_FORCE, largest_force, member_force, rated
 from mdstopo.general.track import carve_track, copy_vector, restore_modes
 from mdstopo.jit import entry, kernel
 
@@ -36,32 +36,13 @@ def visit(  # type: ignore[no-untyped-def]
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
-        h = track.t[k + 1] - track.t[k]
-        t = track.t[k + 1] if c >= 1.0 else track.t[k] + c * h
         q = out[0, i]
         v = out[1, i]
         a = out[2, i]
         lam = lam_out[i, :n_row]
         segment = track.index[k, 2]
-        restore_modes(track, track.index[k, 3], strength)
-        if c <= 0.0 or c >= 1.0:
-            state = track.state[k if c <= 0.0 else k + 1]
-            copy_vector(state[0], q)
-            copy_vector(state[1], v)
-        elif exact:
-            point_of(tag, model, tables, strength, track, count, k, c, no, desk, q, v, work)
-        else:
-            if k != last:
-                for e in range(2):
-                    copy_vector(track.state[k + e, 0], ends[3 * e])
-                    copy_vector(track.state[k + e, 1], ends[3 * e + 1])
-                    balance(
-                        model, strength, segment, track.t[k + e], ends[3 * e], ends[3 * e + 1], no, desk,
-                        ends[3 * e + 2], lam,
-                    )  # fmt: skip
-                last = k
-            quintic(c, h, ends, q, v)
-        drive_state(model, segment, t, q, v)
+        last = go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work)
+        t = time_at(track, k, c)
         seen[i, 2] = who
         if j >= 0 and model.response[j, 0] == MEMBER_FORCE and who < 0:
             balance(model, strength, segment, t, q, v, no, desk, a, lam)
@@ -74,6 +55,100 @@ def visit(  # type: ignore[no-untyped-def]
         for m in range(model.driven.shape[0]):
             d = model.driven[m]
             lam_out[i, n_row + m] = desk.f[d] - model.mass[d] * a[d] - held_back(model, desk, d, a, lam)
+
+
+@entry
+def compare(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, limits, count, room, room_ints, strength, j, places, who, top, seen, work
+):
+    """Members beside each other, of the group that response j looks at, at places (K, 2) as `visit` takes inside steps.
+
+    Out: top (count of members,), the largest |f*| of each at all places; seen (C, K, 2), |f*| and its rate of the
+    members who (C,), by differences along the motion.
+    """
+    model = unpack_general(ints, floats)
+    track = carve_track(model, limits, room, room_ints)
+    desk = make_desk(model)
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    no = np.bool_(False)
+    group = model.response[j, 5]
+    q = np.empty(n)
+    v = np.empty(n)
+    a = np.empty(n)
+    lam = np.empty(n_row)
+    near = np.empty((3, n))
+    ends = np.empty((6, n))
+    slopes = np.empty((3, 6))
+    own = np.empty((2, 6))
+    last = -1
+    for i in range(top.shape[0]):
+        top[i] = 0.0
+    for i in range(places.shape[0]):
+        k = int(places[i, 0])
+        c = places[i, 1]
+        segment = track.index[k, 2]
+        last = go_to(tag, model, tables, strength, track, count, k, c, no, last, desk, ends, lam, q, v, work)
+        t = time_at(track, k, c)
+        balance(model, strength, segment, t, q, v, no, desk, a, lam)
+        for m in range(top.shape[0]):
+            f, _ = member_force(model, strength, segment, t, group, m, q, v, a, slopes, own)
+            top[m] = max(top[m], abs(f))
+        for m in range(who.shape[0]):
+            f, _ = member_force(model, strength, segment, t, group, who[m], q, v, a, slopes, own)
+            seen[m, i, 0] = abs(f)
+            seen[m, i, 1] = 0.0
+        if who.shape[0] == 0:
+            continue
+        apart = APART * (track.t[k + 1] - track.t[k])
+        for side in (-1.0, 1.0):
+            e = side * apart
+            beside(tag, track, k, c, e, q, v, a, near[0], near[1])
+            balance(model, strength, segment, t + e, near[0], near[1], no, desk, near[2], lam)
+            for m in range(who.shape[0]):
+                f, _ = member_force(
+                    model, strength, segment, t + e, group, who[m], near[0], near[1], near[2], slopes, own
+                )
+                seen[m, i, 1] += side * abs(f) / (2.0 * apart)
+
+
+@kernel
+def time_at(track, k, c):  # type: ignore[no-untyped-def]
+    """The time at fraction c of step k."""
+    if c >= 1.0:
+        return track.t[k + 1]
+    return track.t[k] + c * (track.t[k + 1] - track.t[k])
+
+
+@kernel
+def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work):  # type: ignore[no-untyped-def]
+    """q, v (n,) at fraction c of step k, with the modes of that step.
+
+    ends (6, n): the quintic's, made anew where k is not `last`; the step whose ends they are is returned.
+    """
+    no = np.bool_(False)
+    h = track.t[k + 1] - track.t[k]
+    segment = track.index[k, 2]
+    restore_modes(track, track.index[k, 3], strength)
+    if c <= 0.0 or c >= 1.0:
+        state = track.state[k if c <= 0.0 else k + 1]
+        copy_vector(state[0], q)
+        copy_vector(state[1], v)
+    elif exact:
+        point_of(tag, model, tables, strength, track, count, k, c, no, desk, q, v, work)
+    else:
+        if k != last:
+            for e in range(2):
+                copy_vector(track.state[k + e, 0], ends[3 * e])
+                copy_vector(track.state[k + e, 1], ends[3 * e + 1])
+                balance(
+                    model, strength, segment, track.t[k + e], ends[3 * e], ends[3 * e + 1], no, desk, ends[3 * e + 2],
+                    lam,
+                )  # fmt: skip
+            last = k
+        quintic(c, h, ends, q, v)
+    drive_state(model, segment, time_at(track, k, c), q, v)
+    return last
 
 
 @kernel

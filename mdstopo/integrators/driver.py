@@ -43,7 +43,7 @@ class Looked:
     """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
 
     rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
-    meeting: padded index of a member whose ends meet, or -1.
+    meeting: padded index of a member whose ends meet, or -1. grazing: of one that leaves no derivative, or -1.
     """
 
     status: Status
@@ -52,6 +52,7 @@ class Looked:
     found: IndexArray
     gradients: FloatArray
     meeting: int
+    grazing: int = -1
 
 
 class Driver:

@@ -242,7 +242,8 @@ class _Run:
         assert state is not None
         evaluation = engine.evaluate(state.best_alpha, gradient=True)
         if not evaluation.status.ok:
-            self.warnings += (f"the final design has no sensitivities: {evaluation.status.value}",)
+            lacks = "the sensitivities of the final design: " if evaluation.gradients else "no sensitivities: "
+            self.warnings += (f"{lacks}{evaluation.status.value}",)
         if message := getattr(evaluation, "message", ""):
             self.warnings += (message,)
         self.peaks = {

@@ -5,6 +5,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
 from tests.general.support import design_of, load
 
 
@@ -116,3 +117,44 @@ objectives: {G: {response: energy, load_case: one}}
         )
     )
     assert mdstopo.evaluate(case).work["steps"] < mdstopo.evaluate(both).work["steps"]
+
+
+@pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
+def test_histories_by_direct_end_in_the_gradient_and_are_those_of_shorter_motions(integrator):
+    """At the last step the history is the gradient of `final`; before it, that of a motion that ends there."""
+    text = """
+format: 1
+gravity: [0, -9.8]
+time: {end: 0.9}
+bodies: {bar: {mass: 2, inertia: 0.3, position: [0.5, 0]}}
+joints: [{name: pin, type: revolute, bodies: [ground, bar], at: [0, 0]}]
+members:
+  tie:
+    from: {body: ground, at: [1, 1]}
+    to: {body: bar, at: [1, 0]}
+    law: [{type: spring, stiffness: 40, damping: 1}, {type: cubic, stiffness: 10, cubic: 300}]
+  floor:
+    from: {body: ground, at: [1, -2]}
+    to: {body: bar, at: [1, 0]}
+    law: {type: gap, stiffness: 900, damping: 9, gap: 0.3, side: compression}
+design: {initial: 0.8}
+objectives:
+  y: {response: {displacement: {body: bar, at: [1, 0], component: y}}, over_time: final}
+  f: {response: {joint_force: {joint: pin}}, over_time: final}
+  m: {response: {member_force: {group: tie}}, over_time: final}
+combine: {weights: {y: 1, f: 1, m: 1}}
+solver: {integrator: INTEGRATOR, step: 0.001}
+""".replace("INTEGRATOR", integrator)
+    whole = Evaluator(read_case(text))
+    alpha = np.array([0.7, 0.9])
+    final = whole.evaluate(alpha, sensitivity="direct").gradients
+    for name in final:
+        status, t, rows = whole.histories(alpha, name)
+        assert status.ok
+        assert rows.shape == (len(t), 2)
+        assert np.abs(rows[-1] - final[name]).max() <= 1e-9 * np.abs(final[name]).max()
+    k = int(np.searchsorted(t, 0.6))  # after the touch, on the grid of steps
+    shorter = Evaluator(read_case(text.replace("end: 0.9", f"end: {float(t[k])!r}")))
+    for name, gradient in shorter.evaluate(alpha).gradients.items():
+        _, _, rows = whole.histories(alpha, name)
+        assert np.abs(rows[k] - gradient).max() <= 2e-5 * np.abs(gradient).max(), name

@@ -71,8 +71,8 @@ def _start(code, p, x, xd, xdd):
 
 
 @numba.njit
-def _jumps(code, p, before, after):
-    return table.law_jumps(code, p, before, after)
+def _grazes(code, p, mode):
+    return table.law_grazes(code, p, mode)
 
 
 @numba.njit
@@ -106,8 +106,14 @@ class Kernel:
     def start(self, x, xd, xdd=0.0):
         return _start(self.code, self.p, float(x), float(xd), float(xdd))
 
+    def grazes(self, mode):
+        return int(_grazes(self.code, self.p, mode))
+
     def jumps(self, before, after):
-        return bool(_jumps(self.code, self.p, before, after))
+        """Whether the force may jump where the mode changes so: where damped contact begins or ends with a force."""
+        if not isinstance(self.record, GapLaw) or self.record.damping == 0.0:
+            return False
+        return {before, after} == {OPEN, CLOSED}
 
     @property
     def switches(self):
@@ -414,7 +420,7 @@ def test_the_kernel_knows_which_laws_switch(kind):
         assert kernel.margin(0.3, -2.0, 0) == np.inf
         assert kernel.slopes(0.3, -2.0, 0) == (0.0, 0.0)
         assert kernel.start(0.3, -2.0, 1.0) == 0
-        assert not kernel.jumps(0, 1)
+        assert kernel.grazes(0) == 0
 
 
 @every_switching
@@ -551,6 +557,18 @@ def switch_points(kernel, rng):
     x = touch(law) + side * rate * law.damping / law.stiffness
     yield CLOSED, CLIPPED, x, -side * rate
     yield CLIPPED, CLOSED, x, -side * rate
+
+
+def test_only_damped_contacts_graze_and_only_clipped_ones_so_that_the_motion_feels_it():
+    rng = np.random.default_rng(5)
+    for kind in SWITCHING:
+        record = MAKERS[kind](rng)
+        kernel = Kernel(record)
+        damped = isinstance(record, GapLaw) and record.damping > 0.0
+        assert kernel.grazes(OPEN) == ((2 if record.clip else 1) if damped else 0), kind
+        assert kernel.grazes(CLOSED) == 0
+    undamped = GapLaw(stiffness=3.0, gap=0.1, clip=True)
+    assert Kernel(undamped).grazes(OPEN) == 0
 
 
 @every_switching

@@ -108,8 +108,13 @@ def gap_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_jumps(p, before, after):  # type: ignore[no-untyped-def]
-    """Whether the force jumps at this switch: with damping, where contact begins or ends with a force."""
-    if p[1] == 0.0:
-        return False
-    return (before == OPEN and after == CLOSED) or (before == CLOSED and after == OPEN)
+def gap_grazes(p, mode):  # type: ignore[no-untyped-def]
+    """What a touch that only just happens (or not) does: 0 nothing, 1 the force at it is no smooth function, 2 the
+    motion is none.
+
+    Touching by a depth y lasts sqrt(y). Damping gives a force that begins with the root of y; its impulse c (y - y) is
+    nothing, unless clip takes the returning half away: c y, a kink at no touch.
+    """
+    if mode != OPEN or p[1] == 0.0:
+        return 0
+    return 2 if p[4] != 0.0 else 1

@@ -19,7 +19,7 @@ from mdstopo.mechanics.laws.actuator import (
 )
 from mdstopo.mechanics.laws.cubic import cubic_force
 from mdstopo.mechanics.laws.curve import curve_data, curve_force
-from mdstopo.mechanics.laws.gap import gap_force, gap_jumps, gap_margin, gap_margin_slopes, gap_next, gap_start
+from mdstopo.mechanics.laws.gap import gap_force, gap_grazes, gap_margin, gap_margin_slopes, gap_next, gap_start
 from mdstopo.mechanics.laws.linear import linear_force
 from mdstopo.mechanics.laws.pulse import pulse_force, pulse_landings
 
@@ -104,9 +104,9 @@ def law_start(code, p, x, xd, xdd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def law_jumps(code, p, before, after):  # type: ignore[no-untyped-def]
-    """Whether the force may jump where the mode changes so."""
-    return code == GAP and gap_jumps(p, before, after)
+def law_grazes(code, p, mode):  # type: ignore[no-untyped-def]
+    """What a margin that is only just used up (or not) does to derivatives: nothing 0, force 1, motion 2."""
+    return gap_grazes(p, mode) if code == GAP else 0
 
 
 def parameters(record: Law, curves: list[float]) -> list[float]:

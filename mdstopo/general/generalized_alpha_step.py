@@ -1,0 +1,193 @@
+"""One step of generalized-alpha of a general scene (formulas in `generalized_alpha`)."""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
+from mdstopo.general.forces import drive_state
+from mdstopo.general.projection import project
+from mdstopo.general.track import copy_vector, keep_stage
+from mdstopo.integrators.gauss import fastest_rate
+from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
+from mdstopo.integrators.steps import (
+    FORCES,
+    NEWTON,
+    NEWTON_FAILED,
+    NON_FINITE,
+    OK,
+    SINGULAR,
+    TANGENTS,
+    deflection,
+    motion_weights,
+)
+from mdstopo.jit import kernel
+
+
+@kernel
+def rate_of(model, desk):  # type: ignore[no-untyped-def]
+    """Angular frequency of the fastest vibration at the balanced state on the desk, rad/s (an estimate)."""
+    n = model.mass.shape[0]
+    n_pair = model.pair.shape[0]
+    inverse = np.zeros(n)
+    for d in range(n):
+        if model.free[d] != 0:
+            inverse[d] = 1.0 / model.mass[d]
+    return fastest_rate(
+        model.pair, inverse, desk.k.reshape((1, n_pair, 6, 6)), desk.c.reshape((1, n_pair, 6, 6)), np.bool_(True)
+    )
+
+
+@kernel
+def advance(  # type: ignore[no-untyped-def]
+    model,
+    radius,
+    strength,
+    segment,
+    t,
+    h,
+    starting,
+    state,
+    guess,
+    newton_tolerance,
+    size,
+    o,
+    desk,
+    track,
+    ends,
+    push,
+    extent,
+    rel0,
+    work,
+):
+    """One step of length h from state (4, n) = q, v, a, x to ends (4, n) of the same; q, v of the end on the joints.
+
+    starting: whether a and x are to be made here. guess (3, n): x of the three steps before, for the first iterate.
+    extent (2, n_pair): how far each pair has moved so far from its pose rel0 at the start, and its noise, m. push
+    (2, n_row). With o >= 0 the stages are kept
+    from there on. Returns (code, stages, place of a singular unknown).
+    """
+    n = state.shape[1]
+    n_row = model.size[0]
+    e1, e2, e3, beta, gamma, lag = weights_of(radius)
+    yes = np.bool_(True)
+    q = np.empty(n)
+    v = np.empty(n)
+    a = state[2]
+    x = state[3]
+    now = np.empty(n)
+    x_now = np.empty(n)
+    balanced = np.empty(n)
+    delta = np.empty(n)
+    lam = np.zeros(n_row)
+    row = np.empty(n_row)
+    weight = np.empty(n)
+    scale = np.empty(model.pair.shape[0])
+    stages = 0
+    if starting:
+        copy_vector(state[0], q)
+        copy_vector(state[1], v)
+        singular = balance(model, strength, segment, t, q, v, yes, desk, a, lam)
+        work[FORCES] += 1
+        work[TANGENTS] += 1
+        if singular >= 0:
+            return SINGULAR, stages, singular
+        if o >= 0:
+            keep_stage(track, o, t, q, v, a, lam, desk, yes)
+        stages = 1
+        copy_vector(a, x)
+        if lag > 0.0 and h * rate_of(model, desk) < RESOLVED:
+            ahead = lag * h
+            for d in range(n):
+                q[d] = state[0, d] + ahead * (state[1, d] + 0.5 * ahead * a[d])
+                v[d] = state[1, d] + ahead * a[d]
+            singular = balance(model, strength, segment, t + ahead, q, v, yes, desk, balanced, lam)
+            work[FORCES] += 1
+            work[TANGENTS] += 1
+            if singular >= 0:
+                return SINGULAR, stages, singular
+            if o >= 0:
+                keep_stage(track, o + 1, t + ahead, q, v, balanced, lam, desk, yes)
+            stages = 2
+            for d in range(n):
+                x[d] = 2.0 * a[d] - balanced[d]
+    previous = np.inf
+    newton = 0
+    while True:
+        if newton == 0 or newton == RESTART:
+            for d in range(n):
+                x_now[d] = x[d]
+                if newton == 0 and not starting:
+                    x_now[d] = 4.0 * (x[d] + guess[1, d]) - 6.0 * guess[0, d] - guess[2, d]
+                now[d] = (x_now[d] - e2 * a[d] + e3 * x[d]) / e1
+                q[d] = state[0, d] + h * (state[1, d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
+                v[d] = state[1, d] + h * ((1.0 - gamma) * x[d] + gamma * x_now[d])
+            previous = np.inf
+        singular = balance(model, strength, segment, t + h, q, v, yes, desk, balanced, lam)
+        work[FORCES] += 1
+        work[TANGENTS] += 1
+        work[NEWTON] += 1
+        if singular >= 0:
+            return SINGULAR, stages, singular
+        for d in range(n):
+            if model.free[d] == 0:
+                now[d] = balanced[d]
+            balanced[d] -= now[d]
+            delta[d] = model.mass[d] * balanced[d]
+        row[:] = 0.0
+        for p in range(model.pair.shape[0]):
+            for i in range(6):
+                total = 0.0
+                for j in range(6):
+                    total += desk.mass[p, i, j] * balanced[3 * model.pair[p, j // 3] + j % 3]
+                delta[3 * model.pair[p, i // 3] + i % 3] += total
+        for j in range(model.joint.shape[0]):
+            for r in range(3):
+                if model.row[j, r] >= 0:
+                    for i in range(6):
+                        column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                        row[model.row[j, r]] += desk.jac[j, r, i] * balanced[column]
+        factor_matrix(
+            model, desk, desk.k, desk.c, desk.turn, desk.mass, h * h * beta * e1, h * gamma * e1, np.bool_(False)
+        )
+        solve_unknowns(model, desk, delta, row)
+        rounding = 1e-8
+        for p in range(model.pair.shape[0]):
+            reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
+            scale[p] = max(reached, 1e3 * extent[1, p])
+            rounding = max(rounding, 100.0 * extent[1, p] / scale[p])
+        motion_weights(model.pair, rel0, model.reach, scale, weight)
+        e = 0.0
+        for d in range(n):
+            moved = h * h * beta * e1 * delta[d]
+            now[d] += delta[d]
+            x_now[d] = e1 * now[d] + e2 * a[d] - e3 * x[d]
+            q[d] += moved
+            v[d] += h * gamma * e1 * delta[d]
+            change = weight[d] * abs(moved)
+            if not change <= e and not np.isnan(e):
+                e = change
+        if e <= newton_tolerance or (e >= 0.5 * previous and e < rounding):
+            break
+        previous = e
+        if newton >= MOST or (newton >= RESTART and not e < np.inf):
+            return (NEWTON_FAILED if e < np.inf else NON_FINITE), stages, -1
+        newton = RESTART if not e < np.inf else newton + 1
+    drive_state(model, segment, t + h, q, v)
+    if o >= 0:
+        # the multipliers that belong to the corrected accelerations
+        for r in range(n_row):
+            lam[r] += row[r]
+        keep_stage(track, o + stages, t + h, q, v, now, lam, desk, yes)
+    copy_vector(q, ends[0])
+    copy_vector(v, ends[1])
+    copy_vector(now, ends[2])
+    copy_vector(x_now, ends[3])
+    singular = project(model, size, ends[0], ends[1], desk, push[0], push[1])
+    return (SINGULAR if singular >= 0 else OK), stages + 1, singular
+
+
+@kernel
+def copy_state(source, target):  # type: ignore[no-untyped-def]
+    """target (4, n) = source."""
+    for i in range(4):
+        for d in range(source.shape[1]):
+            target[i, d] = source[i, d]

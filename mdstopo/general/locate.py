@@ -1,0 +1,60 @@
+"""Where within a step a margin falls through zero: the next place to look at, and what it has shown.
+
+First it has to be known that one does: members that come and go within a step show it at neither end. Looking at the
+cubic through both ends tells where they might; there the step is cut, and both pieces are looked at in the same way,
+until nothing is doubtful. Then the root is bracketed and closed in on.
+"""
+
+from mdstopo.general.events import block_of
+from mdstopo.jit import kernel
+from mdstopo.mechanics.laws.table import law_grazes
+
+#: looks at one event
+LOOKS = 100
+#: cuts of one step, and how near to the ends of a piece none is worth making
+CUTS, EDGE = 24, 1e-7
+#: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
+NEAR, AIM = 50.0, 5.0
+
+
+@kernel
+def next_look(low, high, at_low, at_high, rounding, resolution, look):  # type: ignore[no-untyped-def]
+    """A length of the step between low and high, where the margins are at_low and at_high < 0; -1: high will do.
+
+    The secant through both, aimed behind the switch by more than rounding; after many looks every other is a bisection.
+    """
+    if high - low <= resolution or at_high >= -NEAR * rounding:
+        return -1.0
+    aim = AIM * rounding
+    middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
+    if (look > 15 and look % 2 == 0) or middle <= low or middle >= high:
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            return -1.0
+    return middle
+
+
+@kernel
+def narrowed(low, high, at_low, at_high, middle, value, rounding, side):  # type: ignore[no-untyped-def]
+    """low, high, at_low, at_high, side after the margin at `middle` has been seen: Illinois' rule."""
+    if value < -rounding:
+        return low, middle, (0.5 * at_low if side == 1 else at_low), value, 1
+    return middle, high, max(value, rounding), (0.5 * at_high if side == -1 else at_high), -1
+
+
+@kernel
+def cut_at(dip, near, low, high):  # type: ignore[no-untyped-def]
+    """Where to cut the piece of a step between low and high, from what `first_sign` says of it; -1: nowhere."""
+    c = dip if dip < 1.0 else near
+    if not (c > EDGE and c < 1.0 - EDGE):
+        return -1.0
+    return low + c * (high - low)
+
+
+@kernel
+def matters(model, strength, i):  # type: ignore[no-untyped-def]
+    """Whether it makes a difference to derivatives that member i only just does not leave its mode."""
+    if i < 0 or strength[0, i] == 0.0:
+        return False
+    k = block_of(model, i)
+    return law_grazes(model.block[k, 3], model.law[k], int(strength[1, i])) == 2

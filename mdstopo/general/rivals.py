@@ -1,0 +1,72 @@
+"""Members that compete for the largest force of their group: every one that comes near it has peaks of its own.
+
+Following the largest member at each time would hide the others, and where they cross the maximum has a kink. Here each
+rival is followed by itself, through its own peaks; the highest of all of them is the maximum over members and time.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.general.extremes import FRACTIONS, Samples, peaks
+from mdstopo.general.model import COUNT, GROUP
+from mdstopo.general.responses import MEMBER_FORCE
+from mdstopo.integrators.driver import CLOSENESS
+from mdstopo.scene.model import FloatArray, IndexArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
+
+#: members that are followed at most
+RIVALS = 12
+
+
+def compete(kind: int, reduction: str) -> bool:
+    """Whether the members behind a response of this kind compete, reduced so."""
+    return kind == MEMBER_FORCE and reduction in ("max", "max_abs", "final")
+
+
+def members_peaks(driver: "GeneralDriver", j: int, t: FloatArray, final: bool) -> list[FloatArray]:
+    """The peaks of the members' forces that response j looks at, as rows of `extremes`; t (m + 1,): the steps' times.
+
+    final: their values at the end instead.
+    """
+    count = len(t) - 1
+    if final:
+        places = np.array([[count - 1.0, 1.0]])
+    else:
+        places = np.empty((count * len(FRACTIONS), 2))
+        places[:, 0] = np.repeat(np.arange(count), len(FRACTIONS))
+        places[:, 1] = np.tile(FRACTIONS, count)
+    top, _ = _compare(driver, j, places, np.zeros(0, dtype=np.int64), count)
+    near = np.flatnonzero(top >= (1.0 - CLOSENESS) * top.max())
+    who = np.sort(near[np.argsort(-top[near], kind="stable")[:RIVALS]])
+    if final:
+        seen = [driver.visit(j, places, True, count, who=int(i))[2][0] for i in who]
+        return [np.array([t[-1], s[0], count - 1.0, 1.0, s[1], 1.0, i]) for s, i in zip(seen, who, strict=True)]
+    _, seen_all = _compare(driver, j, places, who, count)
+    rows = []
+    for i, seen_one in zip(who.tolist(), seen_all, strict=True):
+        shaped = seen_one.reshape(count, len(FRACTIONS), 2)
+        samples = Samples(t, shaped[:, :, 0], shaped[:, :, 1], np.full(shaped.shape[:2], float(i)))
+
+        def see(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
+            return driver.visit(j, places, exact, count, who=who)[2]
+
+        rows += peaks(samples, see, 1.0, CLOSENESS)
+    return rows
+
+
+def _compare(
+    driver: "GeneralDriver", j: int, places: FloatArray, who: IndexArray, count: int
+) -> tuple[FloatArray, FloatArray]:
+    """The largest |f*| of every member (count of members,), and |f*| with rate of some (C, K, 2), at places (K, 2)."""
+    model = driver.scene.model
+    group = int(model.response[j, 5])
+    members = int(model.block[model.block[:, GROUP] == group, COUNT].max())
+    top, seen = np.zeros(members), np.zeros((len(who), len(places), 2))
+    driver.entry.compare(
+        driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,
+        driver.room_ints, driver.strength, j, places, who, top, seen, driver.work,
+    )  # fmt: skip
+    return top, seen
