@@ -51,7 +51,7 @@ def test_readme_cases_can_be_optimised(number, members):
 
     case = read_case(blocks("case")[number])
     assert case.n_design == members
-    assert refusals(case, optimizing=True) == []
+    assert refusals(case) == []
     assert mdstopo.evaluate(case).status.ok
 
 

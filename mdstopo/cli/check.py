@@ -33,7 +33,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
 
     output = Output(json=as_json, quiet=quiet)
     case = load_case(case_path, overrides)
-    refused = refusals(case, optimizing=case.is_optimizable)
+    refused = refusals(case)
     for remark in case.warnings:
         output.notice(f"warning: {remark.located(str(case_path))}")
     output.say(f"{case.title or case.name} ({case_path})")

@@ -2,6 +2,8 @@
 
 COMMANDS: dict[str, str] = {
     "run": "Optimise a case and keep its result file up to date.",
+    "pareto": "Trace the front of several objectives.",
+    "sweep": "Run a case over weights, or over values of any keys.",
     "check": "Read a case and say what is in it, without running it.",
     "simulate": "Compute the motion of one design.",
     "gradient": "Compare sensitivity methods on one design.",

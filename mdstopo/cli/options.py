@@ -74,14 +74,14 @@ def _pairs(_context: click.Context, _parameter: click.Parameter, values: tuple[s
     return pairs
 
 
-def open_case(path: Path, overrides: dict[str, str], *, optimizing: bool = False) -> "Case":
+def open_case(path: Path, overrides: dict[str, str]) -> "Case":
     """Read a case and refuse what the engine cannot compute. Raises CaseError with every mistake."""
     from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
     from mdstopo.scene.refusals import refusals
 
     case = load_case(path, overrides)
-    refused = refusals(case, optimizing=optimizing)
+    refused = refusals(case)
     if refused:
         raise CaseError(refused, str(path))
     return case

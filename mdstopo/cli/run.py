@@ -23,7 +23,7 @@ from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.progress import display
 
 if TYPE_CHECKING:
-    from mdstopo.session import Outcome
+    from mdstopo.session.outcome import Outcome
 
 _EXIT = {"converged": 0, "max_iterations": 0, "failed": 1, "interrupted": 3}
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
@@ -59,10 +59,10 @@ def command(
         raise click.UsageError("--resume and --overwrite exclude each other")
     output = Output(json=as_json, quiet=quiet)
     interrupts = Interrupts(quiet)
-    case = open_case(case_path, overrides, optimizing=True)
+    case = open_case(case_path, overrides)
     initial = open_design(alpha_path, case) if alpha_path is not None else None
     path = result_path(out, case)
-    from mdstopo.session import run_session
+    from mdstopo.session.run import run_session
 
     with display(quiet) as show:
         outcome = run_session(

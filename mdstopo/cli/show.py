@@ -24,12 +24,16 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     from mdstopo.store.reader import read_result
 
     output = Output(json=as_json, quiet=quiet)
-    view = read_result(result_path, leave_out=("optimizer",))
+    view = read_result(result_path, leave_out=("optimizer", "pareto/tasks", "sweep/tasks", "combine/tasks"))
     output.say(f"{view.title or view.name}: {view.status.replace('_', ' ')} - {view.reason}")
     output.say(f"made by `{view.provenance.get('command') or view.kind}` on {view.provenance.get('created', '?')}")
-    if view.kind == "run":
+    if view.kind == "run" and "iterations/combined" in view.arrays:
         _say_iterations(output, view)
         _say_starts(output, view)
+    if view.kind == "pareto":
+        _say_front(output, view)
+    if view.kind == "sweep":
+        _say_sweep(output, view)
     _say_trajectories(output, view)
     _say_sensitivities(output, view)
     _say_members(output, view, count)
@@ -50,12 +54,13 @@ def objective_names(view: "ResultView") -> list[str]:
 
 
 def resume_command(view: "ResultView") -> str:
-    """The command that continues an unfinished run."""
+    """The command that continues what is unfinished."""
     words = shlex.split(view.provenance.get("command", ""))
-    if words[:2] != ["mdstopo", "run"]:
-        words = ["mdstopo", "run", view.case_path or "CASE", "--out", str(view.path)]
+    if words[:1] != ["mdstopo"] or words[1:2] not in (["run"], ["pareto"], ["sweep"]):
+        words = ["mdstopo", view.kind, view.case_path or "CASE", "--out", str(view.path)]
     words = [word for word in words if word not in ("--overwrite", "--resume")]
-    return shlex.join([*words[:3], "--resume", *words[3:]])
+    place = 3 if words[1] == "run" else len(words)
+    return shlex.join([*words[:place], "--resume", *words[place:]])
 
 
 def condensed(count: int, rows: int = _ROWS) -> list[int]:
@@ -95,6 +100,35 @@ def _say_starts(output: Output, view: "ResultView") -> None:
     rows = [["start", *objective_names(view), "status"]]
     for index, word in enumerate(view.lines("starts/status")):
         rows.append([str(index + 1), *(number(value) for value in starts["objectives"][index]), word])
+    output.table(rows)
+
+
+def _say_front(output: Output, view: "ResultView") -> None:
+    import numpy as np
+
+    from mdstopo.cli.pareto import front_rows
+
+    part = view.under("pareto")
+    weights = np.asarray(part["weights"], dtype=np.float64)
+    objectives = np.asarray(part["objectives"], dtype=np.float64)
+    marked, counts = np.asarray(part["dominated"], dtype=np.bool_), np.asarray(part["evaluations"], dtype=np.int64)
+    status = list(view.lines("pareto/status"))
+    output.table(front_rows(objective_names(view), weights, objectives, status, marked, counts))
+    for name in ("utopia", "maxima"):
+        output.say(f"{name}: {', '.join(number(value) for value in part[name][0])}")
+    reasons = view.lines("pareto/reason")
+    for j, word in enumerate(status):
+        if word != "converged":
+            output.say(f"point {j}: {reasons[j]}")
+
+
+def _say_sweep(output: Output, view: "ResultView") -> None:
+    keys = list(view.lines("sweep/keys"))
+    columns = [view.lines(f"sweep/values/{key}") for key in keys]
+    objectives, status = view.array("sweep/objectives"), view.lines("sweep/status")
+    rows = [[*keys, *objective_names(view), "status"]]
+    for i, word in enumerate(status):
+        rows.append([*(column[i] for column in columns), *(number(value, 7) for value in objectives[i]), word])
     output.table(rows)
 
 
@@ -140,7 +174,11 @@ def _document(view: "ResultView") -> dict[str, Any]:
         "datasets": {path: list(array.shape) for path, array in view.arrays.items()},
         "resume": None if view.finished else resume_command(view),
     }
-    if view.kind == "run":
+    if view.kind == "pareto":
+        for name in ("weights", "objectives", "dominated", "evaluations"):
+            content[name] = view.array(f"pareto/{name}")
+        content["point_status"] = list(view.lines("pareto/status"))
+    if view.kind == "run" and "iterations/combined" in view.arrays:
         columns = view.under("iterations")
         content["iterations"] = len(columns["combined"]) - 1
         content["evaluations"] = int(columns["evaluations"][-1])

@@ -54,6 +54,7 @@ class Gsao:
             raise ValueError("a lower bound lies above its upper bound")
         width = self.upper - self.lower
         self.range = np.where(width > 0.0, width, 1.0)
+        self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
 
     def start(self, initial: Floats | None = None) -> State:
@@ -206,6 +207,8 @@ class Gsao:
         highest = float(state.rows.max())
         near = state.rows >= highest - settings.number("peak_window") * abs(highest)
         chosen = np.flatnonzero(near)[: int(settings.number("peaks"))]
+        if self.competitors is not None and settings.number("peaks") > 1:
+            chosen = np.arange(len(state.rows))[: self.competitors]
         slopes = np.concatenate([state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))])
         distance = state.shift * self.range
         below = distance

@@ -1,21 +1,21 @@
 """A case as an optimisation problem: what `Gsao` minimises when it designs a structure.
 
-U is the objective, negated where it is to be maximised. Where U is the worst of several peaks (a maximum that is
-minimised, a minimum that is maximised) every competing peak is a row of its own (bound formulation); elsewhere the one
-value is.
+U is the objective, negated where it is to be maximised, or a scalarisation of several. Where an objective is the worst
+of several peaks (a maximum that is minimised, a minimum that is maximised) every competing peak is a row of its own
+(bound formulation); elsewhere the one value is.
 """
 
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import ResponseRow, VolumeRow
+from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.engine import Evaluator
-from mdstopo.evaluation import Evaluation
+from mdstopo.evaluation import Evaluation, Peak
 from mdstopo.optimizer.problem import Floats, LinearRows, Sample
+from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals
+from mdstopo.status import Status
 
-#: reductions whose competing peaks bound U from above, by sense
-_COMPETING = {("max", "minimize"), ("max_abs", "minimize"), ("min", "maximize")}
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
 #: peaks of one constraint that are rows of their own
@@ -23,20 +23,28 @@ COMPETITORS = 4
 
 
 class StructureProblem:
-    """The `Problem` of a case with one objective, volume rows, and constraints on responses.
+    """The `Problem` of a case: volume rows, constraints on responses, and one objective or a scalarisation of several.
 
-    Raises CaseError where the case asks for an optimisation that is not there yet.
+    scalarisation: of all objectives of the case; those it leaves out are neither simulated nor differentiated. None:
+    the case's only objective. Raises CaseError where the case asks for what is not computed.
     """
 
-    def __init__(self, evaluator: Evaluator) -> None:
+    def __init__(self, evaluator: Evaluator, scalarisation: Scalarisation | None = None) -> None:
         case = evaluator.case
-        refused = refusals(case, optimizing=True)
+        refused = refusals(case)
         if refused:
             raise CaseError(refused, str(case.path or case.name))
-        self._evaluator = evaluator
-        self._objective = case.objectives[0]
-        self._sign = -1.0 if self._objective.sense == "maximize" else 1.0
-        self._competing = (self._objective.over_time, self._objective.sense) in _COMPETING
+        if scalarisation is None and len(case.objectives) != 1:
+            raise ValueError("several objectives need a scalarisation")
+        self.scalarisation = scalarisation
+        #: rows that may compete, where the optimiser's settings shall not say it
+        self.competitors: int | None = None if scalarisation is None else ROWS
+        active = [0] if scalarisation is None else scalarisation.active
+        self._count = len(case.objectives)
+        self._places = active
+        self._objectives = [case.objectives[i] for i in active]
+        self._signs = [sign_of(objective) for objective in self._objectives]
+        self._evaluator = evaluator.looking_at([objective.name for objective in self._objectives])
         self.initial: Floats = np.array(case.initial)
         self.lower: Floats = np.array(case.lower)
         self.upper: Floats = np.array(case.upper)
@@ -46,22 +54,38 @@ class StructureProblem:
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows of U at a design; a design that cannot be computed comes back with its status."""
         evaluation = self._evaluator.evaluate(x, gradient)
-        name = self._objective.name
-        info = {
-            "objectives": np.array([evaluation.objectives[name]]),
-            "peak_time": np.array([evaluation.peak_times[name]]),
-        }
+        info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
+        for place, objective in zip(self._places, self._objectives, strict=True):
+            info["objectives"][place] = evaluation.objectives[objective.name]
+            info["peak_time"][place] = evaluation.peak_times[objective.name]
         if self._responses:
             info["constraints"] = evaluation.constraints
-        if not evaluation.status.ok:
+        if not evaluation.status.usable:
             return Sample(np.inf, status=evaluation.status, message=evaluation.message, info=info)
-        peaks = evaluation.peaks[name] if self._competing else evaluation.peaks[name][:1]
-        rows = self._sign * np.array([peak.value for peak in peaks])
+        parts = [self._part(o, s, evaluation.peaks[o.name]) for o, s in zip(self._objectives, self._signs, strict=True)]
         limits, slopes = self._limits(evaluation)
+        if self.scalarisation is None:
+            rows, gradients = parts[0]
+        else:
+            try:
+                rows, gradients = self.scalarisation.rows(parts)
+            except NotPositiveError as error:
+                name = self._objectives[error.args[0]].name
+                message = f"objective {name}, which weighted_product needs to be positive"
+                return Sample(np.inf, status=Status.NOT_POSITIVE, message=message, info=info)
+            if len(self.scalarisation.planes):
+                own, own_slopes = self.scalarisation.limits(parts)
+                limits = np.concatenate([limits, own])
+                slopes = np.concatenate([slopes.reshape(-1, len(x)), own_slopes.reshape(-1, len(x))])
         if not gradient:
             return Sample(float(rows[0]), rows, constraint_rows=limits, info=info)
-        gradients = self._sign * np.array([peak.gradient for peak in peaks])
         return Sample(float(rows[0]), rows, gradients, limits, slopes, info=info)
+
+    def _part(self, objective: Objective, sign: float, peaks: tuple[Peak, ...]) -> Part:
+        chosen = peaks if _compete(objective, sign) else peaks[:1]
+        values = sign * np.array([peak.value for peak in chosen])
+        slopes = [sign * peak.gradient for peak in chosen if peak.gradient is not None]
+        return values, np.array(slopes).reshape(len(slopes), -1)
 
     def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats]:
         """Rows and gradients of the constraints on responses, feasible where <= 0, relative to their bounds.
@@ -74,13 +98,25 @@ class StructureProblem:
             peaks = evaluation.constraint_peaks[i]
             scale = abs(row.bound) if row.bound != 0.0 else 1.0
             for sign in SIGNS[row.sense]:
-                compete = (row.over_time, sign) in (("max", 1.0), ("max_abs", 1.0), ("min", -1.0))
+                compete = _compete(row, sign)
                 for r in range(COMPETITORS):
                     peak = peaks[min(r, len(peaks) - 1) if compete else 0]
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
                         slopes.append(sign * peak.gradient / scale)
         return np.array(rows), np.array(slopes).reshape(len(slopes), len(self.initial))
+
+
+def sign_of(objective: Objective) -> float:
+    """-1 where an objective is to be maximised, else 1."""
+    return -1.0 if objective.sense == "maximize" else 1.0
+
+
+def _compete(looked: Objective | ResponseRow, sign: float) -> bool:
+    """Whether all peaks of what is looked at bound sign times its value from above."""
+    if looked.response.kind == "member_force" and looked.over_time == "final":
+        return sign > 0.0  # members compete at the end, too
+    return looked.over_time in (("max", "max_abs") if sign > 0.0 else ("min",))
 
 
 def _linear_rows(rows: list[VolumeRow], n: int) -> LinearRows:

@@ -12,16 +12,13 @@ from mdstopo.scene.family import beyond_springs
 INTEGRATORS = frozenset({"auto", "runge_kutta", "generalized_alpha"})
 
 
-def refusals(case: Case, optimizing: bool = False) -> list[Mistake]:
-    """Every part of `case` that the engine cannot compute, each at its place in the file.
-
-    optimizing: whether an optimisation is asked for, which needs a single objective.
-    """
-    found = [case.marks.mistake(path, what) for path, what in _refused(case, optimizing)]
+def refusals(case: Case) -> list[Mistake]:
+    """Every part of `case` that the engine cannot compute, each at its place in the file."""
+    found = [case.marks.mistake(path, what) for path, what in _refused(case)]
     return sorted(found, key=lambda mistake: (bool(mistake.origin), mistake.line, mistake.column))
 
 
-def _refused(case: Case, optimizing: bool) -> Iterator[tuple[str, str]]:
+def _refused(case: Case) -> Iterator[tuple[str, str]]:
     beyond = beyond_springs(case)
     solver = case.solver
     if beyond and solver.integrator not in INTEGRATORS:
@@ -29,6 +26,3 @@ def _refused(case: Case, optimizing: bool) -> Iterator[tuple[str, str]]:
             "solver.integrator",
             f"{solver.integrator} does not compute {beyond}; runge_kutta does, and auto takes it",
         )
-    if optimizing and len(case.objectives) > 1:
-        path = "combine" if "combine" in case.marks else "objectives"
-        yield path, "an optimisation of several objectives is not computed yet"

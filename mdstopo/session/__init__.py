@@ -3,8 +3,3 @@
 It knows neither mechanics nor HDF5: the engine evaluates, the optimiser steps, the store writes; this room
 says when.
 """
-
-from mdstopo.session.outcome import Outcome, Progress
-from mdstopo.session.run import run_session
-
-__all__ = ["Outcome", "Progress", "run_session"]

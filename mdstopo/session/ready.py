@@ -104,10 +104,12 @@ def _marker(case: Case) -> Path:
 def _main() -> None:
     import signal
 
+    from mdstopo.session.combining import even, problem_of
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
     engine = make_engine(case)
-    problem = engine.problem()
+    problem = problem_of(engine, even(case))
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(begin, gradient=True)
     _marker(case).touch()

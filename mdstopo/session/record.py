@@ -13,6 +13,7 @@ from mdstopo.store.errors import DamagedError
 from mdstopo.store.reader import ResultView
 
 Array = NDArray[np.generic]
+Floats = NDArray[np.float64]
 
 
 def best_of(case: Case, states: Sequence[State | None]) -> int | None:
@@ -22,8 +23,12 @@ def best_of(case: Case, states: Sequence[State | None]) -> int | None:
     return best_run(states, case.optimizer.tolerance)
 
 
-def iteration_columns(case: Case, state: State) -> dict[str, Array]:
-    """Columns of `iterations/...`, each (K + 1, ...), row 0 the start."""
+def iteration_columns(case: Case, state: State, before: int = 0, final: Floats | None = None) -> dict[str, Array]:
+    """Columns of `iterations/...`, each (K + 1, ...), row 0 the start.
+
+    before: evaluations that came earlier, for the individual optima. final (n_obj,): raw values of the final design,
+    for what was not simulated on the way there because its weight is 0.
+    """
     columns = state.history.to_arrays()
     rows = len(state.history)
     constraints = columns.get("info/constraints")
@@ -32,13 +37,16 @@ def iteration_columns(case: Case, state: State) -> dict[str, Array]:
         constraints = columns["constraints"].reshape(rows, len(signs)) * np.array(signs)
     # Where even the first evaluation failed, the engine has reported nothing.
     unknown = np.full((rows, len(case.objectives)), np.nan)
+    objectives = np.array(columns.get("info/objectives", unknown), dtype=np.float64).reshape(rows, -1)
+    for row in {best_row(state), rows - 1} if final is not None else ():
+        objectives[row] = np.where(np.isnan(objectives[row]), final, objectives[row])
     return {
-        "objectives": columns.get("info/objectives", unknown).reshape(rows, -1),
+        "objectives": objectives,
         "peak_time": columns.get("info/peak_time", unknown).reshape(rows, -1),
         "constraints": constraints,
         "combined": columns["objective"],
         "change": columns["change"],
-        "evaluations": columns["evaluations"],
+        "evaluations": columns["evaluations"] + before,
         "seconds": columns["seconds"],
         "kkt": columns["kkt"],
         "accepted": columns["accepted"],
@@ -52,15 +60,18 @@ def best_row(state: State) -> int:
     return int(found[0]) if len(found) else 0
 
 
-def run_part(case: Case, states: Sequence[State | None]) -> Datasets:
-    """Everything a run has reached: best design, its iterations, every start, every optimiser's state."""
+def run_part(case: Case, states: Sequence[State | None], before: int = 0, final: Floats | None = None) -> Datasets:
+    """Everything a run has reached: best design, its iterations, every start, every optimiser's state.
+
+    before, final: as of `iteration_columns`.
+    """
     best = best_of(case, states)
     if best is None:
         raise ValueError("no start has begun")
     state = states[best]
     assert state is not None
     part: Datasets = {"design/alpha": state.best_alpha}
-    part |= {f"iterations/{name}": column for name, column in iteration_columns(case, state).items()}
+    part |= {f"iterations/{name}": column for name, column in iteration_columns(case, state, before, final).items()}
     if len(states) > 1:
         part |= _starts_part(case, states)
     for index, each in enumerate(states):

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.front.tasks import StoppedError
 from mdstopo.optimizer.problem import Problem
+from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
 from mdstopo.session.advice import advise
+from mdstopo.session.combining import Combining, even, problem_of
 from mdstopo.session.engine import Engine, MakeEngine, make_engine
 from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
@@ -129,6 +132,8 @@ class _Run:
         self.states: list[State | None] = [None] * case.optimizer.starts
         self.warnings: tuple[str, ...] = tuple(mistake.message for mistake in case.warnings)
         self.finals: Datasets = {}
+        self.final_objectives: Floats | None = None
+        self.combining = Combining(case)
         self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
 
     def go(self, make: MakeEngine, path: Path | None, previous: ResultView | None, workers: int) -> Outcome:
@@ -139,14 +144,17 @@ class _Run:
         if make is make_engine:
             compile_apart(self.case, self.notify)
         engine = make(self.case)
-        problem = engine.problem()
+        problem = problem_of(engine, even(self.case))
         stated, begin, self.before = get_ready(self.case, engine, problem, self.initial)
         self.compare(stated, begin)
         compiled = time.perf_counter()
         if path is not None:
             self.open(path, engine)
+        scalarisation = self.combine(engine, begin, path)
+        if scalarisation is not None:
+            problem = problem_of(engine, scalarisation)
         try:
-            self.iterate(make, problem, path, workers)
+            self.iterate(make, problem, path, workers, scalarisation)
         except WorkerError as error:
             if path is not None and best_of(self.case, self.states) is not None:
                 self.save(path, RunStatus.INTERRUPTED, str(error))
@@ -162,8 +170,27 @@ class _Run:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - compiled, compiled - began)
 
+    def combine(self, engine: Engine, begin: Floats, path: Path | None) -> Scalarisation | None:
+        """U of several objectives, its utopia found first; what is found is kept at once. None for one objective."""
+        saver = None if path is None else Checkpointer(lambda: self.checkpoint(path))
+
+        def keep() -> None:
+            if saver is not None:
+                saver.offer()
+
+        try:
+            return self.combining.scalarisation(engine, begin, keep, self.stop_requested)
+        except StoppedError:
+            if path is not None:
+                self.save(path, RunStatus.INTERRUPTED, "stopped on request; the individual optima so far are saved")
+            raise KeyboardInterrupt from None
+
     def restore(self, view: ResultView) -> None:
         """Take up the states of an earlier process."""
+        if len(self.case.objectives) > 1:
+            from mdstopo.front.content import read_tasks
+
+            self.combining.solved = read_tasks(view, "combine/tasks")
         before = view.arrays.get("design/initial")
         if self.initial is not None and (before is None or not np.array_equal(before, self.initial)):
             raise DifferentCaseError(
@@ -203,7 +230,9 @@ class _Run:
                 f"does not (largest change of alpha {moved:.3g})"
             )
 
-    def iterate(self, make: MakeEngine, problem: Problem, path: Path | None, workers: int) -> None:
+    def iterate(
+        self, make: MakeEngine, problem: Problem, path: Path | None, workers: int, scalarisation: Scalarisation | None
+    ) -> None:
         """Advance every start, checkpointing as time goes by."""
         chosen = self.case.optimizer
         size = 8.0 * self.case.n_design * _STATE_ARRAYS * chosen.starts
@@ -218,7 +247,8 @@ class _Run:
         if workers > 1 and chosen.starts > 1:
             from mdstopo.session.workers import run_in_workers  # most runs need no other process
 
-            run_in_workers(self.case, self.states, self.initial, make, workers, keep, self.stop_requested)
+            job = (self.case, self.initial, make, scalarisation)
+            run_in_workers(job, self.states, workers, keep, self.stop_requested)
             return
         if workers > 1:
             self.notify("one start needs one process: the other workers are not used")
@@ -249,6 +279,9 @@ class _Run:
         self.peaks = {
             name: tuple((peak.time, peak.value) for peak in found) for name, found in evaluation.peaks.items()
         }
+        if evaluation.status.usable and len(self.case.objectives) > 1:
+            names = [objective.name for objective in self.case.objectives]
+            self.final_objectives = np.array([evaluation.objectives[name] for name in names])
         after = motions(self.case, engine, state.best_alpha)
         for name, motion in after.items():
             if not motion.status.ok:
@@ -265,7 +298,14 @@ class _Run:
 
     def save(self, path: Path, status: RunStatus, reason: str) -> None:
         """Write the file as a whole."""
-        datasets = self.fixed | run_part(self.case, self.states) | self.finals
+        datasets = self.fixed | self.finals
+        visited = np.zeros((0, len(self.case.objectives)))
+        if best_of(self.case, self.states) is not None:
+            part = run_part(self.case, self.states, self.combining.evaluations, self.final_objectives)
+            datasets |= part
+            visited = np.asarray(part["iterations/objectives"], dtype=np.float64)
+        if len(self.case.objectives) > 1:
+            datasets |= self.combining.part(visited)
         replace_file(
             path,
             result_image(
@@ -293,7 +333,8 @@ class _Run:
         """What the caller learns."""
         state = self.states[best]
         assert state is not None
-        columns = iteration_columns(self.case, state)
+        before = self.combining.evaluations
+        columns = iteration_columns(self.case, state, before, self.final_objectives)
         names = [objective.name for objective in self.case.objectives]
         begun = [each for each in self.states if each is not None]
         return Outcome(
@@ -309,7 +350,7 @@ class _Run:
             warnings=self.warnings,
             states=tuple(self.states),
             best_start=best,
-            evaluations=sum(int(each.evaluations) for each in begun),
+            evaluations=before + sum(int(each.evaluations) for each in begun),
             iterations=sum(int(each.iteration) for each in begun),
             seconds=seconds,
             compile_seconds=compile_seconds,

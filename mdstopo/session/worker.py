@@ -9,6 +9,7 @@ import threading
 from typing import IO, Any
 
 from mdstopo.optimizer.state import State
+from mdstopo.session.combining import even, problem_of
 from mdstopo.session.ready import get_ready
 from mdstopo.session.starts import run_start
 from mdstopo.store.checkpoint import Checkpointer
@@ -22,13 +23,13 @@ def main() -> None:
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     source = sys.stdin.buffer
-    case, initial, make_engine = pickle.load(source)
+    case, initial, make_engine, scalarisation = pickle.load(source)
     inbox: queue.Queue[Any] = queue.Queue()
     stopped = threading.Event()
     threading.Thread(target=_listen, args=(source, inbox, stopped), daemon=True).start()
     engine = make_engine(case)
-    problem = engine.problem()
-    get_ready(case, engine, problem, initial)
+    get_ready(case, engine, problem_of(engine, even(case)), initial)
+    problem = problem_of(engine, scalarisation)
     while (task := inbox.get()) is not None:
         index, arrays = task
         sender = _Sender(output)

@@ -10,6 +10,7 @@ from mdstopo.store.reader import ResultView, read_result
 
 Notify = Callable[[str], None]
 
+_NAMES = {"run": "run", "pareto": "front", "sweep": "sweep"}
 _SHOWN = 6  # differing keys that a message lists
 
 
@@ -60,8 +61,8 @@ def admit(path: Path, case: Case, kind: str, overwrite: bool, notify: Notify) ->
     notify(f"the finished result in {path} is replaced")
 
 
-def admit_resume(path: Path, case: Case, notify: Notify) -> ResultView | None:
-    """The run to be continued; None, with a notice, where there is none yet.
+def admit_resume(path: Path, case: Case, notify: Notify, kind: str = "run") -> ResultView | None:
+    """The run (front, sweep) to be continued; None, with a notice, where there is none yet.
 
     Raises
     ------
@@ -71,10 +72,10 @@ def admit_resume(path: Path, case: Case, notify: Notify) -> ResultView | None:
         if the file is no run's result or damaged.
     """
     if not path.exists():
-        notify(f"there is no {path} to resume: the run starts from the beginning")
+        notify(f"there is no {path} to resume: the {_NAMES[kind]} starts from the beginning")
         return None
     view = read_result(path, leave_out=("trajectories", "sensitivities", "members"))
-    if view.kind != "run":
+    if view.kind != kind:
         raise StoreError(f"{path} holds a result of `{view.kind}`, which cannot be resumed")
     keys = differences(view.text("resume/case"), case)
     if keys:

@@ -5,17 +5,15 @@ from __future__ import annotations
 from mdstopo.case.reader import read_case
 from mdstopo.scene.refusals import refusals
 
-from .scenes import EVERYTHING, SMALL, changed, place
+from .scenes import EVERYTHING, SMALL, place
 
 
 def test_what_the_engine_computes_is_not_refused() -> None:
-    assert refusals(read_case(SMALL), optimizing=True) == []
+    assert refusals(read_case(SMALL)) == []
 
 
-def test_only_an_optimisation_of_several_objectives_is_not_computed() -> None:
-    case = read_case(EVERYTHING)
-    assert refusals(case) == []
-    assert [m.path_key for m in refusals(case, optimizing=True)] == ["combine"]
+def test_every_key_of_the_format_is_computed() -> None:
+    assert refusals(read_case(EVERYTHING)) == []
 
 
 def test_an_integrator_that_does_not_go_with_the_scene_is_named_at_its_place() -> None:
@@ -24,10 +22,3 @@ def test_an_integrator_that_does_not_go_with_the_scene_is_named_at_its_place() -
     assert refusal.path_key == "solver.integrator"
     assert "gauss does not compute joints; runge_kutta does" in refusal.message
     assert (refusal.line, refusal.column) == place(text, "integrator: gauss", 12)
-
-
-def test_several_objectives_are_refused_only_where_one_is_needed() -> None:
-    two = "  G: {response: energy}\n  H: {response: energy, over_time: mean}\ncombine: {weights: {G: 1, H: 1}}"
-    case = read_case(changed(SMALL, ("  G: {response: energy}", two)))
-    assert refusals(case) == []
-    assert [m.path_key for m in refusals(case, optimizing=True)] == ["combine"]

@@ -6,7 +6,7 @@ from pathlib import Path
 from fakes import FakeEngineWithEvaluations, hand_made_case, limited
 
 from mdstopo.cli.interrupt import Interrupts
-from mdstopo.session import run_session
+from mdstopo.session.run import run_session
 
 path, iterations, delay = Path(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
 case = limited(hand_made_case(), iterations)

@@ -16,8 +16,9 @@ from fakes import DyingEngine, FakeEngineWithEvaluations, hand_made_case, limite
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, VolumeRow
-from mdstopo.session import Outcome, Progress, run_session
 from mdstopo.session.errors import WorkerError
+from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.run import run_session
 from mdstopo.status import RunStatus
 from mdstopo.store import atomic
 from mdstopo.store.errors import DamagedError, DifferentCaseError, InUseError, UnfinishedError, WriteError

@@ -1,0 +1,138 @@
+"""A front as parts of a result file, and the finished tasks back from one.
+
+Every finished task is kept in stacked arrays, `pareto/tasks/...`, a row each: what a front has reached is in them, so
+that one that was stopped goes on without losing or repeating anything.
+"""
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.front.measures import dominated, hypervolume, neighbour_gaps, scaled, spacing
+from mdstopo.front.plan import Front
+from mdstopo.front.tasks import Found
+from mdstopo.optimizer.structure import sign_of
+from mdstopo.status import RunStatus
+from mdstopo.store.contents import Datasets
+from mdstopo.store.errors import DamagedError
+from mdstopo.store.reader import ResultView
+
+Floats = NDArray[np.float64]
+
+#: the reference point of the hypervolume, in objectives scaled by the front's own utopia and maxima
+REFERENCE = 1.1
+_NUMBERS = ("combined", "kkt", "violation", "seconds")
+_COUNTS = ("point", "evaluations")
+_WORDS = ("key", "reason", "host")
+
+
+def tasks_part(found: Iterable[Found], case: Case, place: str = "pareto/tasks") -> Datasets:
+    """Every finished task, at its place in the file."""
+    rows = list(found)
+    m = len(case.objectives)
+    part: Datasets = {
+        "alpha": np.array([each.alpha for each in rows]).reshape(len(rows), case.n_design),
+        "objectives": np.array([each.objectives for each in rows]).reshape(len(rows), m),
+        "status": [each.status.value for each in rows],
+        "visits": np.array([len(each.visited) for each in rows], dtype=np.int64),
+        "visited": np.concatenate([each.visited for each in rows]) if rows else np.zeros((0, m)),
+    }
+    for name in _NUMBERS:
+        part[name] = np.array([getattr(each, name) for each in rows], dtype=np.float64)
+    for name in _COUNTS:
+        part[name] = np.array([getattr(each, name) for each in rows], dtype=np.int64)
+    for name in _WORDS:
+        part[name] = [getattr(each, name) for each in rows]
+    return {f"{place}/{name}": value for name, value in part.items()}
+
+
+def read_tasks(view: ResultView, place: str = "pareto/tasks") -> dict[str, Found]:
+    """The finished tasks of a file, by key. Raises DamagedError where they are not whole."""
+    columns: Mapping[str, NDArray[np.generic]] = view.under(place)
+    words = {name: view.lines(f"{place}/{name}") for name in (*_WORDS, "status")}
+    found: dict[str, Found] = {}
+    if "visits" not in columns:
+        return found
+    last = np.cumsum(columns["visits"])
+    try:
+        for i, key in enumerate(words["key"]):
+            first = int(last[i] - columns["visits"][i])
+            found[key] = Found(
+                point=int(columns["point"][i]),
+                key=key,
+                alpha=np.array(columns["alpha"][i], dtype=np.float64),
+                objectives=np.array(columns["objectives"][i], dtype=np.float64),
+                combined=float(columns["combined"][i]),
+                status=RunStatus(words["status"][i]),
+                reason=words["reason"][i],
+                evaluations=int(columns["evaluations"][i]),
+                kkt=float(columns["kkt"][i]),
+                violation=float(columns["violation"][i]),
+                visited=np.array(columns["visited"][first : int(last[i])], dtype=np.float64),
+                seconds=float(columns["seconds"][i]),
+                host=words["host"][i],
+            )
+    except (KeyError, IndexError, ValueError) as error:
+        raise DamagedError(f"{view.path}: damaged: its finished points are not whole ({error})") from error
+    return found
+
+
+def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Found]) -> Datasets:
+    """What `pareto/...` holds of a finished front."""
+    w, m = directions.shape
+    signs = np.array([sign_of(objective) for objective in case.objectives])
+    objectives = np.full((w, m), np.nan)
+    alpha = np.full((w, case.n_design), np.nan)
+    numbers = {name: np.full(w, np.nan) for name in ("kkt", "violation", "seconds")}
+    status, reason = ["failed"] * w, ["nothing could be computed"] * w
+    visited: dict[int, list[Floats]] = {}
+    count = np.zeros(w, dtype=np.int64)
+    # a point that asks for one objective alone is that objective's own optimum
+    alone = {int(np.argmax(row)): j for j, row in enumerate(directions) if np.count_nonzero(row) == 1}
+    for each in tasks:
+        j = each.point if each.point >= 0 else alone.get(-1 - each.point, -1)
+        if j >= 0:
+            visited.setdefault(j, []).append(each.visited)
+            count[j] += each.evaluations
+    for j, point in enumerate(front.points):
+        if point is None:
+            continue
+        status[j], reason[j] = point.status.value, point.reason
+        objectives[j], alpha[j] = point.objectives, point.alpha
+        for name, column in numbers.items():
+            column[j] = getattr(point, name)
+        visited.setdefault(j, [point.visited])
+    part: Datasets = {
+        "weights": directions,
+        "objectives": objectives,
+        "alpha": alpha,
+        "status": status,
+        "reason": reason,
+        "dominated": dominated(signs * objectives),
+        "evaluations": count,
+        "utopia": np.tile(front.utopia, (w, 1)),
+        "maxima": np.tile(front.maxima, (w, 1)),
+        "ends": np.array([end.objectives for end in front.ends]),
+        "ends_alpha": np.array([end.alpha for end in front.ends]),
+    }
+    part |= numbers
+    part |= {f"visited/{j}": np.concatenate(rows) for j, rows in sorted(visited.items())}
+    return {f"pareto/{name}": value for name, value in part.items()}
+
+
+def quality(case: Case, front: Front) -> dict[str, float]:
+    """Hypervolume (of what lies within utopia and 1.1 times maxima), spacing and largest gap, in scaled objectives."""
+    signs = np.array([sign_of(objective) for objective in case.objectives])
+    points = np.array([point.objectives for point in front.points if point is not None and point.usable])
+    if not len(points):
+        return {"hypervolume": 0.0, "spacing": 0.0, "largest_gap": 0.0}
+    inside = scaled(signs * points, signs * front.utopia, signs * front.maxima)
+    kept = inside[~dominated(inside)]
+    gaps = neighbour_gaps(kept)
+    return {
+        "hypervolume": hypervolume(inside, np.full(points.shape[1], REFERENCE)),
+        "spacing": spacing(kept),
+        "largest_gap": float(gaps.max(initial=0.0)),
+    }

@@ -1,0 +1,87 @@
+"""What a worker does: solve a task of a front, or run a case of a sweep. The same in every process."""
+
+import platform
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.front.tasks import Found, StoppedError, Task, solve
+from mdstopo.session.combining import even, problem_of
+from mdstopo.session.engine import Engine, make_engine
+from mdstopo.session.ready import get_ready
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What all pieces have in common: the case, and its hash; pieces of a sweep bring a case of their own."""
+
+    case: Case
+    case_key: str
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One case of a sweep."""
+
+    case: Case
+    key: str
+
+
+Job = Task | Trial
+
+#: engines that a process keeps, by the hash of their case
+_KEPT = 2
+_engines: OrderedDict[str, Engine] = OrderedDict()
+
+
+def perform(setting: Setting, job: Job, stop: Callable[[], bool] | None = None) -> Any:
+    """The result of one piece. Raises StoppedError where `stop` says so before the end."""
+    if isinstance(job, Trial):
+        return run_trial(job, stop)
+    return solve(ready_engine(setting), setting.case, job, job.key(setting.case_key), stop)
+
+
+def ready_engine(setting: Setting) -> Engine:
+    """The case's engine, its kernels loaded in the one order that makes results repeat to the bit (`ready`)."""
+    found = _engines.get(setting.case_key)
+    if found is None:
+        found = make_engine(setting.case)
+        get_ready(setting.case, found, problem_of(found, even(setting.case)), None)
+        _engines[setting.case_key] = found
+        if len(_engines) > _KEPT:
+            _engines.popitem(last=False)
+    return found
+
+
+def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
+    """The whole run of one case of a sweep; mistakes that only it has become its status."""
+    from mdstopo.case.errors import CaseError
+    from mdstopo.session.run import run_session
+    from mdstopo.status import RunStatus
+
+    began = time.perf_counter()
+    m = len(trial.case.objectives)
+    try:
+        outcome = run_session(trial.case, stop_requested=stop)
+    except KeyboardInterrupt as error:
+        raise StoppedError from error
+    except CaseError as error:
+        return Found(
+            0, trial.key, trial.case.initial, np.full(m, np.nan), float("nan"), RunStatus.FAILED,
+            "; ".join(mistake.message for mistake in error.mistakes), 0, float("nan"), float("nan"), np.zeros((0, m)),
+        )  # fmt: skip
+    if outcome.status is RunStatus.INTERRUPTED:
+        raise StoppedError
+    objectives = np.array([outcome.objectives[each.name] for each in trial.case.objectives])
+    state = outcome.states[outcome.best_start]
+    assert state is not None
+    return Found(
+        0, trial.key, outcome.alpha, objectives, float(state.best_objective), outcome.status, outcome.reason,
+        outcome.evaluations, float(state.kkt), float(state.best_violation),
+        np.array(outcome.history["objectives"], dtype=np.float64), time.perf_counter() - began, platform.node(),
+    )  # fmt: skip

@@ -1,0 +1,330 @@
+"""What to solve, in rounds that are fixed in advance: the same tasks from the same results, wherever they are solved.
+
+1. Each objective alone, from the first design (and from random ones, where more starts are asked for); then each again
+   from where the others ended. The best are the ends; they give utopia and maxima (the pay-off table, Eq. 24).
+2. The other points between solved ones, halving the gaps: each from the solved design that is best by its own U, and
+   from the neighbour on the other side.
+3. Exchange: whoever's U is lower at another point's design starts again from that, until nobody gains.
+4. With what has been found utopia and maxima are brought up to date. Every point goes on from its own design, where
+   they changed, and from both neighbours'; and exchange again.
+"""
+
+from collections.abc import Generator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.front.tasks import Found, Task
+from mdstopo.optimizer.scalarisation import Scalarisation
+
+Floats = NDArray[np.float64]
+Rounds = Generator[list[Task], list[Found], "Front"]
+Part = Generator[list[Task], list[Found], None]
+
+#: rounds of exchange at most; gain by which another's design is better, relative to U; change of utopia or maxima
+#: (relative to their distance) from which points are solved anew
+EXCHANGES, GAIN, MOVED = 6, 1e-6, 1e-6
+#: methods that weigh, and those that spread points evenly
+WEIGHING = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product")
+SPREADING = ("nbi", "nc")
+
+
+@dataclass(frozen=True)
+class Request:
+    """A front: directions (W, m), weights or anchors; method; exponent p and whether to normalise (Eq. 24).
+
+    signs (m,): -1 for what is to be maximised. starts (S, N): the first design, then further ones; iterations: of each
+    solve.
+    """
+
+    directions: Floats
+    method: str
+    exponent: float
+    normalize: bool
+    signs: Floats
+    starts: Floats
+    iterations: int
+
+
+@dataclass(frozen=True)
+class Front:
+    """points: what was found for every direction, None where nothing was. ends: the best known of every objective.
+
+    utopia, maxima (m,): raw values, which the points of the last rounds were found with.
+    """
+
+    points: tuple[Found | None, ...]
+    ends: tuple[Found, ...]
+    utopia: Floats
+    maxima: Floats
+
+
+class NoEndError(Exception):
+    """An objective alone could not be optimised: its place, and what was found."""
+
+    def __init__(self, place: int, found: Found) -> None:
+        super().__init__(found.reason)
+        self.place = place
+        self.found = found
+
+
+class Planner:
+    """What has been found, and what follows from it."""
+
+    def __init__(self, request: Request) -> None:
+        self.request = request
+        self.count, self.m = request.directions.shape
+        self.known: list[Found] = []
+        self.ends: list[Found] = []
+        self.lowest = np.zeros(self.m)
+        self.highest = np.ones(self.m)
+        #: by point, the best that was found for it under the present utopia and maxima, or in the last ones
+        self.best: dict[int, Found] = {}
+        self.solved: set[tuple[int, bytes]] = set()
+
+    def rounds(self) -> Rounds:
+        """Tasks to be solved together; send their results, in order; returns the front."""
+        yield from self._ends()
+        yield from self._between()
+        yield from self._exchange()
+        yield from self._refine()
+        yield from self._exchange()
+        self._improve_ends()
+        points = tuple(self.best.get(j) for j in range(self.count))
+        signs = self.request.signs
+        return Front(points, tuple(self.ends), signs * self.lowest, signs * self.highest)
+
+    def ends_alone(self) -> Part:
+        """The first rounds alone: each objective's optimum, and with it utopia and maxima."""
+        yield from self._ends()
+
+    # the rounds
+
+    def _ends(self) -> Part:
+        alone = [self._alone(i) for i in range(self.m)]
+        found = yield self._new(
+            [
+                Task(-1 - i, alone[i], start, self.request.iterations)
+                for i in range(self.m)
+                for start in self.request.starts
+            ]
+        )
+        self._learn(found)
+        self._choose_ends(found)
+        crossed = [
+            Task(-1 - i, alone[i], other.alpha, self.request.iterations)
+            for i in range(self.m)
+            for k, other in enumerate(self.ends)
+            if k != i
+        ]
+        found = yield self._new(crossed)
+        self._learn(found)
+        self._measure()
+
+    def _between(self) -> Part:
+        for j in range(self.count):
+            i = self._vertex(j)
+            if i >= 0:
+                self.best[j] = replace(self.ends[i], point=j)
+        while True:
+            due = self._due()
+            if not due:
+                return
+            tasks = []
+            for j in due:
+                tasks += [self._task(j, start) for start in self._sides(j)]
+                tasks += [self._task(j, start) for start in self.request.starts[1:]]
+            found = yield self._new(tasks)
+            self._learn(found)
+            for j in due:
+                if j not in self.best:  # nothing worked; the first failure speaks for the point
+                    failed = [each for each in found if each.point == j]
+                    self.best[j] = failed[0] if failed else self.ends[0]
+
+    def _exchange(self) -> Part:
+        for _ in range(EXCHANGES):
+            tasks = []
+            for j in range(self.count):
+                own = self._value(j, self.best[j])
+                values = [self._value(j, other) for other in self.known]
+                k = int(np.argmin(values))
+                if not own <= values[k] + GAIN * abs(values[k]):
+                    tasks.append(self._task(j, self.known[k].alpha))
+            tasks = self._new(tasks)
+            if not tasks:
+                return
+            self._learn((yield tasks))
+
+    def _refine(self) -> Part:
+        moved = self._measure()
+        tasks = []
+        for j in range(self.count):
+            if self._vertex(j) >= 0:
+                continue
+            starts = [self.best[j].alpha] if moved else []
+            starts += [self.best[k].alpha for k in self._adjacent(j, [k for k in range(self.count) if k != j])]
+            tasks += [self._task(j, start) for start in starts]
+        if moved:
+            # U has changed: what was found under the old one is no longer anybody's best
+            self.best = {j: found for j, found in self.best.items() if self._vertex(j) >= 0}
+        tasks = self._new(tasks, again=moved)
+        found = yield tasks
+        self._learn(found)
+        for j in range(self.count):
+            if j not in self.best:
+                self.best[j] = next(each for each in found if each.point == j)
+
+    # what is known
+
+    def _learn(self, found: list[Found]) -> None:
+        """Take results in: they are known to everybody, and the best of its point is that point's."""
+        for each in found:
+            if not each.usable:
+                continue
+            self.known.append(each)
+            if each.point < 0:
+                continue
+            before = self.best.get(each.point)
+            if before is None or not before.usable or self._value(each.point, each) < self._value(each.point, before):
+                self.best[each.point] = each
+
+    def _choose_ends(self, found: list[Found]) -> None:
+        self.ends = []
+        for i in range(self.m):
+            if not any(each.usable for each in found if each.point == -1 - i):
+                raise NoEndError(i, next(each for each in found if each.point == -1 - i))
+            self.ends.append(min(self.known, key=lambda each: float(self._signed(each)[i])))
+
+    def _improve_ends(self) -> None:
+        """The ends are the best of their objective."""
+        self.ends = [min(self.known, key=lambda each, i=i: float(self._signed(each)[i])) for i in range(self.m)]  # type: ignore[misc]
+
+    def _measure(self) -> bool:
+        """Utopia and maxima from all that is known; whether they have moved.
+
+        The maxima are those over the ends: a front runs between its ends.
+        """
+        before = self.lowest, self.highest
+        self._improve_ends()
+        table = np.array([self._signed(end) for end in self.ends])
+        self.lowest = table.min(axis=0)
+        self.highest = table.max(axis=0)
+        # objectives that agree have no width to be measured in
+        flat = ~(self.highest - self.lowest > 1e-12 * np.abs(self.highest))
+        self.highest = np.where(flat, self.lowest + 1.0, self.highest)
+        width = self.highest - self.lowest
+        return bool(
+            np.any(np.abs(self.lowest - before[0]) > MOVED * width)
+            or np.any(np.abs(self.highest - before[1]) > MOVED * width)
+        )
+
+    def _signed(self, found: Found) -> Floats:
+        return self.request.signs * found.objectives
+
+    def _value(self, j: int, found: Found) -> float:
+        """U of point j at a design; infinite where it has none. With planes (nc), what violates them costs a lot."""
+        if not found.usable:
+            return float("inf")
+        one = self.scalarisation(j)
+        signed = self._signed(found)
+        value = one.value(signed)
+        if len(one.planes):
+            g = np.array([one.transformed(signed[i : i + 1], i)[0][0] for i in range(self.m)])
+            value += 1e3 * float(np.maximum(one.planes @ (g - one.anchor), 0.0).sum())
+        return value if np.isfinite(value) else float("inf")
+
+    # scalarisations
+
+    def _alone(self, i: int) -> Scalarisation:
+        return Scalarisation("weighted_sum", np.eye(self.m)[i])
+
+    def _vertex(self, j: int) -> int:
+        """The objective that point j asks for alone, or -1."""
+        places = np.flatnonzero(self.request.directions[j] > 0.0)
+        return int(places[0]) if len(places) == 1 else -1
+
+    def scalarisation(self, j: int) -> Scalarisation:
+        """U of point j under the present utopia and maxima."""
+        request, direction = self.request, self.request.directions[j]
+        i = self._vertex(j)
+        if i >= 0:
+            return self._alone(i)
+        if request.method in SPREADING:
+            # in units of Eq. 24 the ends are the rows of a table; anchors lie on the plane through them
+            table = np.array([(self._signed(end) - self.lowest) / (self.highest - self.lowest) for end in self.ends])
+            anchor = direction @ table
+            if request.method == "nbi":
+                normal = np.ones(self.m)
+                return Scalarisation("nbi", np.ones(self.m), self.lowest, self.highest, anchor=anchor, normal=normal)
+            planes = table[-1] - table[:-1]
+            return Scalarisation("nc", np.ones(self.m), self.lowest, self.highest, anchor=anchor, planes=planes)
+        if not request.normalize or request.method == "weighted_product":
+            return Scalarisation(request.method, direction, exponent=request.exponent)
+        return Scalarisation(request.method, direction, self.lowest, self.highest, request.exponent)
+
+    # tasks
+
+    def _task(self, j: int, start: Floats) -> Task:
+        return Task(j, self.scalarisation(j), start, self.request.iterations)
+
+    def _new(self, tasks: list[Task], again: bool = False) -> list[Task]:
+        """Those tasks whose point has not begun there before, each once."""
+        if again:
+            self.solved = {mark for mark in self.solved if mark[0] < 0}
+        new = []
+        for task in tasks:
+            mark = (task.point, task.start.tobytes())
+            if mark not in self.solved:
+                self.solved.add(mark)
+                new.append(task)
+        return new
+
+    def _due(self) -> list[int]:
+        """The points of the next round: in the middle of gaps; for more objectives those farthest from solved ones."""
+        directions = self.request.directions
+        todo = [j for j in range(self.count) if j not in self.best]
+        if not todo:
+            return []
+        if self.m == 2:
+            marks = sorted([0.0, 1.0, *(float(directions[j, 0]) for j in self.best)])
+            due = []
+            for low, high in pairwise(marks):
+                inside = [j for j in todo if low < directions[j, 0] < high]
+                if inside:
+                    due.append(min(inside, key=lambda j: abs(float(directions[j, 0]) - 0.5 * (low + high))))
+            return due
+        placed = [np.eye(self.m)[i] for i in range(self.m)] + [directions[j] for j in self.best]
+        due = []
+        for _ in range(min(len(todo), len(placed))):
+            distance = [min(float(np.linalg.norm(directions[j] - place)) for place in placed) for j in todo]
+            j = todo.pop(int(np.argmax(distance)))
+            due.append(j)
+            placed.append(directions[j])
+        return due
+
+    def _sides(self, j: int) -> list[Floats]:
+        """Where an unsolved point begins: the solved design that is best for it, and the neighbour across from it."""
+        solved = [k for k in self.best if self.best[k].usable]
+        sides = [self.best[k].alpha for k in self._adjacent(j, solved)]
+        position = self.request.directions[j]
+        if self.m > 2 or len(sides) < 2:
+            order = np.argsort([float(np.linalg.norm(np.eye(self.m)[i] - position)) for i in range(self.m)])
+            sides += [self.ends[i].alpha for i in order.tolist()]
+        best = min(self.known, key=lambda each: self._value(j, each))
+        if any(np.array_equal(best.alpha, side) for side in sides[:2]):
+            return sides[:2]
+        return [best.alpha, sides[0]]
+
+    def _adjacent(self, j: int, among: list[int]) -> list[int]:
+        """The nearest points on either side; for more objectives the nearest ones, as many as there are objectives."""
+        directions = self.request.directions
+        if self.m == 2:
+            here = float(directions[j, 0])
+            below = [k for k in among if directions[k, 0] < here]
+            above = [k for k in among if directions[k, 0] > here]
+            sides = [max(below, key=lambda k: float(directions[k, 0]))] if below else []
+            return sides + ([min(above, key=lambda k: float(directions[k, 0]))] if above else [])
+        order = sorted(among, key=lambda k: (float(np.linalg.norm(directions[k] - directions[j])), k))
+        return order[: self.m]

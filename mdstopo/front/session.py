@@ -1,0 +1,358 @@
+"""A front from its request to its file: plan, solve what is not solved yet, keep, and go on."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.front.content import front_part, quality, read_tasks, tasks_part
+from mdstopo.front.jobs import Setting, perform
+from mdstopo.front.plan import Front, NoEndError, Planner, Request
+from mdstopo.front.pool import Here, Lost, Pool, Processes, cores
+from mdstopo.front.tasks import Found, StoppedError, Task, case_key
+from mdstopo.optimizer.starts import random_feasible
+from mdstopo.optimizer.structure import sign_of
+from mdstopo.session.combining import even
+from mdstopo.session.engine import make_engine
+from mdstopo.session.ready import compile_apart
+from mdstopo.session.starts import first_design
+from mdstopo.status import RunStatus
+from mdstopo.store.admit import admit, admit_resume, prepare_place
+from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.checkpoint import Checkpointer
+from mdstopo.store.contents import Datasets, case_part, result_image
+from mdstopo.store.errors import WriteError
+from mdstopo.store.lock import Lock
+from mdstopo.store.provenance import Provenance
+
+Floats = NDArray[np.float64]
+Stop = Callable[[], bool]
+
+#: seconds of work from which on other processes are worth their start
+WORTH = 6.0
+#: tasks that a point takes, and evaluations of a task, about: for guesses of the time that is left
+TASKS, EVALUATIONS = 3.2, 11.0
+
+
+@dataclass(frozen=True)
+class Ask:
+    """What the user asks for. directions (W, m); method: of the case where empty; starts: of every solve."""
+
+    directions: Floats
+    method: str = ""
+    starts: int = 1
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A front in the making: best by point, points that are being worked on, tasks done, seconds left (a guess)."""
+
+    directions: Floats
+    names: tuple[str, ...]
+    best: dict[int, Found]
+    running: tuple[int, ...]
+    done: int
+    evaluations: int
+    left: float
+
+
+@dataclass(frozen=True)
+class FrontOutcome:
+    """A front that has ended, or was stopped. tasks: all that were solved, in the plan's order."""
+
+    case: Case
+    directions: Floats
+    method: str
+    front: Front | None
+    status: RunStatus
+    reason: str
+    tasks: tuple[Found, ...]
+    evaluations: int
+    quality: dict[str, float]
+    seconds: float
+    path: Path | None
+    warnings: tuple[str, ...] = field(default=())
+
+
+def run_front(
+    case: Case,
+    ask: Ask,
+    *,
+    path: Path | None = None,
+    resume: bool = False,
+    overwrite: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
+    on_progress: Callable[[Snapshot], None] | None = None,
+    stop_requested: Stop | None = None,
+    notify: Callable[[str], None] | None = None,
+    command: str = "",
+    worth: float = WORTH,
+) -> FrontOutcome:
+    """Compute a front and keep its result file up to date.
+
+    workers: processes at most (default: one a core); they are started where there is work for more than `worth`
+    seconds. cluster: the address of a Dask scheduler instead. No result depends on either.
+    Raises CaseError where the case is no front that can be computed, StoreError for an unusable file.
+    """
+    check(case)
+    run = _FrontRun(case, ask, on_progress or _ignore, stop_requested or _never, notify or _ignore, command)
+    if path is None:
+        return run.go(None, workers, cluster, worth)
+    place = prepare_place(path)
+    with Lock(place):
+        remove_leftovers(place)
+        if resume:
+            view = admit_resume(place, case, run.notify, "pareto")
+            run.solved = {} if view is None else read_tasks(view)
+        else:
+            admit(place, case, "pareto", overwrite, run.notify)
+        return run.go(place, workers, cluster, worth)
+
+
+def check(case: Case) -> None:
+    """Refuse a case that has no front. Raises CaseError."""
+    mistakes = []
+    if len(case.objectives) < 2:
+        mistakes.append(case.marks.mistake("objectives", "a front needs at least two objectives"))
+    if not case.n_design:
+        mistakes.append(case.marks.mistake("members", "an optimisation needs members with `design: true`"))
+    if mistakes:
+        raise CaseError(mistakes, str(case.path or case.name))
+
+
+class _FrontRun:
+    """One front: what it has reached, and how it is saved."""
+
+    def __init__(
+        self,
+        case: Case,
+        ask: Ask,
+        on_progress: Callable[[Snapshot], None],
+        stop: Stop,
+        notify: Callable[[str], None],
+        command: str,
+    ) -> None:
+        assert case.combine is not None
+        self.case = case
+        self.ask = ask
+        self.on_progress = on_progress
+        self.stop = stop
+        self.notify = notify
+        self.command = command
+        self.method = ask.method or case.combine.method
+        #: finished tasks by key: those of an earlier process, and those of this one in the plan's order
+        self.solved: dict[str, Found] = {}
+        self.taken: dict[str, Found] = {}
+        self.warnings = tuple(mistake.message for mistake in case.warnings)
+        self.pool: Pool | None = None
+
+    def go(self, path: Path | None, workers: int | None, cluster: str | None, worth: float) -> FrontOutcome:
+        """The whole front."""
+        began = time.perf_counter()
+        compile_apart(self.case, self.notify)
+        self.planner = Planner(self.request())
+        self.open(path)
+        self.setting = Setting(self.case, case_key(self.case))
+        self.workers, self.cluster, self.worth = workers, cluster, worth
+        self.saver = Checkpointer(lambda: self.checkpoint(path)) if path is not None else None
+        front, status, reason = None, RunStatus.INTERRUPTED, "stopped on request; what is finished is saved"
+        try:
+            front = self.work()
+            status, reason = verdict(front)
+        except StoppedError:
+            pass
+        except NoEndError as error:
+            name = self.case.objectives[error.place].name
+            status, reason = RunStatus.FAILED, f"objective {name} alone cannot be optimised: {error}"
+        finally:
+            if self.pool is not None:
+                self.pool.close()
+        if path is not None:
+            self.save(path, status, reason, front)
+        tasks = tuple(self.taken.values())
+        return FrontOutcome(
+            self.case, self.ask.directions, self.method, front, status, reason, tasks,
+            sum(each.evaluations for each in tasks), quality(self.case, front) if front is not None else {},
+            time.perf_counter() - began, path, self.warnings,
+        )  # fmt: skip
+
+    def request(self) -> Request:
+        """The plan's request, with the designs to begin with."""
+        assert self.case.combine is not None
+        problem = make_engine(self.case).problem(even(self.case))
+        _, first = first_design(self.case, problem, None)
+        more = [random_feasible(problem, self.case.optimizer.seed, k) for k in range(1, self.ask.starts)]
+        combine = self.case.combine
+        return Request(
+            self.ask.directions, self.method, combine.exponent, combine.normalize,
+            np.array([sign_of(objective) for objective in self.case.objectives]), np.array([first, *more]),
+            self.case.optimizer.max_iterations,
+        )  # fmt: skip
+
+    def work(self) -> Front:
+        """Go through the plan. Raises StoppedError where it is to stop."""
+        rounds = self.planner.rounds()
+        tasks = next(rounds)
+        while True:
+            try:
+                tasks = rounds.send(self.round(tasks))
+            except StopIteration as end:
+                front: Front = end.value
+                return front
+
+    def round(self, tasks: Sequence[Task]) -> list[Found]:
+        """Results of a round, in order: those that are known, and the others solved."""
+        keys = [task.key(self.setting.case_key) for task in tasks]
+        due = [i for i, key in enumerate(keys) if key not in self.solved]
+        if due and self.pool is None:
+            due = self.first(tasks, keys, due)
+        if due:
+            assert self.pool is not None
+            running = {i: tasks[i].point for i in due}
+            self.tell(running)
+            for place, result in self.pool.results([tasks[i] for i in due]):
+                i = due[place]
+                running.pop(i)
+                self.keep(keys[i], lost(tasks[i], keys[i], result) if isinstance(result, Lost) else result, running)
+            if running:
+                raise StoppedError
+        for key in keys:
+            self.taken[key] = self.solved[key]
+        return [self.solved[key] for key in keys]
+
+    def first(self, tasks: Sequence[Task], keys: Sequence[str], due: list[int]) -> list[int]:
+        """Solve one task here, and decide by its time who solves the others; returns what is left of this round."""
+        if self.cluster is not None:
+            from mdstopo.front.cluster import Cluster
+
+            self.pool = Cluster(self.setting, self.stop, self.cluster)
+            return due
+        here = Here(self.setting, self.stop)
+        self.pool = here
+        wanted = cores() if self.workers is None else self.workers
+        if wanted == 1:
+            return due
+        i = due[0]
+        if self.stop():
+            raise StoppedError
+        result: Found = perform(self.setting, tasks[i], self.stop)
+        self.keep(keys[i], result, {})
+        left = result.seconds / result.evaluations * EVALUATIONS * TASKS * len(self.ask.directions)
+        if left > self.worth:
+            self.pool = Processes(self.setting, self.stop, wanted)
+        return due[1:]
+
+    def keep(self, key: str, found: Found, running: dict[int, int]) -> None:
+        """Take a result in, and write it."""
+        self.solved[key] = found
+        self.tell(running)
+        if self.saver is not None:
+            self.saver.offer()
+
+    def tell(self, running: dict[int, int]) -> None:
+        """Progress."""
+        done = list(self.solved.values())
+        mean = sum(each.seconds for each in done) / len(done) if done else float("nan")
+        expected = TASKS * len(self.ask.directions)
+        best: dict[int, Found] = dict(self.planner.best)
+        for each in done:
+            if each.point >= 0 and each.usable:
+                best.setdefault(each.point, each)
+        at_once = (self.workers or cores()) if isinstance(self.pool, Processes) else 1
+        self.on_progress(
+            Snapshot(
+                self.ask.directions,
+                tuple(objective.name for objective in self.case.objectives),
+                best,
+                tuple(sorted({point for point in running.values() if point >= 0})),
+                len(done),
+                sum(each.evaluations for each in done),
+                max(expected - len(done), len(running)) * mean / at_once,
+            )
+        )
+
+    # the file
+
+    def open(self, path: Path | None) -> None:
+        """Collect what every write repeats."""
+        if path is None:
+            return
+        self.fixed: Datasets = case_part(self.case)
+        self.provenance = Provenance.collect(self.command)
+        chosen = self.case.optimizer
+        self.settings: dict[str, str | int | float | bool] = {
+            "method": self.method,
+            "solver_tolerance": self.case.solver.tolerance,
+            "preset": chosen.preset,
+            "max_iterations": chosen.max_iterations,
+            "tolerance": chosen.tolerance,
+            "starts": self.ask.starts,
+            "seed": chosen.seed,
+        }
+        self.settings |= {f"set {key}": value for key, value in self.case.overrides.items()}
+
+    def checkpoint(self, path: Path) -> None:
+        """Save in the middle; a full disk then is no reason to lose the front."""
+        try:
+            self.save(path, RunStatus.RUNNING, "running", None)
+        except WriteError as error:
+            self.notify(f"no checkpoint: {error}")
+
+    def save(self, path: Path, status: RunStatus, reason: str, front: Front | None) -> None:
+        """Write the file as a whole. In the middle it holds all that is solved, in the end what the plan has taken."""
+        tasks = (self.solved if front is None else self.taken).values()
+        datasets = self.fixed | tasks_part(tasks, self.case)
+        settings = dict(self.settings)
+        if front is None:
+            now = Front(tuple(self.planner.best.get(j) for j in range(len(self.ask.directions))), (), *self.measures())
+            datasets |= front_part(self.case, self.ask.directions, now, tasks)
+        else:
+            datasets |= front_part(self.case, self.ask.directions, front, tasks)
+            settings |= quality(self.case, front)
+        replace_file(
+            path,
+            result_image(
+                self.case, "pareto", status.value, reason, datasets, self.provenance, settings, self.warnings
+            ),
+        )  # fmt: skip
+
+    def measures(self) -> tuple[Floats, Floats]:
+        """Utopia and maxima so far, raw."""
+        signs = self.planner.request.signs
+        return signs * self.planner.lowest, signs * self.planner.highest
+
+
+def lost(task: Task, key: str, result: Lost) -> Found:
+    """What stands for a task that no worker finished."""
+    m = len(task.scalarisation.weights)
+    return Found(
+        task.point, key, task.start, np.full(m, np.nan), float("nan"), RunStatus.FAILED, result.reason, 0, float("nan"),
+        float("nan"), np.zeros((0, m)),
+    )  # fmt: skip
+
+
+def verdict(front: Front) -> tuple[RunStatus, str]:
+    """A front's status, and how its points stand."""
+    counts: dict[str, int] = {}
+    for point in front.points:
+        word = "failed" if point is None else point.status.value
+        counts[word] = counts.get(word, 0) + 1
+    words = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(counts.items()))
+    reason = f"{len(front.points)} points: {words}"
+    if counts.get("failed", 0) == len(front.points):
+        return RunStatus.FAILED, reason
+    return (RunStatus.MAX_ITERATIONS if "max_iterations" in counts else RunStatus.CONVERGED), reason
+
+
+def _ignore(_: object) -> None:
+    return None
+
+
+def _never() -> bool:
+    return False

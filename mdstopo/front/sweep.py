@@ -1,0 +1,234 @@
+"""A case run over values of its keys: every combination is a run of its own, and one table holds what they found."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import load_case
+from mdstopo.front.content import read_tasks, tasks_part
+from mdstopo.front.directions import MOST, parse_range
+from mdstopo.front.jobs import Setting, Trial
+from mdstopo.front.pool import Here, Lost, Pool, Processes, cores
+from mdstopo.front.session import WORTH, Snapshot
+from mdstopo.front.tasks import Found, case_key
+from mdstopo.session.ready import compile_apart
+from mdstopo.status import RunStatus
+from mdstopo.store.admit import admit, admit_resume, prepare_place
+from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.checkpoint import Checkpointer
+from mdstopo.store.contents import Datasets, case_part, result_image
+from mdstopo.store.errors import WriteError
+from mdstopo.store.lock import Lock
+from mdstopo.store.provenance import Provenance
+
+
+@dataclass(frozen=True)
+class SweepOutcome:
+    """A sweep that has ended, or was stopped: keys, their values (W) as written, and what was found, None if not."""
+
+    case: Case
+    keys: tuple[str, ...]
+    values: tuple[tuple[str, ...], ...]
+    found: tuple[Found | None, ...]
+    status: RunStatus
+    reason: str
+    seconds: float
+    path: Path | None
+
+
+def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
+    """Every combination of the values of some keys, the last key fastest. Raises ValueError with a sentence."""
+    columns = []
+    for key, text in sets.items():
+        if ":" in text:
+            columns.append([f"{value:.17g}" for value in parse_range(text)])
+        else:
+            columns.append([word.strip() for word in text.split(",")])
+        if "" in columns[-1]:
+            raise ValueError(f"{key}: found {text!r}; a value is missing")
+    count = int(np.prod([len(column) for column in columns]))
+    if count > MOST:
+        raise ValueError(f"{count} combinations are more than {MOST}")
+    return tuple(product(*columns))
+
+
+def run_sweep(
+    case_path: Path,
+    overrides: Mapping[str, str],
+    sets: Mapping[str, str],
+    *,
+    path: Path,
+    resume: bool = False,
+    overwrite: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
+    on_progress: Callable[[Snapshot], None] | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+    notify: Callable[[str], None] | None = None,
+    command: str = "",
+    worth: float = WORTH,
+) -> SweepOutcome:
+    """Run a case with every combination of the values in `sets`, {key: "a:b:step" or "x,y,z"}.
+
+    Other arguments as `run_front`'s. Raises CaseError where a combination is no case (all their mistakes at once).
+    """
+    values = combinations(sets)
+    base = load_case(case_path, dict(overrides))
+    cases = _cases(case_path, overrides, tuple(sets), values)
+    sweep = _Sweep(base, tuple(sets), values, cases, command)
+    tell = notify or _ignore
+    place = prepare_place(path)
+    with Lock(place):
+        remove_leftovers(place)
+        solved: dict[str, Found] = {}
+        if resume:
+            view = admit_resume(place, base, tell, "sweep")
+            solved = {} if view is None else read_tasks(view, "sweep/tasks")
+        else:
+            admit(place, base, "sweep", overwrite, tell)
+        began = time.perf_counter()
+        for case in cases:
+            compile_apart(case, tell)
+        stop = stop_requested or _never
+        saver = Checkpointer(lambda: sweep.checkpoint(place, tell))
+        due = [i for i, key in enumerate(sweep.runs) if key not in solved]
+        sweep.solved = solved
+        pool: Pool | None = None
+        try:
+            while due:
+                jobs = [Trial(cases[i], sweep.runs[i]) for i in due]
+                if pool is None:
+                    setting = Setting(base, case_key(base))
+                    wanted = cores() if workers is None else workers
+                    if cluster is not None:
+                        from mdstopo.front.cluster import Cluster
+
+                        pool = Cluster(setting, stop, cluster)
+                    else:
+                        pool = Here(setting, stop)
+                        jobs = jobs if wanted == 1 else jobs[:1]  # the time of one says who runs the others
+                count = 0
+                for k, result in pool.results(jobs):
+                    i = due[k]
+                    count += 1
+                    sweep.solved[sweep.runs[i]] = _lost(cases[i], sweep.runs[i]) if isinstance(result, Lost) else result
+                    if on_progress is not None:
+                        on_progress(sweep.snapshot())
+                    saver.offer()
+                if count < len(jobs):
+                    break
+                due = [i for i in due if sweep.runs[i] not in sweep.solved]
+                if isinstance(pool, Here) and due and wanted > 1:
+                    spent = sum(each.seconds for each in sweep.solved.values()) / max(len(sweep.solved), 1)
+                    if spent * len(due) > worth:
+                        pool = Processes(setting, stop, wanted)
+        finally:
+            if pool is not None:
+                pool.close()
+        whole = all(key in sweep.solved for key in sweep.runs)
+        status, reason = sweep.verdict() if whole else (RunStatus.INTERRUPTED, "stopped; what is finished is saved")
+        sweep.save(place, status, reason)
+    found = tuple(sweep.solved.get(key) for key in sweep.runs)
+    return SweepOutcome(base, tuple(sets), values, found, status, reason, time.perf_counter() - began, place)
+
+
+def _cases(
+    case_path: Path, overrides: Mapping[str, str], keys: Sequence[str], values: Sequence[tuple[str, ...]]
+) -> list[Case]:
+    cases, mistakes, seen = [], [], set()
+    for row in values:
+        try:
+            cases.append(load_case(case_path, {**overrides, **dict(zip(keys, row, strict=True))}))
+        except CaseError as error:
+            new = [mistake for mistake in error.mistakes if str(mistake) not in seen]
+            seen |= {str(mistake) for mistake in new}
+            mistakes += new
+    if mistakes:
+        raise CaseError(mistakes, str(case_path))
+    return cases
+
+
+class _Sweep:
+    """What a sweep has reached, and how it is saved."""
+
+    def __init__(
+        self, base: Case, keys: tuple[str, ...], values: Sequence[tuple[str, ...]], cases: list[Case], command: str
+    ) -> None:
+        self.base = base
+        self.keys = keys
+        self.values = values
+        self.runs = [case_key(case) for case in cases]
+        self.solved: dict[str, Found] = {}
+        self.fixed: Datasets = case_part(base)
+        self.provenance = Provenance.collect(command)
+
+    def verdict(self) -> tuple[RunStatus, str]:
+        """How the runs have ended."""
+        counts: dict[str, int] = {}
+        for key in self.runs:
+            word = self.solved[key].status.value
+            counts[word] = counts.get(word, 0) + 1
+        words = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(counts.items()))
+        status = RunStatus.MAX_ITERATIONS if "max_iterations" in counts else RunStatus.CONVERGED
+        return (RunStatus.FAILED if set(counts) == {"failed"} else status), f"{len(self.runs)} runs: {words}"
+
+    def snapshot(self) -> Snapshot:
+        """Progress."""
+        done = {i: self.solved[key] for i, key in enumerate(self.runs) if key in self.solved}
+        mean = sum(each.seconds for each in done.values()) / max(len(done), 1)
+        return Snapshot(
+            np.arange(len(self.runs), dtype=np.float64)[:, None], tuple(o.name for o in self.base.objectives), done, (),
+            len(done), sum(each.evaluations for each in done.values()), mean * (len(self.runs) - len(done)),
+        )  # fmt: skip
+
+    def checkpoint(self, path: Path, notify: Callable[[str], None]) -> None:
+        """Save in the middle."""
+        try:
+            self.save(path, RunStatus.RUNNING, "running")
+        except WriteError as error:
+            notify(f"no checkpoint: {error}")
+
+    def save(self, path: Path, status: RunStatus, reason: str) -> None:
+        """Write the file as a whole."""
+        done = [self.solved.get(key) for key in self.runs]
+        m = len(self.base.objectives)
+        part: Datasets = {
+            "keys": list(self.keys),
+            "objectives": np.array([np.full(m, np.nan) if each is None else each.objectives for each in done]),
+            "status": ["running" if each is None else each.status.value for each in done],
+            "reason": ["" if each is None else each.reason for each in done],
+            "evaluations": np.array([0 if each is None else each.evaluations for each in done], dtype=np.int64),
+        }
+        for k, key in enumerate(self.keys):
+            part[f"values/{key}"] = [row[k] for row in self.values]
+        tasks = [each for each in done if each is not None]
+        alike = len({len(each.alpha) for each in tasks}) <= 1
+        part |= {f"alpha/{i}": each.alpha for i, each in enumerate(done) if each is not None}
+        datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
+        if alike and tasks and len(tasks[0].alpha) == self.base.n_design:
+            datasets |= tasks_part(tasks, self.base, "sweep/tasks")
+        image = result_image(self.base, "sweep", status.value, reason, datasets, self.provenance, {}, ())
+        replace_file(path, image)
+
+
+def _lost(case: Case, key: str) -> Found:
+    m = len(case.objectives)
+    nothing = np.full(m, np.nan)
+    return Found(
+        0, key, case.initial, nothing, float("nan"), RunStatus.FAILED, Lost.reason, 0, float("nan"), float("nan"),
+        np.zeros((0, m)),
+    )  # fmt: skip
+
+
+def _ignore(_: object) -> None:
+    return None
+
+
+def _never() -> bool:
+    return False

@@ -1,0 +1,119 @@
+"""One piece of work: an optimisation of one scalarisation from one design. What comes out depends on nothing else."""
+
+import hashlib
+import json
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo._version import __version__
+from mdstopo.case.model import Case
+from mdstopo.optimizer.driver import Gsao, run
+from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.session.engine import Engine
+from mdstopo.status import RunStatus
+from mdstopo.store.compare import describe
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Task:
+    """point: which point of the front it is for, or -1 - i for the optimum of objective i alone.
+
+    start (N,): the design to begin with; iterations: at most so many.
+    """
+
+    point: int
+    scalarisation: Scalarisation
+    start: Floats
+    iterations: int
+
+    def key(self, case_key: str) -> str:
+        """The hash of all that the result depends on."""
+        digest = hashlib.blake2b(digest_size=16)
+        one = self.scalarisation
+        words = [case_key, self.point, one.method, one.exponent, self.iterations]
+        digest.update(json.dumps(words).encode())
+        for array in (one.weights, one.lowest, one.highest, one.anchor, one.normal, one.planes, self.start):
+            digest.update(b"-" if array is None else np.ascontiguousarray(array, dtype=np.float64).tobytes() + b"|")
+        return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a task has found.
+
+    alpha (N,): its best design; objectives (m,): all raw G there, NaN where it could not be evaluated; combined: U;
+    visited (K, m): raw G of every iterate, NaN of objectives that were not simulated; kkt: the projected residual at
+    the end, relative to the largest gradient entry; violation: the largest excess over a constraint, in its own unit.
+    """
+
+    point: int
+    key: str
+    alpha: Floats
+    objectives: Floats
+    combined: float
+    status: RunStatus
+    reason: str
+    evaluations: int
+    kkt: float
+    violation: float
+    visited: Floats
+    seconds: float = 0.0
+    host: str = field(default="")
+
+    @property
+    def usable(self) -> bool:
+        """Whether there is a design with values."""
+        return bool(np.isfinite(self.objectives).all())
+
+
+def case_key(case: Case) -> str:
+    """The hash of a case and of what else decides: the version, the tolerance, the settings of the optimiser."""
+    return hashlib.blake2b(f"{__version__}\n{describe(case)}".encode(), digest_size=16).hexdigest()
+
+
+class StoppedError(Exception):
+    """A task was left in the middle."""
+
+
+def solve(engine: Engine, case: Case, task: Task, key: str, stop: Callable[[], bool] | None = None) -> Found:
+    """Run the task to its end. Never raises because of a design: a failure is a status.
+
+    Raises StoppedError where `stop` says so before the end.
+    """
+    began = time.perf_counter()
+    chosen = case.optimizer
+    problem = engine.problem(task.scalarisation)
+    optimizer = Gsao(
+        problem,
+        settings(chosen.preset, dict(chosen.options), max_iterations=task.iterations, tolerance=chosen.tolerance),
+    )
+    state = run(optimizer, optimizer.start(task.start), stop_requested=stop)
+    if state.running:
+        raise StoppedError
+    visited = np.array(state.history.info["objectives"]).reshape(-1, len(case.objectives))
+    objectives, excess = _final(engine, case, state.best_alpha)
+    status, reason = state.status, state.reason
+    if status is not RunStatus.FAILED and not np.isfinite(objectives).all():
+        status, reason = RunStatus.FAILED, "the design that was found cannot be evaluated in every load case"
+    return Found(
+        task.point, key, state.best_alpha, objectives, float(state.best_objective), status, reason,
+        int(state.evaluations), float(state.kkt), excess, visited, time.perf_counter() - began, platform.node(),
+    )  # fmt: skip
+
+
+def _final(engine: Engine, case: Case, alpha: Floats) -> tuple[Floats, float]:
+    """All raw objectives of a design, and its largest excess over a constraint."""
+    evaluation = engine.evaluate(alpha, gradient=False)
+    values = np.array([evaluation.objectives[objective.name] for objective in case.objectives])
+    worst = 0.0
+    for row, excess in zip(case.constraints, evaluation.constraints.tolist(), strict=True):
+        worst = max(worst, {"limit": excess, "at_least": -excess, "equals": abs(excess)}[row.sense])
+    return values, worst

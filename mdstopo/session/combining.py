@@ -1,0 +1,105 @@
+"""How a run makes one U of several objectives: utopia and maxima first, by optimising each alone (Eq. 24)."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.front.plan import NoEndError, Planner, Request
+from mdstopo.front.tasks import Found, StoppedError, case_key, solve
+from mdstopo.optimizer.problem import Problem
+from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.optimizer.structure import sign_of
+from mdstopo.session.engine import Engine
+from mdstopo.session.errors import NoUtopiaError
+from mdstopo.store.contents import Datasets
+
+Floats = NDArray[np.float64]
+
+
+def even(case: Case) -> Scalarisation | None:
+    """Equal weights of raw values: a U to get ready with, which needs no utopia. None for one objective."""
+    count = len(case.objectives)
+    return Scalarisation("weighted_sum", np.full(count, 1.0 / count)) if count > 1 else None
+
+
+def problem_of(engine: Engine, scalarisation: Scalarisation | None) -> Problem:
+    """What the optimiser sees."""
+    return engine.problem() if scalarisation is None else engine.problem(scalarisation)
+
+
+class Combining:
+    """The individual optima of one run, each solved once and kept, and the U that follows from them."""
+
+    def __init__(self, case: Case) -> None:
+        self.case = case
+        #: finished solves by key
+        self.solved: dict[str, Found] = {}
+        self.utopia: Floats | None = None
+        self.maxima: Floats | None = None
+
+    @property
+    def evaluations(self) -> int:
+        """Designs that were evaluated for it."""
+        return sum(found.evaluations for found in self.solved.values())
+
+    def scalarisation(
+        self, engine: Engine, first: Floats, keep: Callable[[], None], stop: Callable[[], bool]
+    ) -> Scalarisation | None:
+        """U of the case; None for one objective.
+
+        first (N,): the design that the individual optima begin with. keep is called after each of them. Raises
+        StoppedError where `stop` says so, and NoUtopiaError where an objective alone cannot be optimised.
+        """
+        case, combine = self.case, self.case.combine
+        if combine is None or len(case.objectives) < 2:
+            return None
+        weights = np.array([combine.weights[objective.name] for objective in case.objectives])
+        if np.count_nonzero(weights) == 1:
+            return Scalarisation("weighted_sum", weights)  # Eq. 24 would change nothing but its unit
+        if not combine.normalize or combine.method == "weighted_product":
+            return Scalarisation(combine.method, weights, exponent=combine.exponent)
+        signs = np.array([sign_of(objective) for objective in case.objectives])
+        request = Request(
+            np.zeros((0, len(weights))), combine.method, combine.exponent, True, signs, first[None],
+            case.optimizer.max_iterations,
+        )  # fmt: skip
+        planner = Planner(request)
+        rounds = planner.ends_alone()
+        key_of_case = case_key(case)
+        try:
+            tasks = next(rounds)
+            while True:
+                found = []
+                for task in tasks:
+                    key = task.key(key_of_case)
+                    if key not in self.solved:
+                        if stop():
+                            raise StoppedError
+                        self.solved[key] = solve(engine, case, task, key, stop)
+                        keep()
+                    found.append(self.solved[key])
+                tasks = rounds.send(found)
+        except StopIteration:
+            pass
+        except NoEndError as error:
+            name = case.objectives[error.place].name
+            raise NoUtopiaError(f"objective {name} alone cannot be optimised: {error}") from error
+        self.utopia, self.maxima = signs * planner.lowest, signs * planner.highest
+        return Scalarisation(combine.method, weights, planner.lowest, planner.highest, combine.exponent)
+
+    def part(self, visited: Floats) -> Datasets:
+        """What the result file holds of it. visited (K, m): raw values so far, for better utopia than was known."""
+        from mdstopo.front.content import tasks_part
+
+        part: Datasets = tasks_part(self.solved.values(), self.case, "combine/tasks") if self.solved else {}
+        if self.utopia is not None and self.maxima is not None:
+            signs = np.array([sign_of(objective) for objective in self.case.objectives])
+            found = np.concatenate([visited * signs, (self.utopia * signs)[None]])
+            part |= {
+                "combine/utopia": self.utopia,
+                "combine/maxima": self.maxima,
+                "combine/best_found": signs * np.nanmin(found, axis=0),
+            }
+        return part

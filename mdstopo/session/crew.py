@@ -1,0 +1,75 @@
+"""Processes beside this one: fresh interpreters that are given pickled messages and send some back.
+
+They ignore the terminal's Ctrl-C and end when their input is closed, so that they neither spoil a clean stop nor
+outlive a killed parent.
+"""
+
+import os
+import pickle
+import queue
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from typing import IO, Any
+
+
+class WorkerProcess:
+    """One process that runs a module, and a thread that listens to it.
+
+    Messages arrive in `inbox` as (this, message), None once it has ended. crew: how many share the machine's cores.
+    """
+
+    def __init__(self, module: str, job: object, crew: int, inbox: "queue.Queue[tuple[WorkerProcess, Any]]") -> None:
+        threads = max(1, (os.cpu_count() or 1) // crew)
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", module],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env={**os.environ, "NUMBA_NUM_THREADS": str(threads)},
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._input: IO[bytes] = self._process.stdin
+        self._output: IO[bytes] = self._process.stdout
+        self._inbox = inbox
+        self.busy = False
+        self.pid = self._process.pid
+        self.send(job)
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def send(self, message: object) -> None:
+        """Give it a message; where it is gone, the listener says so."""
+        with suppress(BrokenPipeError, ValueError):
+            pickle.dump(message, self._input)
+            self._input.flush()
+
+    def stop(self) -> None:
+        """Ask it to end after what it is at."""
+        with suppress(BrokenPipeError):
+            self._input.close()
+
+    def close(self) -> None:
+        """Let it end; end it if it does not."""
+        self.stop()
+        try:
+            self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            self.kill()
+        self._output.close()
+
+    def kill(self) -> None:
+        """End it at once."""
+        self._process.kill()
+        self._process.wait()
+        self.stop()
+
+    def _listen(self) -> None:
+        while True:
+            try:
+                message = pickle.load(self._output)
+            except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+                message = None
+            self._inbox.put((self, message))
+            if message is None:
+                return
