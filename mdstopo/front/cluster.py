@@ -3,12 +3,25 @@
 The scheduler is Dask's, and so is what happens to pieces whose worker dies: they are given to another one.
 """
 
+import logging
+import queue
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from mdstopo.front.jobs import Job, Setting, perform
-from mdstopo.front.pool import PATIENCE
+from mdstopo.front.pool import PATIENCE, Lost
+from mdstopo.session.errors import WorkerError
 from mdstopo.store.errors import StoreError
+
+#: engines are for one thread at a time, and a Dask worker may have several
+_one_at_a_time = threading.Lock()
+
+
+def perform_alone(setting: Setting, job: Job) -> Any:
+    """The result of one piece; a process does one after the other."""
+    with _one_at_a_time:
+        return perform(setting, job)
 
 
 class Cluster:
@@ -19,33 +32,39 @@ class Cluster:
             from distributed import Client
         except ImportError as error:
             raise StoreError("--cluster needs Dask: pip install 'mdstopo[cluster]'") from error
+        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told in our words
         self._stop = stop
+        self._address = address
         try:
             self._client = Client(address, timeout=10, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise StoreError(f"no Dask scheduler answers at {address}: {error}") from error
-        self._setting = self._client.scatter(setting, broadcast=True)
+        # goes with every piece: what is scattered dies with the workers that hold it
+        self._setting = setting
 
     def results(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]:
-        """As they are done."""
-        from distributed import wait
-
+        """As they are done. Raises WorkerError where the scheduler is gone."""
+        done: queue.Queue[Any] = queue.Queue()
         futures = {
-            self._client.submit(perform, self._setting, job, pure=False, retries=2): place
+            self._client.submit(perform_alone, self._setting, job, pure=False, retries=2): place
             for place, job in enumerate(jobs)
         }
-        open_ones = set(futures)
-        while open_ones:
+        for future in futures:
+            future.add_done_callback(done.put)
+        left = len(futures)
+        while left:
             if self._stop():
-                self._client.cancel(list(open_ones))
+                self._client.cancel(list(futures))
                 return
             try:
-                done = wait(open_ones, timeout=PATIENCE, return_when="FIRST_COMPLETED").done
-            except TimeoutError:
+                future = done.get(timeout=PATIENCE)
+            except queue.Empty:
                 continue
-            for future in sorted(done, key=lambda each: futures[each]):
-                open_ones.discard(future)
-                yield futures[future], future.result()
+            if future.cancelled():
+                raise WorkerError(f"the Dask scheduler at {self._address} is gone; what is finished is saved")
+            left -= 1
+            error = future.exception()
+            yield futures[future], future.result() if error is None else Lost(f"the cluster failed on it: {error}")
 
     def close(self) -> None:
         """Leave the cluster to itself."""

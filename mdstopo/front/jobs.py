@@ -13,7 +13,7 @@ from mdstopo.case.model import Case
 from mdstopo.front.tasks import Found, StoppedError, Task, solve
 from mdstopo.session.combining import even, problem_of
 from mdstopo.session.engine import Engine, make_engine
-from mdstopo.session.ready import get_ready
+from mdstopo.session.ready import compile_apart, get_ready
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ def ready_engine(setting: Setting) -> Engine:
     """The case's engine, its kernels loaded in the one order that makes results repeat to the bit (`ready`)."""
     found = _engines.get(setting.case_key)
     if found is None:
+        compile_apart(setting.case, lambda _: None)  # on a machine where nothing has been compiled yet
         found = make_engine(setting.case)
         get_ready(setting.case, found, problem_of(found, even(setting.case)), None)
         _engines[setting.case_key] = found

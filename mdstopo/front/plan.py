@@ -229,10 +229,7 @@ class Planner:
             return float("inf")
         one = self.scalarisation(j)
         signed = self._signed(found)
-        value = one.value(signed)
-        if len(one.planes):
-            g = np.array([one.transformed(signed[i : i + 1], i)[0][0] for i in range(self.m)])
-            value += 1e3 * float(np.maximum(one.planes @ (g - one.anchor), 0.0).sum())
+        value = one.value(signed) + 1e3 * float(np.maximum(one.excess(signed), 0.0).sum())
         return value if np.isfinite(value) else float("inf")
 
     # scalarisations

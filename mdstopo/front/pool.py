@@ -8,6 +8,7 @@ dies is replaced once for each piece it had; then the piece comes back as an err
 import os
 import queue
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from mdstopo.front.jobs import Job, Setting, perform
@@ -18,10 +19,11 @@ from mdstopo.session.crew import WorkerProcess
 PATIENCE = 0.1
 
 
+@dataclass(frozen=True)
 class Lost:
-    """What stands for the result of a piece whose worker died, twice."""
+    """What stands for the result of a piece that no worker could finish."""
 
-    reason = "its worker process ended unexpectedly, twice"
+    reason: str = "its worker process ended unexpectedly, twice"
 
 
 class Pool(Protocol):

@@ -19,6 +19,7 @@ from mdstopo.optimizer.starts import random_feasible
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.combining import even
 from mdstopo.session.engine import make_engine
+from mdstopo.session.errors import WorkerError
 from mdstopo.session.ready import compile_apart
 from mdstopo.session.starts import first_design
 from mdstopo.status import RunStatus
@@ -167,6 +168,10 @@ class _FrontRun:
             status, reason = verdict(front)
         except StoppedError:
             pass
+        except WorkerError as error:
+            if path is not None:
+                self.save(path, status, str(error), None)
+            raise
         except NoEndError as error:
             name = self.case.objectives[error.place].name
             status, reason = RunStatus.FAILED, f"objective {name} alone cannot be optimised: {error}"

@@ -17,6 +17,7 @@ from mdstopo.front.jobs import Setting, Trial
 from mdstopo.front.pool import Here, Lost, Pool, Processes, cores
 from mdstopo.front.session import WORTH, Snapshot
 from mdstopo.front.tasks import Found, case_key
+from mdstopo.session.errors import WorkerError
 from mdstopo.session.ready import compile_apart
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
@@ -128,6 +129,9 @@ def run_sweep(
                     spent = sum(each.seconds for each in sweep.solved.values()) / max(len(sweep.solved), 1)
                     if spent * len(due) > worth:
                         pool = Processes(setting, stop, wanted)
+        except WorkerError as error:
+            sweep.save(place, RunStatus.INTERRUPTED, str(error))
+            raise
         finally:
             if pool is not None:
                 pool.close()

@@ -71,6 +71,13 @@ class Scalarisation:
             return float("nan")
         return float(self.rows([(signed[i : i + 1], np.zeros((0, 0))) for i in self.active])[0][0])
 
+    def excess(self, signed: Floats) -> Floats:
+        """By how much values (m,) exceed each plane of nc, (c,); feasible where <= 0."""
+        if not len(self.planes):
+            return np.zeros(0)
+        g = np.array([float(self.transformed(signed[i : i + 1], i)[0][0]) for i in range(len(signed))])
+        return np.asarray(self.planes @ (g - self.anchor))
+
     def rows(self, parts: Sequence[Part]) -> tuple[Floats, Floats]:
         """Rows (R,), highest first, and gradients (R, N), from the active objectives' parts.
 

@@ -36,7 +36,8 @@ class WorkerProcess:
         self.busy = False
         self.pid = self._process.pid
         self.send(job)
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
 
     def send(self, message: object) -> None:
         """Give it a message; where it is gone, the listener says so."""
@@ -56,20 +57,22 @@ class WorkerProcess:
             self._process.wait(timeout=5.0)
         except subprocess.TimeoutExpired:
             self.kill()
-        self._output.close()
+        self._listener.join()
 
     def kill(self) -> None:
         """End it at once."""
         self._process.kill()
         self._process.wait()
         self.stop()
+        self._listener.join()
 
     def _listen(self) -> None:
-        while True:
-            try:
-                message = pickle.load(self._output)
-            except (EOFError, OSError, ValueError, pickle.UnpicklingError):
-                message = None
-            self._inbox.put((self, message))
-            if message is None:
-                return
+        with self._output:
+            while True:
+                try:
+                    message = pickle.load(self._output)
+                except (EOFError, OSError, ValueError, pickle.UnpicklingError):
+                    message = None
+                self._inbox.put((self, message))
+                if message is None:
+                    return
