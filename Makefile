@@ -58,10 +58,15 @@ lint: $(VENV)/.ready-dev
 types: $(VENV)/.ready-dev
 	$(BIN)/mypy
 
-bench: $(VENV)/.ready
+# what benchmarks compare with beside the peers
+$(VENV)/.ready-bench: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[ga]'
+	@touch $@
+
+bench: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks $(SECTIONS) $(if $(PEERS),--peers '$(PEERS)' --peers-python '$(PEERS_PYTHON)')
 
-readme: $(VENV)/.ready
+readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme
 
 clean:

@@ -18,6 +18,7 @@ SECTIONS = {
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
+    "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "peers": "the same beside other programs (needs --peers)",
 }
 

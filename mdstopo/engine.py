@@ -77,6 +77,13 @@ class Evaluator:
             | {key: row for key, row in limited.items() if row.load_case == name}
             for name in self.scenes
         }
+        self._names = tuple(objective.name for objective in case.objectives)
+        #: groups whose alpha^mu has no slope at 0: name, power, their part of alpha
+        self._rooted = [
+            (group.name, group.power, part)
+            for group, part in zip(case.design_groups, case.group_slices.values(), strict=True)
+            if group.power < 1.0
+        ]
         self._work = np.zeros(WORK, dtype=np.int64)
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
 
@@ -222,9 +229,9 @@ class Evaluator:
 
     def _without_slope(self, design: FloatArray) -> str:
         """Why there is no gradient at this design, or nothing: alpha^mu has no slope at 0 where mu < 1."""
-        for group, part in zip(self.case.design_groups, self.case.group_slices.values(), strict=True):
-            if group.power < 1.0 and np.any(design[part] == 0.0):
-                return f"alpha = 0 in group {group.name}, whose power {group.power:g} is below 1"
+        for name, power, part in self._rooted:
+            if np.any(design[part] == 0.0):
+                return f"alpha = 0 in group {name}, whose power {power:g} is below 1"
         return ""
 
     def driver(self, name: str) -> "AnyDriver":
@@ -287,7 +294,7 @@ class Evaluator:
         status: Status,
         message: str,
     ) -> Evaluation:
-        names = [objective.name for objective in self.case.objectives]
+        names = self._names
         if not status.usable:
             lost = (Peak(np.nan, np.nan, None),)
             keys = [*names, *self._limited]

@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +38,8 @@ Stop = Callable[[], bool]
 WORTH = 6.0
 #: tasks that a point takes, and evaluations of a task, about: for guesses of the time that is left
 TASKS, EVALUATIONS = 3.2, 11.0
+#: iterations of the first task that are tried, and thrown away, to see how long the work takes
+LOOK = 2
 
 
 @dataclass(frozen=True)
@@ -215,10 +217,9 @@ class _FrontRun:
         """Results of a round, in order: those that are known, and the others solved."""
         keys = [task.key(self.setting.case_key) for task in tasks]
         due = [i for i, key in enumerate(keys) if key not in self.solved]
-        if due and self.pool is None:
-            due = self.first(tasks, keys, due)
         if due:
-            assert self.pool is not None
+            if self.pool is None:
+                self.pool = self.choose_pool(tasks[due[0]])
             running = {i: tasks[i].point for i in due}
             self.tell(running)
             for place, result in self.pool.results([tasks[i] for i in due]):
@@ -231,27 +232,19 @@ class _FrontRun:
             self.taken[key] = self.solved[key]
         return [self.solved[key] for key in keys]
 
-    def first(self, tasks: Sequence[Task], keys: Sequence[str], due: list[int]) -> list[int]:
-        """Solve one task here, and decide by its time who solves the others; returns what is left of this round."""
+    def choose_pool(self, task: Task) -> Pool:
+        """Who does the work: a cluster, this process, or others where a look at the task says that it is worth it."""
         if self.cluster is not None:
             from mdstopo.front.cluster import Cluster
 
-            self.pool = Cluster(self.setting, self.stop, self.cluster)
-            return due
-        here = Here(self.setting, self.stop)
-        self.pool = here
+            return Cluster(self.setting, self.stop, self.cluster)
         wanted = cores() if self.workers is None else self.workers
-        if wanted == 1:
-            return due
-        i = due[0]
-        if self.stop():
-            raise StoppedError
-        result: Found = perform(self.setting, tasks[i], self.stop)
-        self.keep(keys[i], result, {})
-        left = result.seconds / result.evaluations * EVALUATIONS * TASKS * len(self.ask.directions)
-        if left > self.worth:
-            self.pool = Processes(self.setting, self.stop, wanted)
-        return due[1:]
+        if wanted > 1:
+            look = perform(self.setting, replace(task, iterations=LOOK), self.stop)
+            left = look.seconds / max(look.evaluations, 1) * EVALUATIONS * TASKS * len(self.ask.directions)
+            if left > self.worth:
+                return Processes(self.setting, self.stop, wanted)
+        return Here(self.setting, self.stop)
 
     def keep(self, key: str, found: Found, running: dict[int, int]) -> None:
         """Take a result in, and write it."""
