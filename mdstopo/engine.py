@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     AnyScene: TypeAlias = Scene | GeneralScene
     AnyDriver: TypeAlias = Driver | GeneralDriver
 
-#: the motion is computed to the tolerance of what is looked at, and never looser than this: at 1e-4 a gradient may
-#: exceed ten tolerances on scenes whose members turn fast
+#: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
+#: else exceed ten tolerances on scenes whose members turn fast
 LOOSEST = 5e-5
 
 
@@ -239,7 +239,7 @@ class Evaluator:
         if name not in self._drivers:
             looked = self._by_load_case[name].values()
             solver = self.case.solver
-            scene, tolerance, step = self.scenes[name], min(solver.tolerance, LOOSEST), solver.step or 0.0
+            scene, tolerance, step = self.scenes[name], _of_motion(solver.tolerance), solver.step or 0.0
             driver: AnyDriver
             if isinstance(scene, Scene):
                 reductions = np.array([REDUCTIONS[each.over_time] for each in looked], dtype=np.int64)
@@ -326,6 +326,10 @@ class Evaluator:
         )
 
 
+def _of_motion(tolerance: float) -> float:
+    return min(tolerance, max(LOOSEST, 0.5 * tolerance))
+
+
 def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
     """Every load case as a scene of the family that the case needs."""
     if general:
@@ -350,15 +354,9 @@ def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked:
 
 
 def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:
-    count = int(result.found[j])
-    gradients = result.gradients[j, :count].copy() if gradient else None
-    if gradients is not None:
-        gradients.flags.writeable = False
-    return tuple(
-        Peak(
-            float(result.rows[j, r, 0]),
-            float(result.rows[j, r, 1]),
-            None if gradients is None else gradients[r],
-        )
-        for r in range(count)
-    )
+    rows = result.rows[j, : result.found[j]].tolist()
+    if not gradient:
+        return tuple(Peak(row[0], row[1], None) for row in rows)
+    gradients = result.gradients[j, : len(rows)].copy()
+    gradients.flags.writeable = False
+    return tuple(Peak(row[0], row[1], gradients[r]) for r, row in enumerate(rows))

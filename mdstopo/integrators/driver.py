@@ -7,7 +7,7 @@ little, and gives the steps more room when the kernel asks for it.
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,8 +38,7 @@ class Method:
     stages: int
 
 
-@dataclass(frozen=True)
-class Looked:
+class Looked(NamedTuple):
     """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
 
     rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
@@ -76,7 +75,7 @@ class Driver:
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         self._shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
         fixed = step > 0.0 or method.name == "generalized_alpha"
-        newton = NEWTON_TOLERANCE if fixed else min(max(tolerance, NEWTON_TOLERANCE), 1e-6)
+        newton = NEWTON_TOLERANCE if fixed else min(max(tolerance, NEWTON_TOLERANCE), LOOSE_NEWTON)
         self.settings = np.array([tolerance, newton, step, CLOSENESS])
         self.reductions = reductions
         self.work = np.zeros(WORK, dtype=np.int64)
@@ -218,3 +217,4 @@ MAX_STEPS = 1_000_000
 #: Newton corrections relative to the motion at which a fixed implicit step counts as solved: the next would be
 #: rounding. Adaptive ones need no better than their tolerance; the tangents are then off by no more than that.
 NEWTON_TOLERANCE = 1e-10
+LOOSE_NEWTON = 1e-4

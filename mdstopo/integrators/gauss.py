@@ -9,7 +9,7 @@ is solved by sweeps that touch no member (they contract quickly because h^2 |K/M
 here). The first pass uses few nodes; every further one takes more, until the Legendre coefficients of a have decayed
 below the tolerance, and goes on at that number until the Newton correction is. So the corrections and the tail of the
 coefficients are the error estimate, at no cost. The last correction is solved for but not passed over once more, so
-the kept tangents belong to states that are off by it: by at most the tolerance (and 1e-6) on adaptive windows, by
+the kept tangents belong to states that are off by it: by at most the tolerance (and 1e-4) on adaptive windows, by
 1e-10 on fixed ones, where the discrete adjoint (`gauss_linear`) is the exact derivative of what was computed.
 """
 
@@ -336,10 +336,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                         w = planes[3, i, j]
                         for d in range(n):
                             coef[i, d] += w * a[j, d]
-                # what the next coefficient would add to the motion, from the last ones
+                # what the next coefficient would add to the motion, from the last ones, and half as much again: peaks
+                # amplify what is left (measured on 150 random scenes)
                 estimate = 0.0
                 for d in range(n):
-                    tail = max(abs(coef[s - 1, d]), 0.1 * abs(coef[s - 2, d])) * h * h / (4.0 * s * s)
+                    tail = max(abs(coef[s - 1, d]), 0.1 * abs(coef[s - 2, d])) * 1.5 * h * h / (4.0 * s * s)
                     estimate = max(estimate, weight[d] * tail)
                 if estimate <= tolerance or fixed_step > 0.0:
                     # the last clause: rounding is all that is left
