@@ -3,6 +3,7 @@
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
 #   make lint, make types         ruff; mypy
+#   make reproduce                every figure and table of the paper, into results/index.html
 #   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
 #   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
 #   make readme                   measure everything and put the numbers into the README
@@ -24,10 +25,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test lint types bench readme clean
+.PHONY: help run test lint types reproduce bench readme clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,9p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,10p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -48,6 +49,14 @@ run: $(VENV)/.ready
 	  args=--resume; fi; \
 	echo mdstopo run $(CASE) $$args; \
 	exec $(BIN)/mdstopo run $(CASE) $$args
+
+$(VENV)/.ready-plot: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[plot]'
+	@touch $@
+
+# Goes on where it was stopped; what is made and current is left alone.
+reproduce: $(VENV)/.ready-plot
+	$(BIN)/python -m reproduce
 
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest $(TESTS)

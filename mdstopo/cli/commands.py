@@ -8,6 +8,7 @@ COMMANDS: dict[str, str] = {
     "simulate": "Compute the motion of one design.",
     "gradient": "Compare sensitivity methods on one design.",
     "show": "Say in words what a result file holds.",
+    "plot": "Draw what a result file holds.",
     "schema": "Print the JSON Schema of the case format, for editors.",
 }
 

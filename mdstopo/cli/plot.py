@@ -1,0 +1,64 @@
+"""`mdstopo plot`: pictures of a result."""
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from mdstopo.cli.options import FILE, output_options
+from mdstopo.cli.output import Output
+
+
+@click.command("plot")
+@click.argument("result_path", metavar="RESULT", type=FILE)
+@click.argument("what", required=False, metavar="[WHAT]")
+@click.option("--out", type=FILE, metavar="FILE", help="Where to: .png, .svg or .pdf (default: beside the result).")
+@click.option("--format", "ending", type=click.Choice(["png", "svg", "pdf"]), default="png", show_default=True)
+@click.option("--time", "times", type=float, multiple=True, metavar="T", help="Layout at this time; may be repeated.")
+@click.option("--load-case", metavar="NAME", help="Of layout at a time, and of histories.")
+@click.option("--point", type=click.IntRange(0), metavar="K", help="Of a front: the design of this point.")
+@click.option("--members", type=click.IntRange(1), metavar="N", help="Sensitivities of the first N members.")
+@output_options
+def command(
+    result_path: Path,
+    what: str | None,
+    out: Path | None,
+    ending: str,
+    times: tuple[float, ...],
+    load_case: str | None,
+    point: int | None,
+    members: int | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Draw what a result file holds.
+
+    WHAT is one of layout, convergence, design, sensitivities, histories, sensitivity-histories, front; without it,
+    everything that the file has is drawn.
+    """
+    from mdstopo.plots.source import Source
+    from mdstopo.plots.style import save, styled
+    from mdstopo.plots.table import PLOTS, fitting
+
+    output = Output(json=as_json, quiet=quiet)
+    if what is not None and what not in PLOTS:
+        raise click.BadParameter(f"no picture {what!r}; there are {', '.join(PLOTS)}", param_hint="WHAT")
+    if out is not None and what is None:
+        raise click.UsageError("--out is for one picture: say which")
+    written = []
+    with styled() as module:
+        source = Source(result_path, point)
+        if load_case is not None and load_case not in source.load_cases:
+            raise click.BadParameter(
+                f"no load case {load_case!r}; there are {', '.join(source.load_cases)}", param_hint="--load-case"
+            )
+        given = {"times": times, "load_case": load_case, "members": members, "marked": point}
+        for name in [what] if what else fitting(source.view):
+            plot = PLOTS[name]
+            options: dict[str, Any] = {key: given[key] for key in plot.options if given[key] not in (None, ())}
+            place = out or result_path.with_name(f"{result_path.stem}-{name}.{ending}")
+            save(plot.draw(module, source, **options), place)
+            written.append(str(place))
+            output.say(str(place))
+    output.document({"command": "plot", "result": str(result_path), "pictures": written})
+    return 0

@@ -1,0 +1,1 @@
+"""Pictures of results (extra `plot`); nothing else imports matplotlib."""

@@ -1,0 +1,84 @@
+"""The system: bodies, points, and members drawn by how much of them there is."""
+
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.model import GROUND
+from mdstopo.plots.scenery import ends_at, outline, start_state
+from mdstopo.plots.source import Floats, Source
+from mdstopo.plots.style import COLOURS, WIDTH
+from mdstopo.plots.watch import points_at
+
+#: of the range of alpha: what is thinner is not drawn
+FAINT = 0.02
+#: points: the widest member, the narrowest
+WIDEST, NARROWEST = 1.6, 0.15
+#: members of one group that are drawn, the strongest first
+MOST = 20_000
+
+
+def draw(module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = ()) -> Any:
+    """One panel a time, the start where none is given."""
+    case = source.case
+    panels: list[tuple[float | None, Floats]] = [(None, start_state(case))]
+    if times:
+        name = load_case or source.load_cases[0]
+        motion = source.motion(name, np.array(times))
+        panels = list(zip(times, motion.q, strict=True))
+    figure = module.Figure(figsize=(WIDTH, min(0.4 + 2.9 * len(panels), 9.0)))
+    axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
+    for axis, (t, q) in zip(axes, panels, strict=True):
+        _bodies(axis, source, q)
+        _members(axis, source, q)
+        axis.set_aspect("equal", adjustable="datalim")
+        axis.set_xlabel("x, m")
+        axis.set_ylabel("y, m")
+        axis.margins(0.08)
+        if t is not None:
+            axis.set_title(f"t = {t:g} s", loc="left")
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=3)
+    return figure
+
+
+def _bodies(axis: Any, source: Source, q: Floats) -> None:
+    case = source.case
+    for k, name in enumerate([*(body.name for body in case.bodies), GROUND]):
+        corners = outline(case, name)
+        if not len(corners):
+            continue
+        colour = "#555555" if name == GROUND else COLOURS[(k + 2) % len(COLOURS)]
+        if len(corners) > 2:
+            placed = points_at(case, name, corners, q[None])[0]
+            axis.fill(*placed.T, facecolor=colour, alpha=0.12, linewidth=0)
+            axis.fill(*placed.T, facecolor="none", edgecolor=colour, linewidth=0.7)
+        points = [grid.local for grid in case.points.values() if grid.body == name]
+        if points:
+            axis.plot(*points_at(case, name, np.concatenate(points), q[None])[0].T, ".", color=colour, markersize=2)
+        if name != GROUND:
+            axis.plot(q[3 * k], q[3 * k + 1], "+", color=colour, markersize=6, label=name)
+
+
+def _members(axis: Any, source: Source, q: Floats) -> None:
+    from matplotlib.collections import LineCollection
+
+    case = source.case
+    slices = case.group_slices
+    for k, group in enumerate(case.members):
+        ends = ends_at(case, group, q)
+        colour = COLOURS[k % 2]
+        style = "-"
+        if group.design:
+            values = source.alpha[slices[group.name]]
+            share = (values - group.lower) / max(group.upper - group.lower, 1e-300)
+        else:
+            share, style = np.full(len(group), 0.5), "--"
+        order = np.argsort(share)[-MOST:]
+        order = order[share[order] > FAINT]
+        widths = NARROWEST + (WIDEST - NARROWEST) * share[order]
+        axis.add_collection(
+            LineCollection(list(ends[order]), colors=colour, linewidths=widths, alpha=0.8, linestyles=style),
+            autolim=True,
+        )
+        axis.plot([], [], style, color=colour, label=f"{group.name}, width by alpha" if group.design else group.name)

@@ -1,0 +1,57 @@
+"""Bodies and members in the plane: outlines from the points that stand on bodies, places of ends at any time."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.plots.watch import points_at
+
+Floats = NDArray[np.float64]
+
+#: design values above which a member counts as present, as a share of the group's range
+PRESENT = 0.5
+
+
+def outline(case: Case, body: str) -> Floats:
+    """(K, 2) corners of the convex hull of a body's points and its centre of mass, in body coordinates."""
+    pieces = [np.zeros((1, 2))] if body != GROUND else []
+    pieces += [grid.local for grid in case.points.values() if grid.body == body]
+    for group in case.members:
+        pieces += [group.from_local] if group.body_from == body else []
+        pieces += [group.to_local] if group.body_to == body else []
+    for joint in case.joints:
+        ends = zip(joint.bodies, (joint.at_first, joint.at_second), strict=True)
+        pieces += [np.array([at]) for name, at in ends if name == body]
+    return hull(np.concatenate(pieces)) if pieces else np.zeros((0, 2))
+
+
+def hull(points: Floats) -> Floats:
+    """Corners (K, 2) of the convex hull of points (n, 2), counterclockwise (Andrew's monotone chain)."""
+    order = sorted(set(map(tuple, points.tolist())))
+    if len(order) < 3:
+        return np.array(order).reshape(-1, 2)
+
+    def half(sequence: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+        chain: list[tuple[float, ...]] = []
+        for x, y in sequence:
+            while len(chain) > 1:
+                (ax, ay), (bx, by) = chain[-2], chain[-1]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 0.0:
+                    break
+                chain.pop()
+            chain.append((x, y))
+        return chain[:-1]
+
+    return np.array(half(order) + half(order[::-1]))
+
+
+def ends_at(case: Case, group: MemberGroup, q: Floats) -> Floats:
+    """(M, 2, 2) both ends of a group's members at a state q (3 n_bodies,)."""
+    state = q[None]
+    p = points_at(case, group.body_from, group.from_local, state)[0][group.from_index]
+    return np.stack([p, points_at(case, group.body_to, group.to_local, state)[0][group.to_index]], axis=1)
+
+
+def start_state(case: Case) -> Floats:
+    """q (3 n_bodies,) as the case draws it."""
+    return np.array([value for body in case.bodies for value in (*body.position, body.angle)])
