@@ -30,6 +30,14 @@ class Motion:
     q: Floats
 
 
+def case_of(view: ResultView) -> Case:
+    """The case in a result file as it was read, with what --set changed. Raises CaseError where files are gone."""
+    path = Path(view.case_path) if view.case_path else None
+    settings = view.settings.items()
+    overrides = {key.removeprefix("set "): str(value) for key, value in settings if key.startswith("set ")}
+    return read_case(view.case_text, path=path, overrides=overrides)
+
+
 class Source:
     """A result file, with what pictures ask of it. point: of a front, which of its designs."""
 
@@ -42,10 +50,7 @@ class Source:
     @cached_property
     def case(self) -> Case:
         """The case as it was read, with what --set changed."""
-        path = Path(self.view.case_path) if self.view.case_path else None
-        settings = self.view.settings.items()
-        overrides = {key.removeprefix("set "): str(value) for key, value in settings if key.startswith("set ")}
-        return read_case(self.view.case_text, path=path, overrides=overrides)
+        return case_of(self.view)
 
     @property
     def title(self) -> str:

@@ -13,6 +13,7 @@ from mdstopo.case.model import Case
 from mdstopo.status import Status
 from mdstopo.store.compare import describe
 from mdstopo.store.image import Attribute, Value, encode, texts
+from mdstopo.store.labels import labels
 from mdstopo.store.provenance import Provenance
 
 FORMAT = 1
@@ -109,7 +110,12 @@ def result_image(
         "provenance": provenance.attributes(),
         "settings": settings,
     }
-    return encode(attributes, {**datasets, "warnings": list(warnings)})
+    whole = {**datasets, "warnings": list(warnings)}
+    if status == "running":  # checkpoints are many, and nobody opens them in a notebook
+        return encode(attributes, whole)
+    marked = labels(case, whole)
+    attributes |= {path: {"units": unit} for path, unit in marked.units.items()}
+    return encode(attributes, {**whole, **marked.extra}, marked.scales)
 
 
 def _rows(blocks: list[Floats]) -> Floats:

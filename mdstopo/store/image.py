@@ -19,7 +19,11 @@ _FORMAT = ("v110", "v110")
 _BLOCK = 1 << 16
 
 
-def encode(attributes: Mapping[str, Mapping[str, Attribute]], datasets: Mapping[str, Value]) -> bytes:
+def encode(
+    attributes: Mapping[str, Mapping[str, Attribute]],
+    datasets: Mapping[str, Value],
+    scales: Mapping[str, Sequence[str]] | None = None,
+) -> bytes:
     """The bytes of an HDF5 file.
 
     Parameters
@@ -28,6 +32,8 @@ def encode(attributes: Mapping[str, Mapping[str, Attribute]], datasets: Mapping[
         of each group, by its path; the root's under "".
     datasets
         by path: arrays, texts, or lists of texts; text is UTF-8.
+    scales
+        by path of a dataset: the dataset that is the scale of each of its dimensions, or "".
     """
     size = sum(value.nbytes for value in datasets.values() if isinstance(value, np.ndarray))
     with h5py.File(
@@ -37,12 +43,26 @@ def encode(attributes: Mapping[str, Mapping[str, Attribute]], datasets: Mapping[
         for path, value in datasets.items():
             writer.write(path, value)
         for path, pairs in attributes.items():
-            node = file.require_group(path) if path else file
+            node = file[path] if path in datasets else file.require_group(path) if path else file
             for key, attribute in pairs.items():
                 node.attrs[key] = attribute
+        _attach(file, scales or {})
         file.flush()
         image: bytes = file.id.get_file_image()
     return image
+
+
+def _attach(file: "h5py.File", scales: Mapping[str, Sequence[str]]) -> None:
+    """Dimension scales, named as their datasets."""
+    made: set[str] = set()
+    for path, names in scales.items():
+        for axis, scale in enumerate(names):
+            if not scale:
+                continue
+            if scale not in made:
+                file[scale].make_scale(scale.split("/")[-1])
+                made.add(scale)
+            file[path].dims[axis].attach_scale(file[scale])
 
 
 def texts(values: Sequence[str]) -> NDArray[np.bytes_]:

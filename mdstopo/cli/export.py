@@ -1,0 +1,43 @@
+"""`mdstopo export`: a result as CSV tables or as JSON."""
+
+from pathlib import Path
+
+import click
+
+from mdstopo.cli.options import FILE
+from mdstopo.cli.output import Output
+
+
+@click.command("export")
+@click.argument("result_path", metavar="RESULT", type=FILE)
+@click.option("--csv", "kind", flag_value="csv", help="Tables: members, iterations, front, trajectories.")
+@click.option("--json", "kind", flag_value="json", help="One JSON document with every dataset.")
+@click.option("--out", type=FILE, metavar="PLACE", help="Folder of the tables, or the JSON file (default: beside it).")
+@click.option("--quiet", "-q", is_flag=True, help="Say nothing but mistakes.")
+def command(result_path: Path, kind: str | None, out: Path | None, quiet: bool) -> int:
+    """Write what a result file holds as --csv tables or as one --json document."""
+    if kind is None:
+        raise click.UsageError("say --csv or --json")
+    from mdstopo.plots.source import case_of
+    from mdstopo.store.errors import StoreError
+    from mdstopo.store.export import as_csv, as_json, tables
+    from mdstopo.store.reader import read_result
+
+    output = Output(json=False, quiet=quiet)
+    view = read_result(result_path, leave_out=("optimizer", "resume", "pareto/tasks", "sweep/tasks", "combine/tasks"))
+    place = out or result_path.with_suffix(f".{kind}")
+    try:
+        if kind == "json":
+            place.parent.mkdir(parents=True, exist_ok=True)
+            with place.open("w", encoding="utf-8") as stream:
+                stream.writelines(as_json(view))
+            output.say(str(place))
+            return 0
+        place.mkdir(parents=True, exist_ok=True)
+        for name, table in tables(view, case_of(view)).items():
+            file = place / f"{name}.csv"
+            file.write_text(as_csv(table), encoding="utf-8")
+            output.say(str(file))
+    except OSError as error:
+        raise StoreError(f"{place}: cannot be written: {error.strerror}") from error
+    return 0

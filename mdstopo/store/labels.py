@@ -1,0 +1,108 @@
+"""Dimension scales and units, so that notebooks open a finished result with its axes named.
+
+HDF5's dimension scales are what netCDF-4 (and so xarray) takes for coordinates: with h5netcdf,
+`xarray.open_dataset("results/fig6.h5", group="trajectories/default", engine="h5netcdf")` gives q over t and coordinate.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.case.units import unit_of_value
+from mdstopo.store.image import Value
+
+Datasets = dict[str, Value]
+
+_KINEMATIC = {"t": "s", "q": "m, rad", "v": "m/s, rad/s", "a": "m/s^2, rad/s^2", "lambda": "N, N m"}
+_AXES = ("x", "y", "psi")
+
+
+@dataclass
+class Labels:
+    """extra: datasets that only are scales; scales: path -> scale of each dimension, by its path or ""; units by path."""
+
+    extra: Datasets = field(default_factory=dict)
+    scales: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)
+
+
+#: what the second dimension of a dataset is, by the dataset's name
+_SECOND = {
+    "objectives": "objective",
+    "peak_time": "objective",
+    "weights": "objective",
+    "utopia": "objective",
+    "maxima": "objective",
+    "constraints": "constraint",
+    "alpha": "member",
+    "lambda": "row",
+    "q": "coordinate",
+    "v": "coordinate",
+    "a": "coordinate",
+}
+
+
+def labels(case: Case, datasets: Mapping[str, Value]) -> Labels:
+    """What a result file's datasets are measured in and run over."""
+    found = Labels()
+    for load_case in case.load_cases:
+        _trajectory(case, f"trajectories/{load_case.name}", datasets, found)
+    _rows(case, "iterations", "iteration", "combined", datasets, found)
+    _rows(case, "pareto", "point", "weights", datasets, found)
+    units = ", ".join(dict.fromkeys(unit_of_value(objective) for objective in case.objectives))
+    for path in ("iterations/objectives", "pareto/objectives", "pareto/utopia", "pareto/maxima"):
+        if path in datasets:
+            found.units[path] = units
+    for path in ("iterations/peak_time", "iterations/seconds", "pareto/seconds"):
+        if path in datasets:
+            found.units[path] = "s"
+    for path in ("members/p", "members/q"):
+        if path in datasets:
+            found.units[path] = "m"
+    return found
+
+
+def _trajectory(case: Case, group: str, datasets: Mapping[str, Value], found: Labels) -> None:
+    for name, unit in _KINEMATIC.items():
+        path = f"{group}/{name}"
+        if path in datasets:
+            found.units[path] = unit
+            if name != "t":
+                found.scales[path] = (f"{group}/t", _second(case, group, name, datasets[path], found))
+    for path in datasets:
+        if path.startswith(f"{group}/reactions/"):
+            found.units[path] = "N, N, N m"
+            found.extra[f"{group}/component"] = ["Fx", "Fy", "M"]
+            found.scales[path] = (f"{group}/t", f"{group}/component")
+
+
+def _rows(case: Case, group: str, scale: str, first: str, datasets: Mapping[str, Value], found: Labels) -> None:
+    """Columns of a group that all have one row for each iterate, or point."""
+    leader = datasets.get(f"{group}/{first}")
+    if not isinstance(leader, np.ndarray):
+        return
+    found.extra[f"{group}/{scale}"] = np.arange(len(leader))
+    for path, value in datasets.items():
+        name = path.removeprefix(f"{group}/")
+        if path == name or "/" in name or not isinstance(value, np.ndarray) or value.ndim not in (1, 2):
+            continue
+        if len(value) == len(leader):
+            second = (_second(case, group, name, value, found),) if value.ndim == 2 else ()
+            found.scales[path] = (f"{group}/{scale}", *second)
+
+
+def _second(case: Case, group: str, name: str, value: Value, found: Labels) -> str:
+    """The scale of a second dimension, made where it is first needed."""
+    assert isinstance(value, np.ndarray)
+    scale = _SECOND.get(name, f"{name}_column")
+    path = f"{group}/{scale}"
+    if path not in found.extra:
+        if scale == "coordinate":
+            found.extra[path] = [f"{body.name}.{axis}" for body in case.bodies for axis in _AXES]
+        elif scale == "objective":
+            found.extra[path] = [objective.name for objective in case.objectives]
+        else:
+            found.extra[path] = np.arange(value.shape[1])
+    return path
