@@ -54,7 +54,7 @@ def alpha_option(function: F) -> F:
         "alpha_path",
         type=FILE,
         metavar="FILE",
-        help="Take the design from a .npy, .txt or result file.",
+        help="Take the design from a .npy, .txt or result file; FRONT.h5:K is point K.",
     )(function)
 
 

@@ -13,16 +13,22 @@ from mdstopo.cli.options import FILE, open_case, out_option, output_options, ove
 from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
     from mdstopo.case.model import Case
-    from mdstopo.front.session import FrontOutcome
+    from mdstopo.front.session import Ask, FrontOutcome
 
 METHODS = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product", "nbi", "nc")
 DEFAULT_CASE = Path("cases/fig7.yaml")
 EXIT = {"converged": 0, "max_iterations": 0, "failed": 1, "interrupted": 3}
 _POINTS = 21
+#: violation, relative to a constraint's bound, from which a point says so
+STATED = 1e-8
+#: the reference point of the hypervolume (`front.content`, which is not imported for this alone)
+REFERENCE = 1.1
 
 
 @click.command("pareto")
@@ -36,7 +42,7 @@ _POINTS = 21
 @click.option("--resume", is_flag=True, help="Continue the front in the result file.")
 @overwrite_option
 @set_option
-@click.option("--starts", type=click.IntRange(1), default=1, metavar="N", help="How many starts for every solve.")
+@click.option("--starts", type=click.IntRange(1), default=None, metavar="N", help="How many starts for every solve.")
 @click.option("--workers", type=click.IntRange(1), metavar="N", help="At most so many processes (default: all cores).")
 @click.option("--cluster", metavar="ADDRESS", help="Workers of a Dask cluster instead, e.g. tcp://host:8786.")
 @output_options
@@ -49,7 +55,7 @@ def command(
     resume: bool,
     overwrite: bool,
     overrides: dict[str, str],
-    starts: int,
+    starts: int | None,
     workers: int | None,
     cluster: str | None,
     as_json: bool,
@@ -64,19 +70,23 @@ def command(
         raise click.UsageError("--resume and --overwrite exclude each other")
     if weights is not None and points is not None:
         raise click.UsageError("--weights and --points exclude each other")
+    if workers is not None and cluster is not None:
+        raise click.UsageError("--workers and --cluster exclude each other")
+    if case_path == DEFAULT_CASE and not case_path.exists():
+        raise click.UsageError(f"no CASE given, and the default, {DEFAULT_CASE}, is not here")
     output = Output(json=as_json, quiet=quiet)
     interrupts = Interrupts(quiet)
     case = open_case(case_path, overrides)
-    from mdstopo.front.session import Ask, check, run_front
+    from mdstopo.front.session import check, run_front
 
     check(case)
-    directions = _directions(case, weights, points)
     line = shlex.join(["mdstopo", *sys.argv[1:]])
     path = result_path(out, case, "pareto")
+    ask = _asked(case, path if resume else None, weights, points, method, starts)
     with front_display(quiet) as show:
         outcome = run_front(
             case,
-            Ask(directions, method or "", starts),
+            ask,
             path=path,
             resume=resume,
             overwrite=overwrite,
@@ -103,6 +113,23 @@ def resumed(line: str) -> str:
     return shlex.join([*words, "--resume"])
 
 
+def _asked(
+    case: "Case", earlier: Path | None, weights: str | None, points: int | None, method: str | None, starts: int | None
+) -> "Ask":
+    """What is to be computed; what is not said is as in the file that is resumed, else as in the case."""
+    from mdstopo.front.session import Ask
+    from mdstopo.store.reader import read_result
+
+    if earlier is not None and earlier.exists():
+        view = read_result(earlier, leave_out=("pareto/tasks", "pareto/visited", "members"))
+        if view.kind == "pareto":
+            method = method or str(view.settings["method"])
+            starts = starts or int(view.settings["starts"])
+            if weights is None and points is None:
+                return Ask(view.array("pareto/weights").astype("f8"), method, starts)
+    return Ask(_directions(case, weights, points), method or "", starts or case.optimizer.starts)
+
+
 def _directions(case: "Case", weights: str | None, points: int | None) -> "NDArray[np.float64]":
     """The points that are asked for, (W, m)."""
     import numpy as np
@@ -125,49 +152,53 @@ def _directions(case: "Case", weights: str | None, points: int | None) -> "NDArr
         raise click.BadParameter(str(error), param_hint="'--points'") from None
 
 
-def front_rows(
-    names: list[str],
-    directions: "NDArray[np.float64]",
-    objectives: "NDArray[np.float64]",
-    status: list[str],
-    dominated: "NDArray[np.bool_]",
-    evaluations: "NDArray[np.int64]",
-) -> list[list[str]]:
-    """A front as a table."""
-    rows = [["point", *(f"weight {name}" for name in names), *names, "status", "evaluations", ""]]
-    rows += [
-        [
-            str(j),
-            *(number(weight, 4) for weight in directions[j]),
-            *(number(value, 7) for value in objectives[j]),
-            status[j].replace("_", " "),
-            str(int(evaluations[j])),
-            "dominated" if dominated[j] else "",
-        ]
-        for j in range(len(directions))
+def front_rows(names: list[str], part: "Mapping[str, Any]") -> list[list[str]]:
+    """A front, as `pareto/...` holds it, as a table."""
+    rows = [["point", *(f"weight {name}" for name in names), *names, "status", "evaluations", "KKT", ""]]
+    for j, status in enumerate(part["status"]):
+        violation = float(part["violation"][j])
+        remarks = ["dominated"] if part["dominated"][j] else []
+        if violation > STATED:
+            remarks.append(f"exceeds a constraint by {violation:.1e} of its bound")
+        rows.append(
+            [
+                str(j),
+                *(number(weight, 4) for weight in part["weights"][j]),
+                *(number(value, 7) for value in part["objectives"][j]),
+                status.replace("_", " "),
+                str(int(part["evaluations"][j])),
+                number(float(part["kkt"][j]), 1),
+                ", ".join(remarks),
+            ]
+        )
+    return rows
+
+
+def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[str, Any]") -> list[list[str]]:
+    """Utopia and maxima that the points were found with, and how good the front is."""
+    rows = [
+        [title, ", ".join(f"{name} {number(value)}" for name, value in zip(names, part[title][0], strict=True))]
+        for title in ("utopia", "maxima")
     ]
+    if "ideal" in part:
+        scale = "; ".join(
+            f"{title} {', '.join(number(value) for value in part[title])}" for title in ("ideal", "nadir")
+        )
+        rows += [
+            ["hypervolume", f"{number(numbers['hypervolume'], 5)} up to {REFERENCE:g} of objectives scaled to {scale}"],
+            ["spacing", f"{number(numbers['spacing'], 3)}, largest gap {number(numbers['largest_gap'], 3)}, scaled"],
+        ]
     return rows
 
 
 def _say(output: Output, outcome: "FrontOutcome") -> None:
     case = outcome.case
     output.say(f"{case.title or case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
-    if outcome.front is not None:
-        from mdstopo.front.content import REFERENCE, front_part
-
-        part: dict[str, Any] = dict(front_part(case, outcome.directions, outcome.front, outcome.tasks))
-        names = [objective.name for objective in case.objectives]
-        columns = [part[f"pareto/{name}"] for name in ("objectives", "status", "dominated", "evaluations")]
-        output.table(front_rows(names, outcome.directions, *columns))
-        rows = [
-            ["utopia", ", ".join(number(value) for value in outcome.front.utopia)],
-            ["maxima", ", ".join(number(value) for value in outcome.front.maxima)],
-            ["hypervolume", f"{number(outcome.quality['hypervolume'], 5)}, reference point {REFERENCE:g} of each "
-                            "objective scaled by these"],
-            ["spacing", f"{number(outcome.quality['spacing'], 3)}, largest gap "
-                        f"{number(outcome.quality['largest_gap'], 3)}"],
-        ]  # fmt: skip
-        output.table(rows)
+    names = [objective.name for objective in case.objectives]
+    part = outcome.part
+    output.table(front_rows(names, part))
+    numbers = {} if outcome.quality is None else outcome.quality.numbers()
+    output.table(quality_rows(names, numbers, part))
     output.table(
         [
             ["method", outcome.method],
@@ -179,8 +210,6 @@ def _say(output: Output, outcome: "FrontOutcome") -> None:
 
 
 def _document(outcome: "FrontOutcome", again: str) -> dict[str, Any]:
-    from mdstopo.front.content import front_part
-
     content: dict[str, Any] = {
         "command": "pareto",
         "case": outcome.case.name,
@@ -194,11 +223,13 @@ def _document(outcome: "FrontOutcome", again: str) -> dict[str, Any]:
         "path": str(outcome.path),
         "warnings": outcome.warnings,
         "resume": again if outcome.status == "interrupted" else None,
-    } | outcome.quality
-    if outcome.front is not None:
-        part = front_part(outcome.case, outcome.directions, outcome.front, outcome.tasks)
-        names = ("objectives", "dominated", "kkt", "violation")
-        content |= {name: part[f"pareto/{name}"] for name in names}
-        content["point_status"] = part["pareto/status"]
-        content["utopia"], content["maxima"] = outcome.front.utopia, outcome.front.maxima
+    }
+    part = outcome.part
+    for name in ("objectives", "dominated", "kkt", "violation"):
+        content[name] = part[name]
+    content["point_status"] = part["status"]
+    content["utopia"], content["maxima"] = part["utopia"][0], part["maxima"][0]
+    if outcome.quality is not None:
+        content |= outcome.quality.numbers()
+        content |= {name: getattr(outcome.quality, name) for name in ("ideal", "nadir", "reference")}
     return content

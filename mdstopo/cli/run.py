@@ -120,6 +120,12 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     for name, value in outcome.objectives.items():
         rows.append([name, f"{number(outcome.initial_objectives[name], 9)} -> {number(value, 9)}"])
         rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in outcome.peaks.get(name, ())]
+    if outcome.combined is not None:
+        rows.append(["combined", f"{number(outcome.combined, 9)} ({case.combine.method if case.combine else ''})"])
+    for title, scale in (("utopia", outcome.utopia), ("maxima", outcome.maxima)):
+        if scale is not None:
+            named = zip(outcome.objectives, scale.tolist(), strict=True)
+            rows.append([f"  {title}", ", ".join(f"{name} {number(value)}" for name, value in named)])
     rows.append(["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"])
     if len(outcome.states) > 1:
         begun = [each for each in outcome.states if each is not None]
@@ -142,9 +148,14 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     import numpy as np
 
     from mdstopo.case.model import VolumeRow
+    from mdstopo.case.units import words
 
     case, lines = outcome.case, []
-    for row in case.constraints:
+    for row, excess in zip(case.constraints, outcome.constraints.tolist(), strict=True):
+        if not isinstance(row, VolumeRow):
+            word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
+            found = f"{number(excess + row.bound, 9)}, {word} {number(row.bound, 9)}"
+            lines.append((f"{row.over_time} {words(row.response)}", found))
         if isinstance(row, VolumeRow):
             used = float(row.coefficients @ outcome.alpha)
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
@@ -173,7 +184,10 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
             for each in outcome.states
         ],
         "best_start": outcome.best_start,
-        "constraints": outcome.history["constraints"][-1],
+        "constraints": outcome.constraints,
+        "combined": outcome.combined,
+        "utopia": outcome.utopia,
+        "maxima": outcome.maxima,
         "integrator": outcome.integrator,
         "integrator_reason": outcome.integrator_reason,
         "seconds": outcome.seconds,

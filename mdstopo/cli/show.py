@@ -104,21 +104,15 @@ def _say_starts(output: Output, view: "ResultView") -> None:
 
 
 def _say_front(output: Output, view: "ResultView") -> None:
-    import numpy as np
+    from mdstopo.cli.pareto import front_rows, quality_rows
 
-    from mdstopo.cli.pareto import front_rows
-
-    part = view.under("pareto")
-    weights = np.asarray(part["weights"], dtype=np.float64)
-    objectives = np.asarray(part["objectives"], dtype=np.float64)
-    marked, counts = np.asarray(part["dominated"], dtype=np.bool_), np.asarray(part["evaluations"], dtype=np.int64)
-    status = list(view.lines("pareto/status"))
-    output.table(front_rows(objective_names(view), weights, objectives, status, marked, counts))
-    for name in ("utopia", "maxima"):
-        output.say(f"{name}: {', '.join(number(value) for value in part[name][0])}")
+    part: dict[str, Any] = {**view.under("pareto"), "status": list(view.lines("pareto/status"))}
+    names, status = objective_names(view), part["status"]
+    output.table(front_rows(names, part))
+    output.table(quality_rows(names, view.settings, part))
     reasons = view.lines("pareto/reason")
     for j, word in enumerate(status):
-        if word != "converged":
+        if word not in ("converged", "running"):
             output.say(f"point {j}: {reasons[j]}")
 
 
@@ -128,8 +122,13 @@ def _say_sweep(output: Output, view: "ResultView") -> None:
     objectives, status = view.array("sweep/objectives"), view.lines("sweep/status")
     rows = [[*keys, *objective_names(view), "status"]]
     for i, word in enumerate(status):
-        rows.append([*(column[i] for column in columns), *(number(value, 7) for value in objectives[i]), word])
+        cells = [*(column[i] for column in columns), *(number(value, 7) for value in objectives[i])]
+        rows.append([*cells, word.replace("_", " ")])
     output.table(rows)
+    reasons = view.lines("sweep/reason")
+    for i, word in enumerate(status):
+        if word == "failed":
+            output.say(f"run {i}: {reasons[i]}")
 
 
 def _say_trajectories(output: Output, view: "ResultView") -> None:
@@ -178,6 +177,9 @@ def _document(view: "ResultView") -> dict[str, Any]:
         for name in ("weights", "objectives", "dominated", "evaluations"):
             content[name] = view.array(f"pareto/{name}")
         content["point_status"] = list(view.lines("pareto/status"))
+        content |= {
+            name: view.arrays[f"pareto/{name}"] for name in ("ideal", "nadir") if f"pareto/{name}" in view.arrays
+        }
     if view.kind == "run" and "iterations/combined" in view.arrays:
         columns = view.under("iterations")
         content["iterations"] = len(columns["combined"]) - 1

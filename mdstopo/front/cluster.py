@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
+from mdstopo._version import __version__
 from mdstopo.front.jobs import Job, Setting, perform
 from mdstopo.front.pool import PATIENCE, Lost
 from mdstopo.session.errors import WorkerError
@@ -24,8 +25,19 @@ def perform_alone(setting: Setting, job: Job) -> Any:
         return perform(setting, job)
 
 
+def _version() -> str:
+    """Of mdstopo where this runs."""
+    try:
+        from mdstopo._version import __version__ as found
+    except ImportError:
+        return ""
+    return str(found)
+
+
 class Cluster:
     """Workers of a running Dask cluster. They need this version of mdstopo."""
+
+    at_once = 0
 
     def __init__(self, setting: Setting, stop: Callable[[], bool], address: str) -> None:
         try:
@@ -35,10 +47,18 @@ class Cluster:
         logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told in our words
         self._stop = stop
         self._address = address
+        if "://" not in address or ":" not in address.split("://")[1]:
+            raise StoreError(f"no Dask scheduler answers at {address}: write it as tcp://host:8786")
         try:
             self._client = Client(address, timeout=10, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
             raise StoreError(f"no Dask scheduler answers at {address}: {error}") from error
+        versions = self._client.run(_version)
+        other = {address: found for address, found in versions.items() if found != __version__}
+        if other:
+            self._client.close()
+            worker, found = next(iter(other.items()))
+            raise StoreError(f"the worker at {worker} has mdstopo {found or 'not at all'}, this is {__version__}")
         # goes with every piece: what is scattered dies with the workers that hold it
         self._setting = setting
 

@@ -5,13 +5,14 @@ that one that was stopped goes on without losing or repeating anything.
 """
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.front.measures import dominated, hypervolume, neighbour_gaps, scaled, spacing
-from mdstopo.front.plan import Front
+from mdstopo.front.plan import TOLERATED, Front
 from mdstopo.front.tasks import Found
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.status import RunStatus
@@ -21,7 +22,7 @@ from mdstopo.store.reader import ResultView
 
 Floats = NDArray[np.float64]
 
-#: the reference point of the hypervolume, in objectives scaled by the front's own utopia and maxima
+#: the reference point of the hypervolume, in objectives scaled to the front's own ideal and nadir
 REFERENCE = 1.1
 _NUMBERS = ("combined", "kkt", "violation", "seconds")
 _COUNTS = ("point", "evaluations")
@@ -29,11 +30,12 @@ _WORDS = ("key", "reason", "host")
 
 
 def tasks_part(found: Iterable[Found], case: Case, place: str = "pareto/tasks") -> Datasets:
-    """Every finished task, at its place in the file."""
-    rows = list(found)
+    """Every finished task that may be used again, at its place in the file; designs one behind the other."""
+    rows = [each for each in found if each.key]
     m = len(case.objectives)
     part: Datasets = {
-        "alpha": np.array([each.alpha for each in rows]).reshape(len(rows), case.n_design),
+        "alpha": np.concatenate([each.alpha for each in rows]) if rows else np.zeros(0),
+        "sizes": np.array([len(each.alpha) for each in rows], dtype=np.int64),
         "objectives": np.array([each.objectives for each in rows]).reshape(len(rows), m),
         "status": [each.status.value for each in rows],
         "visits": np.array([len(each.visited) for each in rows], dtype=np.int64),
@@ -55,14 +57,14 @@ def read_tasks(view: ResultView, place: str = "pareto/tasks") -> dict[str, Found
     found: dict[str, Found] = {}
     if "visits" not in columns:
         return found
-    last = np.cumsum(columns["visits"])
+    last, end = np.cumsum(columns["visits"]), np.cumsum(columns["sizes"])
     try:
         for i, key in enumerate(words["key"]):
             first = int(last[i] - columns["visits"][i])
             found[key] = Found(
                 point=int(columns["point"][i]),
                 key=key,
-                alpha=np.array(columns["alpha"][i], dtype=np.float64),
+                alpha=np.array(columns["alpha"][int(end[i] - columns["sizes"][i]) : int(end[i])], dtype=np.float64),
                 objectives=np.array(columns["objectives"][i], dtype=np.float64),
                 combined=float(columns["combined"][i]),
                 status=RunStatus(words["status"][i]),
@@ -86,7 +88,7 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
     objectives = np.full((w, m), np.nan)
     alpha = np.full((w, case.n_design), np.nan)
     numbers = {name: np.full(w, np.nan) for name in ("kkt", "violation", "seconds")}
-    status, reason = ["failed"] * w, ["nothing could be computed"] * w
+    status, reason = ["running"] * w, ["not solved yet"] * w
     visited: dict[int, list[Floats]] = {}
     count = np.zeros(w, dtype=np.int64)
     # a point that asks for one objective alone is that objective's own optimum
@@ -110,7 +112,7 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
         "alpha": alpha,
         "status": status,
         "reason": reason,
-        "dominated": dominated(signs * objectives),
+        "dominated": _dominated(signs * objectives, numbers["violation"], status),
         "evaluations": count,
         "utopia": np.tile(front.utopia, (w, 1)),
         "maxima": np.tile(front.maxima, (w, 1)),
@@ -122,17 +124,43 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
     return {f"pareto/{name}": value for name, value in part.items()}
 
 
-def quality(case: Case, front: Front) -> dict[str, float]:
-    """Hypervolume (of what lies within utopia and 1.1 times maxima), spacing and largest gap, in scaled objectives."""
+def _dominated(signed: Floats, violation: Floats, status: list[str]) -> NDArray[np.bool_]:
+    """What is beaten by another point that keeps the constraints, or keeps them not itself; not what is still open."""
+    feasible = violation <= TOLERATED
+    beaten = dominated(np.where(feasible[:, None], signed, np.nan))
+    return np.asarray(beaten & (np.array(status) != "running"))
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How good a front is, in objectives scaled so that its best values are 0 and its worst are 1.
+
+    ideal, nadir (m,): these values, raw; reference: the point up to which the hypervolume counts, scaled.
+    """
+
+    hypervolume: float
+    spacing: float
+    largest_gap: float
+    ideal: Floats
+    nadir: Floats
+    reference: float = REFERENCE
+
+    def numbers(self) -> dict[str, float]:
+        """The scalars."""
+        return {"hypervolume": self.hypervolume, "spacing": self.spacing, "largest_gap": self.largest_gap}
+
+
+def quality(case: Case, front: Front) -> Quality:
+    """Of the front's points that keep the constraints and are not dominated."""
     signs = np.array([sign_of(objective) for objective in case.objectives])
-    points = np.array([point.objectives for point in front.points if point is not None and point.usable])
-    if not len(points):
-        return {"hypervolume": 0.0, "spacing": 0.0, "largest_gap": 0.0}
-    inside = scaled(signs * points, signs * front.utopia, signs * front.maxima)
-    kept = inside[~dominated(inside)]
-    gaps = neighbour_gaps(kept)
-    return {
-        "hypervolume": hypervolume(inside, np.full(points.shape[1], REFERENCE)),
-        "spacing": spacing(kept),
-        "largest_gap": float(gaps.max(initial=0.0)),
-    }
+    good = [each for each in front.points if each is not None and each.usable and each.violation <= TOLERATED]
+    points = signs * np.array([each.objectives for each in good]).reshape(len(good), len(signs))
+    kept = points[~dominated(points)]
+    if not len(kept):
+        nothing = np.full(len(signs), np.nan)
+        return Quality(0.0, 0.0, 0.0, nothing, nothing)
+    ideal, nadir = kept.min(axis=0), kept.max(axis=0)
+    inside = scaled(kept, ideal, nadir)
+    volume = hypervolume(inside, np.full(len(signs), REFERENCE))
+    gaps = neighbour_gaps(inside)
+    return Quality(volume, spacing(inside), float(gaps.max(initial=0.0)), signs * ideal, signs * nadir)

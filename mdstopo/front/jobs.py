@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.front.tasks import Found, StoppedError, Task, solve
+from mdstopo.front.tasks import Found, StoppedError, Task, failed, solve
 from mdstopo.session.combining import even, problem_of
 from mdstopo.session.engine import Engine, make_engine
 from mdstopo.session.ready import compile_apart, get_ready
@@ -40,10 +40,21 @@ _engines: OrderedDict[str, Engine] = OrderedDict()
 
 
 def perform(setting: Setting, job: Job, stop: Callable[[], bool] | None = None) -> Any:
-    """The result of one piece. Raises StoppedError where `stop` says so before the end."""
-    if isinstance(job, Trial):
-        return run_trial(job, stop)
-    return solve(ready_engine(setting), setting.case, job, job.key(setting.case_key), stop)
+    """The result of one piece; whatever goes wrong in it is its status, so that it fails nothing else.
+
+    Raises StoppedError where `stop` says so before the end.
+    """
+    try:
+        if isinstance(job, Trial):
+            return run_trial(job, stop)
+        return solve(ready_engine(setting), setting.case, job, job.key(setting.case_key), stop)
+    except StoppedError:
+        raise
+    except Exception as error:
+        words = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+        if isinstance(job, Trial):
+            return failed(0, job.key, job.case.initial, len(job.case.objectives), words)
+        return failed(job.point, job.key(setting.case_key), job.start, len(setting.case.objectives), words)
 
 
 def ready_engine(setting: Setting) -> Engine:
@@ -62,6 +73,7 @@ def ready_engine(setting: Setting) -> Engine:
 def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
     """The whole run of one case of a sweep; mistakes that only it has become its status."""
     from mdstopo.case.errors import CaseError
+    from mdstopo.session.errors import NoUtopiaError
     from mdstopo.session.run import run_session
     from mdstopo.status import RunStatus
 
@@ -72,10 +84,9 @@ def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
     except KeyboardInterrupt as error:
         raise StoppedError from error
     except CaseError as error:
-        return Found(
-            0, trial.key, trial.case.initial, np.full(m, np.nan), float("nan"), RunStatus.FAILED,
-            "; ".join(mistake.message for mistake in error.mistakes), 0, float("nan"), float("nan"), np.zeros((0, m)),
-        )  # fmt: skip
+        return failed(0, trial.key, trial.case.initial, m, "; ".join(mistake.message for mistake in error.mistakes))
+    except NoUtopiaError as error:
+        return failed(0, trial.key, trial.case.initial, m, str(error))
     if outcome.status is RunStatus.INTERRUPTED:
         raise StoppedError
     objectives = np.array([outcome.objectives[each.name] for each in trial.case.objectives])

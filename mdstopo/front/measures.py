@@ -47,11 +47,16 @@ def _volume(points: Floats, reference: Floats) -> float:
             total += (float(reference[0]) - low) * float(upper - points[k, 1])
         return total
     total = 0.0
+    front = np.zeros((0, points.shape[1] - 1))
     for k in range(len(points)):
+        here = points[k, :-1]
+        # only what is not dominated in the slice counts there
+        if not np.any((front <= here).all(axis=1)):
+            front = np.concatenate([front[~(front >= here).all(axis=1)], here[None]])
         upper = points[k + 1, -1] if k + 1 < len(points) else reference[-1]
         height = float(upper - points[k, -1])
         if height > 0.0:
-            total += height * _volume(points[: k + 1, :-1], reference[:-1])
+            total += height * _volume(front, reference[:-1])
     return total
 
 

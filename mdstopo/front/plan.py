@@ -6,7 +6,9 @@
    from the neighbour on the other side.
 3. Exchange: whoever's U is lower at another point's design starts again from that, until nobody gains.
 4. With what has been found utopia and maxima are brought up to date. Every point goes on from its own design, where
-   they changed, and from both neighbours'; and exchange again.
+   they changed, and from both neighbours'; and exchange again. The same again while they still move by much.
+
+Designs that violate constraints come after all that do not, whatever their U, and are no ends.
 """
 
 from collections.abc import Generator
@@ -16,6 +18,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.front.measures import dominated
 from mdstopo.front.tasks import Found, Task
 from mdstopo.optimizer.scalarisation import Scalarisation
 
@@ -23,9 +26,13 @@ Floats = NDArray[np.float64]
 Rounds = Generator[list[Task], list[Found], "Front"]
 Part = Generator[list[Task], list[Found], None]
 
-#: rounds of exchange at most; gain by which another's design is better, relative to U; change of utopia or maxima
-#: (relative to their distance) from which points are solved anew
-EXCHANGES, GAIN, MOVED = 6, 1e-6, 1e-6
+#: rounds of exchange at most; gain by which another's design is better, relative to U (to the violation)
+EXCHANGES, GAIN, LESS = 6, 1e-6, 1e-3
+#: rounds of refinement at most; change of utopia or maxima, relative to their distance, from which points are solved
+#: anew the first time, and in further rounds
+REFINEMENTS, MOVED, MOVED_AGAIN = 4, 1e-6, 1e-3
+#: violation of a constraint, relative to its bound, up to which a design counts as feasible here
+TOLERATED = 1e-6
 #: methods that weigh, and those that spread points evenly
 WEIGHING = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product")
 SPREADING = ("nbi", "nc")
@@ -36,7 +43,7 @@ class Request:
     """A front: directions (W, m), weights or anchors; method; exponent p and whether to normalise (Eq. 24).
 
     signs (m,): -1 for what is to be maximised. starts (S, N): the first design, then further ones; iterations: of each
-    solve.
+    solve. active: the objectives that take part, by place; all where empty.
     """
 
     directions: Floats
@@ -46,6 +53,7 @@ class Request:
     signs: Floats
     starts: Floats
     iterations: int
+    active: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,7 +84,11 @@ class Planner:
     def __init__(self, request: Request) -> None:
         self.request = request
         self.count, self.m = request.directions.shape
+        self.active = request.active or tuple(range(self.m))
+        #: all usable results, and their signed objectives (K, m) and violations (K,) beyond what is tolerated
         self.known: list[Found] = []
+        self.table = np.zeros((0, self.m))
+        self.beyond = np.zeros(0)
         self.ends: list[Found] = []
         self.lowest = np.zeros(self.m)
         self.highest = np.ones(self.m)
@@ -89,8 +101,12 @@ class Planner:
         yield from self._ends()
         yield from self._between()
         yield from self._exchange()
-        yield from self._refine()
-        yield from self._exchange()
+        for k in range(REFINEMENTS):
+            moved = self._moves(MOVED if k == 0 else MOVED_AGAIN)
+            if k > 0 and not moved:
+                break
+            yield from self._refine(moved)
+            yield from self._exchange()
         self._improve_ends()
         points = tuple(self.best.get(j) for j in range(self.count))
         signs = self.request.signs
@@ -107,7 +123,7 @@ class Planner:
         found = yield self._new(
             [
                 Task(-1 - i, alone[i], start, self.request.iterations)
-                for i in range(self.m)
+                for i in self.active
                 for start in self.request.starts
             ]
         )
@@ -115,13 +131,13 @@ class Planner:
         self._choose_ends(found)
         crossed = [
             Task(-1 - i, alone[i], other.alpha, self.request.iterations)
-            for i in range(self.m)
+            for i in self.active
             for k, other in enumerate(self.ends)
-            if k != i
+            if k != i and k in self.active
         ]
         found = yield self._new(crossed)
         self._learn(found)
-        self._measure()
+        self._moves(0.0)
 
     def _between(self) -> Part:
         for j in range(self.count):
@@ -147,18 +163,24 @@ class Planner:
         for _ in range(EXCHANGES):
             tasks = []
             for j in range(self.count):
-                own = self._value(j, self.best[j])
-                values = [self._value(j, other) for other in self.known]
-                k = int(np.argmin(values))
-                if not own <= values[k] + GAIN * abs(values[k]):
+                values = self._values(j, self.table)
+                k = self._best_of(values, self.beyond)
+                own = self.best[j]
+                if not own.usable:
+                    better = True
+                else:
+                    beyond = _beyond(own)
+                    value = float(self._values(j, self._signed(own)[None])[0])
+                    gain = value > values[k] + GAIN * abs(values[k])
+                    better = beyond > (1.0 + LESS) * self.beyond[k] if beyond > 0.0 else bool(gain)
+                if better:
                     tasks.append(self._task(j, self.known[k].alpha))
             tasks = self._new(tasks)
             if not tasks:
                 return
             self._learn((yield tasks))
 
-    def _refine(self) -> Part:
-        moved = self._measure()
+    def _refine(self, moved: bool) -> Part:
         tasks = []
         for j in range(self.count):
             if self._vertex(j) >= 0:
@@ -170,6 +192,8 @@ class Planner:
             # U has changed: what was found under the old one is no longer anybody's best
             self.best = {j: found for j, found in self.best.items() if self._vertex(j) >= 0}
         tasks = self._new(tasks, again=moved)
+        if not tasks:
+            return
         found = yield tasks
         self._learn(found)
         for j in range(self.count):
@@ -180,57 +204,66 @@ class Planner:
 
     def _learn(self, found: list[Found]) -> None:
         """Take results in: they are known to everybody, and the best of its point is that point's."""
-        for each in found:
-            if not each.usable:
-                continue
-            self.known.append(each)
+        new = [each for each in found if each.usable]
+        if new:
+            self.known += new
+            self.table = np.concatenate([self.table, [self._signed(each) for each in new]])
+            self.beyond = np.concatenate([self.beyond, [_beyond(each) for each in new]])
+        for each in new:
             if each.point < 0:
                 continue
             before = self.best.get(each.point)
-            if before is None or not before.usable or self._value(each.point, each) < self._value(each.point, before):
+            if before is None or not before.usable:
+                self.best[each.point] = each
+                continue
+            pair = np.array([self._signed(before), self._signed(each)])
+            if self._best_of(self._values(each.point, pair), np.array([_beyond(before), _beyond(each)])) == 1:
                 self.best[each.point] = each
 
     def _choose_ends(self, found: list[Found]) -> None:
-        self.ends = []
-        for i in range(self.m):
-            if not any(each.usable for each in found if each.point == -1 - i):
-                raise NoEndError(i, next(each for each in found if each.point == -1 - i))
-            self.ends.append(min(self.known, key=lambda each: float(self._signed(each)[i])))
+        if not self.known:  # where one objective alone fails, another's optimum is an end, and the crossed start
+            raise NoEndError(-1 - found[0].point, found[0])
+        self._improve_ends()
 
     def _improve_ends(self) -> None:
         """The ends are the best of their objective."""
-        self.ends = [min(self.known, key=lambda each, i=i: float(self._signed(each)[i])) for i in range(self.m)]  # type: ignore[misc]
+        self.ends = [self.known[self._best_of(self.table[:, i], self.beyond)] for i in range(self.m)]
 
-    def _measure(self) -> bool:
-        """Utopia and maxima from all that is known; whether they have moved.
+    def _moves(self, much: float) -> bool:
+        """Bring utopia and maxima up to date, where they have moved by more than `much` of their distance.
 
-        The maxima are those over the ends: a front runs between its ends.
+        The maxima are those over the ends; of three objectives and more also those over the front so far, which may
+        reach beyond. What has moved by less stays, so that they are what all points were solved with.
         """
-        before = self.lowest, self.highest
         self._improve_ends()
-        table = np.array([self._signed(end) for end in self.ends])
-        self.lowest = table.min(axis=0)
-        self.highest = table.max(axis=0)
+        table = np.array([self._signed(self.ends[i]) for i in self.active])
+        lowest, highest = table.min(axis=0), table.max(axis=0)
+        if self.m > 2:
+            points = np.array([self._signed(each) for each in self.best.values() if each.usable and not _beyond(each)])
+            if len(points):
+                highest = np.maximum(highest, points[~dominated(points)].max(axis=0))
         # objectives that agree have no width to be measured in
-        flat = ~(self.highest - self.lowest > 1e-12 * np.abs(self.highest))
-        self.highest = np.where(flat, self.lowest + 1.0, self.highest)
-        width = self.highest - self.lowest
-        return bool(
-            np.any(np.abs(self.lowest - before[0]) > MOVED * width)
-            or np.any(np.abs(self.highest - before[1]) > MOVED * width)
-        )
+        flat = ~(highest - lowest > 1e-12 * np.abs(highest))
+        highest = np.where(flat, lowest + 1.0, highest)
+        limit = much * (highest - lowest)
+        moved = bool(np.any(np.abs(lowest - self.lowest) > limit) or np.any(np.abs(highest - self.highest) > limit))
+        if moved:
+            self.lowest, self.highest = lowest, highest
+        return moved
 
     def _signed(self, found: Found) -> Floats:
         return self.request.signs * found.objectives
 
-    def _value(self, j: int, found: Found) -> float:
-        """U of point j at a design; infinite where it has none. With planes (nc), what violates them costs a lot."""
-        if not found.usable:
-            return float("inf")
+    def _values(self, j: int, table: Floats) -> Floats:
+        """U (K,) of point j at objectives (K, m); infinite where it has none. What violates planes (nc) costs a lot."""
         one = self.scalarisation(j)
-        signed = self._signed(found)
-        value = one.value(signed) + 1e3 * float(np.maximum(one.excess(signed), 0.0).sum())
-        return value if np.isfinite(value) else float("inf")
+        values = one.values(table) + 1e3 * one.excesses(table)
+        return np.where(np.isfinite(values), values, np.inf)
+
+    @staticmethod
+    def _best_of(values: Floats, beyond: Floats) -> int:
+        """The least violation beyond what is tolerated, among equals the lowest value, then the first."""
+        return int(np.lexsort((np.arange(len(values)), values, beyond))[0])
 
     # scalarisations
 
@@ -309,7 +342,7 @@ class Planner:
         if self.m > 2 or len(sides) < 2:
             order = np.argsort([float(np.linalg.norm(np.eye(self.m)[i] - position)) for i in range(self.m)])
             sides += [self.ends[i].alpha for i in order.tolist()]
-        best = min(self.known, key=lambda each: self._value(j, each))
+        best = self.known[self._best_of(self._values(j, self.table), self.beyond)]
         if any(np.array_equal(best.alpha, side) for side in sides[:2]):
             return sides[:2]
         return [best.alpha, sides[0]]
@@ -325,3 +358,11 @@ class Planner:
             return sides + ([min(above, key=lambda k: float(directions[k, 0]))] if above else [])
         order = sorted(among, key=lambda k: (float(np.linalg.norm(directions[k] - directions[j])), k))
         return order[: self.m]
+
+
+def _beyond(found: Found) -> float:
+    """A design's violation beyond what is tolerated; infinite where it is not known."""
+    violation = found.violation
+    if not np.isfinite(violation):
+        return float("inf")
+    return violation if violation > TOLERATED else 0.0

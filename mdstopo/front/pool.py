@@ -5,7 +5,6 @@ the piece. Workers are fresh interpreters that ignore the terminal's Ctrl-C and 
 dies is replaced once for each piece it had; then the piece comes back as an error.
 """
 
-import os
 import queue
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -27,7 +26,12 @@ class Lost:
 
 
 class Pool(Protocol):
-    """Does pieces of work. `results` yields (place, result) as they are done, and ends early where it is to stop."""
+    """Does pieces of work. `results` yields (place, result) as they are done, and ends early where it is to stop.
+
+    at_once: how many pieces are worked on together; 0 where that is not known.
+    """
+
+    at_once: int
 
     def results(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]: ...
     def close(self) -> None: ...
@@ -35,6 +39,8 @@ class Pool(Protocol):
 
 class Here:
     """One piece after the other, in this process."""
+
+    at_once = 1
 
     def __init__(self, setting: Setting, stop: Callable[[], bool]) -> None:
         self._setting = setting
@@ -61,7 +67,7 @@ class Processes:
     def __init__(self, setting: Setting, stop: Callable[[], bool], workers: int) -> None:
         self._setting = setting
         self._stop = stop
-        self._workers = workers
+        self._workers = self.at_once = workers
         self._crew: list[WorkerProcess] = []
         self._inbox: queue.Queue[tuple[WorkerProcess, Any]] = queue.Queue()
 
@@ -107,8 +113,3 @@ class Processes:
         for worker in self._crew:
             worker.kill()
         self._crew = []
-
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

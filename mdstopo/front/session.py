@@ -1,31 +1,32 @@
 """A front from its request to its file: plan, solve what is not solved yet, keep, and go on."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.front.content import front_part, quality, read_tasks, tasks_part
+from mdstopo.front.content import Quality, front_part, quality, read_tasks, tasks_part
 from mdstopo.front.jobs import Setting, perform
 from mdstopo.front.plan import Front, NoEndError, Planner, Request
-from mdstopo.front.pool import Here, Lost, Pool, Processes, cores
-from mdstopo.front.tasks import Found, StoppedError, Task, case_key
+from mdstopo.front.pool import Here, Lost, Pool, Processes
+from mdstopo.front.tasks import Found, StoppedError, Task, case_key, failed
 from mdstopo.optimizer.starts import random_feasible
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.combining import even
+from mdstopo.session.crew import cores
 from mdstopo.session.engine import make_engine
-from mdstopo.session.errors import WorkerError
 from mdstopo.session.ready import compile_apart
-from mdstopo.session.starts import first_design
+from mdstopo.session.starts import first_design, replaced
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
-from mdstopo.store.checkpoint import Checkpointer
+from mdstopo.store.checkpoint import INTERVAL, Checkpointer
 from mdstopo.store.contents import Datasets, case_part, result_image
 from mdstopo.store.errors import WriteError
 from mdstopo.store.lock import Lock
@@ -66,7 +67,10 @@ class Snapshot:
 
 @dataclass(frozen=True)
 class FrontOutcome:
-    """A front that has ended, or was stopped. tasks: all that were solved, in the plan's order."""
+    """A front that has ended, or was stopped.
+
+    tasks: all that were solved, in the plan's order. part: the front as the file has it under `pareto`.
+    """
 
     case: Case
     directions: Floats
@@ -76,7 +80,8 @@ class FrontOutcome:
     reason: str
     tasks: tuple[Found, ...]
     evaluations: int
-    quality: dict[str, float]
+    quality: Quality | None
+    part: Mapping[str, Any]
     seconds: float
     path: Path | None
     warnings: tuple[str, ...] = field(default=())
@@ -101,9 +106,12 @@ def run_front(
 
     workers: processes at most (default: one a core); they are started where there is work for more than `worth`
     seconds. cluster: the address of a Dask scheduler instead. No result depends on either.
-    Raises CaseError where the case is no front that can be computed, StoreError for an unusable file.
+    Raises CaseError where the case is no front that can be computed, StoreError for an unusable file, ValueError for a
+    direction that is given twice.
     """
     check(case)
+    if len(np.unique(ask.directions, axis=0)) < len(ask.directions):
+        raise ValueError("a direction is given twice")
     run = _FrontRun(case, ask, on_progress or _ignore, stop_requested or _never, notify or _ignore, command)
     if path is None:
         return run.go(None, workers, cluster, worth)
@@ -170,22 +178,25 @@ class _FrontRun:
             status, reason = verdict(front)
         except StoppedError:
             pass
-        except WorkerError as error:
-            if path is not None:
-                self.save(path, status, str(error), None)
-            raise
         except NoEndError as error:
             name = self.case.objectives[error.place].name
             status, reason = RunStatus.FAILED, f"objective {name} alone cannot be optimised: {error}"
+        except Exception as error:  # what is finished is worth keeping, whatever it is that cannot go on
+            if path is not None:
+                self.save(path, status, str(error) or type(error).__name__, None)
+            raise
         finally:
             if self.pool is not None:
                 self.pool.close()
+        self.quality = quality(self.case, front) if front is not None else None
         if path is not None:
             self.save(path, status, reason, front)
         tasks = tuple(self.taken.values())
+        part = front_part(self.case, self.ask.directions, front if front is not None else self.so_far(), tasks)
         return FrontOutcome(
             self.case, self.ask.directions, self.method, front, status, reason, tasks,
-            sum(each.evaluations for each in tasks), quality(self.case, front) if front is not None else {},
+            sum(each.evaluations for each in tasks), self.quality,
+            {name.removeprefix("pareto/"): value for name, value in part.items()},
             time.perf_counter() - began, path, self.warnings,
         )  # fmt: skip
 
@@ -193,7 +204,9 @@ class _FrontRun:
         """The plan's request, with the designs to begin with."""
         assert self.case.combine is not None
         problem = make_engine(self.case).problem(even(self.case))
-        _, first = first_design(self.case, problem, None)
+        stated, first = first_design(self.case, problem, None)
+        if not np.array_equal(stated, first):
+            self.notify(replaced(stated, first))
         more = [random_feasible(problem, self.case.optimizer.seed, k) for k in range(1, self.ask.starts)]
         combine = self.case.combine
         return Request(
@@ -221,11 +234,11 @@ class _FrontRun:
             if self.pool is None:
                 self.pool = self.choose_pool(tasks[due[0]])
             running = {i: tasks[i].point for i in due}
-            self.tell(running)
+            self.tell(running)  # the first of them, as many as there are workers
             for place, result in self.pool.results([tasks[i] for i in due]):
                 i = due[place]
                 running.pop(i)
-                self.keep(keys[i], lost(tasks[i], keys[i], result) if isinstance(result, Lost) else result, running)
+                self.keep(keys[i], self.lost(tasks[i], result) if isinstance(result, Lost) else result, running)
             if running:
                 raise StoppedError
         for key in keys:
@@ -242,16 +255,21 @@ class _FrontRun:
         if wanted > 1:
             look = perform(self.setting, replace(task, iterations=LOOK), self.stop)
             left = look.seconds / max(look.evaluations, 1) * EVALUATIONS * TASKS * len(self.ask.directions)
+            left *= 1.0 - min(len(self.solved) / (TASKS * len(self.ask.directions)), 1.0)
             if left > self.worth:
                 return Processes(self.setting, self.stop, wanted)
         return Here(self.setting, self.stop)
+
+    def lost(self, task: Task, result: Lost) -> Found:
+        """What stands for a task that no worker finished; its key is empty, so that a resumed front tries again."""
+        return failed(task.point, "", task.start, len(self.case.objectives), result.reason)
 
     def keep(self, key: str, found: Found, running: dict[int, int]) -> None:
         """Take a result in, and write it."""
         self.solved[key] = found
         self.tell(running)
         if self.saver is not None:
-            self.saver.offer()
+            self.saver.offer(urgent=found.seconds > INTERVAL)
 
     def tell(self, running: dict[int, int]) -> None:
         """Progress."""
@@ -262,16 +280,16 @@ class _FrontRun:
         for each in done:
             if each.point >= 0 and each.usable:
                 best.setdefault(each.point, each)
-        at_once = (self.workers or cores()) if isinstance(self.pool, Processes) else 1
+        at_once = self.pool.at_once if self.pool is not None else 1
         self.on_progress(
             Snapshot(
                 self.ask.directions,
                 tuple(objective.name for objective in self.case.objectives),
                 best,
-                tuple(sorted({point for point in running.values() if point >= 0})),
+                tuple(sorted({point for point in list(running.values())[: at_once or None] if point >= 0})),
                 len(done),
                 sum(each.evaluations for each in done),
-                max(expected - len(done), len(running)) * mean / at_once,
+                max(expected - len(done), len(running)) * mean / max(at_once, 1),
             )
         )
 
@@ -308,11 +326,12 @@ class _FrontRun:
         datasets = self.fixed | tasks_part(tasks, self.case)
         settings = dict(self.settings)
         if front is None:
-            now = Front(tuple(self.planner.best.get(j) for j in range(len(self.ask.directions))), (), *self.measures())
-            datasets |= front_part(self.case, self.ask.directions, now, tasks)
+            datasets |= front_part(self.case, self.ask.directions, self.so_far(), tasks)
         else:
             datasets |= front_part(self.case, self.ask.directions, front, tasks)
-            settings |= quality(self.case, front)
+            assert self.quality is not None
+            settings |= self.quality.numbers()
+            datasets |= {"pareto/ideal": self.quality.ideal, "pareto/nadir": self.quality.nadir}
         replace_file(
             path,
             result_image(
@@ -320,19 +339,12 @@ class _FrontRun:
             ),
         )  # fmt: skip
 
-    def measures(self) -> tuple[Floats, Floats]:
-        """Utopia and maxima so far, raw."""
-        signs = self.planner.request.signs
-        return signs * self.planner.lowest, signs * self.planner.highest
-
-
-def lost(task: Task, key: str, result: Lost) -> Found:
-    """What stands for a task that no worker finished."""
-    m = len(task.scalarisation.weights)
-    return Found(
-        task.point, key, task.start, np.full(m, np.nan), float("nan"), RunStatus.FAILED, result.reason, 0, float("nan"),
-        float("nan"), np.zeros((0, m)),
-    )  # fmt: skip
+    def so_far(self) -> Front:
+        """What the plan has reached; utopia and maxima are not known before the ends are."""
+        planner = self.planner
+        known = planner.request.signs if planner.ends else np.full(planner.m, np.nan)
+        points = tuple(planner.best.get(j) for j in range(len(self.ask.directions)))
+        return Front(points, tuple(planner.ends), known * planner.lowest, known * planner.highest)
 
 
 def verdict(front: Front) -> tuple[RunStatus, str]:

@@ -14,15 +14,15 @@ from mdstopo.case.reader import load_case
 from mdstopo.front.content import read_tasks, tasks_part
 from mdstopo.front.directions import MOST, parse_range
 from mdstopo.front.jobs import Setting, Trial
-from mdstopo.front.pool import Here, Lost, Pool, Processes, cores
+from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.session import WORTH, Snapshot
-from mdstopo.front.tasks import Found, case_key
-from mdstopo.session.errors import WorkerError
+from mdstopo.front.tasks import Found, case_key, failed
+from mdstopo.session.crew import cores
 from mdstopo.session.ready import compile_apart
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
-from mdstopo.store.checkpoint import Checkpointer
+from mdstopo.store.checkpoint import INTERVAL, Checkpointer
 from mdstopo.store.contents import Datasets, case_part, result_image
 from mdstopo.store.errors import WriteError
 from mdstopo.store.lock import Lock
@@ -48,7 +48,7 @@ def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
     columns = []
     for key, text in sets.items():
         if ":" in text:
-            columns.append([f"{value:.17g}" for value in parse_range(text)])
+            columns.append([repr(value) for value in parse_range(text)])
         else:
             columns.append([word.strip() for word in text.split(",")])
         if "" in columns[-1]:
@@ -118,10 +118,10 @@ def run_sweep(
                 for k, result in pool.results(jobs):
                     i = due[k]
                     count += 1
-                    sweep.solved[sweep.runs[i]] = _lost(cases[i], sweep.runs[i]) if isinstance(result, Lost) else result
+                    sweep.solved[sweep.runs[i]] = lost(cases[i], result) if isinstance(result, Lost) else result
                     if on_progress is not None:
                         on_progress(sweep.snapshot())
-                    saver.offer()
+                    saver.offer(urgent=sweep.solved[sweep.runs[i]].seconds > INTERVAL)
                 if count < len(jobs):
                     break
                 due = [i for i in due if sweep.runs[i] not in sweep.solved]
@@ -129,8 +129,8 @@ def run_sweep(
                     spent = sum(each.seconds for each in sweep.solved.values()) / max(len(sweep.solved), 1)
                     if spent * len(due) > worth:
                         pool = Processes(setting, stop, wanted)
-        except WorkerError as error:
-            sweep.save(place, RunStatus.INTERRUPTED, str(error))
+        except Exception as error:  # what is finished is worth keeping, whatever it is that cannot go on
+            sweep.save(place, RunStatus.INTERRUPTED, str(error) or type(error).__name__)
             raise
         finally:
             if pool is not None:
@@ -212,22 +212,16 @@ class _Sweep:
         for k, key in enumerate(self.keys):
             part[f"values/{key}"] = [row[k] for row in self.values]
         tasks = [each for each in done if each is not None]
-        alike = len({len(each.alpha) for each in tasks}) <= 1
         part |= {f"alpha/{i}": each.alpha for i, each in enumerate(done) if each is not None}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
-        if alike and tasks and len(tasks[0].alpha) == self.base.n_design:
-            datasets |= tasks_part(tasks, self.base, "sweep/tasks")
+        datasets |= tasks_part(tasks, self.base, "sweep/tasks")
         image = result_image(self.base, "sweep", status.value, reason, datasets, self.provenance, {}, ())
         replace_file(path, image)
 
 
-def _lost(case: Case, key: str) -> Found:
-    m = len(case.objectives)
-    nothing = np.full(m, np.nan)
-    return Found(
-        0, key, case.initial, nothing, float("nan"), RunStatus.FAILED, Lost.reason, 0, float("nan"), float("nan"),
-        np.zeros((0, m)),
-    )  # fmt: skip
+def lost(case: Case, result: Lost) -> Found:
+    """What stands for a run that no worker finished; its key is empty, so that a resumed sweep tries again."""
+    return failed(0, "", case.initial, len(case.objectives), result.reason)
 
 
 def _ignore(_: object) -> None:

@@ -50,8 +50,10 @@ class Found:
     """What a task has found.
 
     alpha (N,): its best design; objectives (m,): all raw G there, NaN where it could not be evaluated; combined: U;
-    visited (K, m): raw G of every iterate, NaN of objectives that were not simulated; kkt: the projected residual at
-    the end, relative to the largest gradient entry; violation: the largest excess over a constraint, in its own unit.
+    visited (K, m): raw G of every iterate, NaN of objectives that were not simulated; the last row is the design that
+    is kept and has all. kkt: the projected residual at the last iterate, relative to the largest gradient entry, NaN
+    where another design is kept; violation: the largest excess over a constraint, relative to its bound. key: empty for
+    what is not to be used again (a lost one).
     """
 
     point: int
@@ -79,6 +81,15 @@ def case_key(case: Case) -> str:
     return hashlib.blake2b(f"{__version__}\n{describe(case)}".encode(), digest_size=16).hexdigest()
 
 
+def failed(point: int, key: str, alpha: Floats, m: int, reason: str) -> Found:
+    """What stands for a task that came to nothing."""
+    nothing = np.full(m, np.nan)
+    return Found(
+        point, key, alpha, nothing, float("nan"), RunStatus.FAILED, reason, 0, float("nan"), float("nan"),
+        np.zeros((0, m)),
+    )  # fmt: skip
+
+
 class StoppedError(Exception):
     """A task was left in the middle."""
 
@@ -100,12 +111,17 @@ def solve(engine: Engine, case: Case, task: Task, key: str, stop: Callable[[], b
         raise StoppedError
     visited = np.array(state.history.info["objectives"]).reshape(-1, len(case.objectives))
     objectives, excess = _final(engine, case, state.best_alpha)
+    kept = np.array_equal(state.best_alpha, state.alpha)
+    if not kept or not len(visited):
+        visited = np.concatenate([visited, objectives[None]])
+    visited[-1] = objectives
     status, reason = state.status, state.reason
     if status is not RunStatus.FAILED and not np.isfinite(objectives).all():
         status, reason = RunStatus.FAILED, "the design that was found cannot be evaluated in every load case"
     return Found(
         task.point, key, state.best_alpha, objectives, float(state.best_objective), status, reason,
-        int(state.evaluations), float(state.kkt), excess, visited, time.perf_counter() - began, platform.node(),
+        int(state.evaluations), float(state.kkt) if kept else float("nan"), excess, visited,
+        time.perf_counter() - began, platform.node(),
     )  # fmt: skip
 
 
@@ -115,5 +131,6 @@ def _final(engine: Engine, case: Case, alpha: Floats) -> tuple[Floats, float]:
     values = np.array([evaluation.objectives[objective.name] for objective in case.objectives])
     worst = 0.0
     for row, excess in zip(case.constraints, evaluation.constraints.tolist(), strict=True):
-        worst = max(worst, {"limit": excess, "at_least": -excess, "equals": abs(excess)}[row.sense])
+        own = {"limit": excess, "at_least": -excess, "equals": abs(excess)}[row.sense] / (abs(row.bound) or 1.0)
+        worst = own if not own <= worst else worst  # what is not known stays so
     return values, worst

@@ -2,28 +2,40 @@
 
 import os
 import pickle
+import queue
 import signal
 import sys
-
-from mdstopo.front.jobs import perform
+import threading
+from typing import IO, Any
 
 
 def main() -> None:
     """Read what all pieces have in common, then one piece after another, until the input is closed."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
+    from mdstopo.front.jobs import perform
+
     # Whatever prints by mistake must not disturb the messages.
     output = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    source = sys.stdin.buffer
+    inbox: queue.Queue[Any] = queue.Queue()
+    threading.Thread(target=_listen, args=(sys.stdin.buffer, inbox), daemon=True).start()
+    setting = inbox.get()
     try:
-        setting = pickle.load(source)
         while True:
-            result = perform(setting, pickle.load(source))
+            result = perform(setting, inbox.get())
             pickle.dump(result, output)
             output.flush()
-    except (EOFError, BrokenPipeError):
-        os._exit(0)  # the parent wants no more, or is gone
+    except BrokenPipeError:
+        os._exit(0)
+
+
+def _listen(source: IO[bytes], inbox: "queue.Queue[Any]") -> None:
+    try:
+        while True:
+            inbox.put(pickle.load(source))
+    except EOFError:
+        os._exit(0)  # the parent wants no more, or is gone: in the middle of a piece, too
 
 
 if __name__ == "__main__":

@@ -123,6 +123,8 @@ def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, s
             f"actual and predicted decrease were both below {share:.2g} of the objective twice running"
         )
     if move <= settings.number("change_tolerance"):
+        if move == 0.0:
+            return RunStatus.CONVERGED, "no step is left that would change a variable"
         return RunStatus.CONVERGED, (f"the next step would change no variable by more than {move:.2g} of its range")
     if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, f"the limit of {settings.max_iterations} iterations was reached"

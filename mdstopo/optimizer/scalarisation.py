@@ -65,18 +65,35 @@ class Scalarisation:
         width = float(self.highest[i] - self.lowest[i])
         return (values - self.lowest[i]) / width, 1.0 / width
 
-    def value(self, signed: Floats) -> float:
-        """U of one value (m,) each; NaN where it has none. Constraint rows of nc are not part of it."""
-        if self.method == "weighted_product" and np.any(signed[self.active] <= 0.0):
-            return float("nan")
-        return float(self.rows([(signed[i : i + 1], np.zeros((0, 0))) for i in self.active])[0][0])
+    def values(self, signed: Floats) -> Floats:
+        """U (K,) of designs with one value (K, m) each; NaN where there is none. Planes of nc are not part of it."""
+        active = self.active
+        raw, weights = signed[:, active], self.weights[active]
+        if self.method == "weighted_product":
+            with np.errstate(invalid="ignore", divide="ignore"):
+                logs = np.log(np.where(raw > 0.0, raw, np.nan))
+            return np.asarray(np.exp(logs @ weights))
+        g = self._transformed_all(signed)[:, active]
+        if self.method == "nbi":
+            return np.asarray((1.0 + (g - self.anchor) / self.normal).max(axis=1))
+        if self.method == "nc":
+            return np.asarray(g[:, -1])
+        if self.method == "weighted_min_max":
+            return np.asarray((weights * g).max(axis=1))
+        p = 1.0 if self.method == "weighted_sum" else self.exponent
+        return np.asarray((weights * np.sign(g) * np.abs(g) ** p).sum(axis=1))
 
-    def excess(self, signed: Floats) -> Floats:
-        """By how much values (m,) exceed each plane of nc, (c,); feasible where <= 0."""
+    def excesses(self, signed: Floats) -> Floats:
+        """By how much values (K, m) exceed the planes of nc, (K,) added up; 0 where feasible."""
         if not len(self.planes):
-            return np.zeros(0)
-        g = np.array([float(self.transformed(signed[i : i + 1], i)[0][0]) for i in range(len(signed))])
-        return np.asarray(self.planes @ (g - self.anchor))
+            return np.zeros(len(signed))
+        beyond = (self._transformed_all(signed) - self.anchor) @ self.planes.T
+        return np.asarray(np.maximum(beyond, 0.0).sum(axis=1))
+
+    def _transformed_all(self, signed: Floats) -> Floats:
+        if self.lowest is None or self.highest is None:
+            return signed
+        return np.asarray((signed - self.lowest) / (self.highest - self.lowest))
 
     def rows(self, parts: Sequence[Part]) -> tuple[Floats, Floats]:
         """Rows (R,), highest first, and gradients (R, N), from the active objectives' parts.

@@ -85,7 +85,7 @@ class StructureProblem:
         chosen = peaks if _compete(objective, sign) else peaks[:1]
         values = sign * np.array([peak.value for peak in chosen])
         slopes = [sign * peak.gradient for peak in chosen if peak.gradient is not None]
-        return values, np.array(slopes).reshape(len(slopes), -1)
+        return values, np.array(slopes).reshape(len(slopes), len(self.initial))
 
     def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats]:
         """Rows and gradients of the constraints on responses, feasible where <= 0, relative to their bounds.

@@ -36,13 +36,16 @@ class Combining:
         self.case = case
         #: finished solves by key
         self.solved: dict[str, Found] = {}
+        self.used: set[str] = set()
+        #: those of an earlier process whose iterates go on: they stay, whatever options have changed
+        self.fixed: tuple[Floats, Floats] | None = None
         self.utopia: Floats | None = None
         self.maxima: Floats | None = None
 
     @property
     def evaluations(self) -> int:
         """Designs that were evaluated for it."""
-        return sum(found.evaluations for found in self.solved.values())
+        return sum(self.solved[key].evaluations for key in self.used)
 
     def scalarisation(
         self, engine: Engine, first: Floats, keep: Callable[[], None], stop: Callable[[], bool]
@@ -61,9 +64,14 @@ class Combining:
         if not combine.normalize or combine.method == "weighted_product":
             return Scalarisation(combine.method, weights, exponent=combine.exponent)
         signs = np.array([sign_of(objective) for objective in case.objectives])
+        if self.fixed is not None:
+            self.utopia, self.maxima = self.fixed
+            self.used = set(self.solved)
+            return Scalarisation(combine.method, weights, signs * self.utopia, signs * self.maxima, combine.exponent)
+        active = tuple(np.flatnonzero(weights > 0.0).tolist())
         request = Request(
             np.zeros((0, len(weights))), combine.method, combine.exponent, True, signs, first[None],
-            case.optimizer.max_iterations,
+            case.optimizer.max_iterations, active,
         )  # fmt: skip
         planner = Planner(request)
         rounds = planner.ends_alone()
@@ -79,6 +87,7 @@ class Combining:
                             raise StoppedError
                         self.solved[key] = solve(engine, case, task, key, stop)
                         keep()
+                    self.used.add(key)
                     found.append(self.solved[key])
                 tasks = rounds.send(found)
         except StopIteration:
@@ -93,10 +102,12 @@ class Combining:
         """What the result file holds of it. visited (K, m): raw values so far, for better utopia than was known."""
         from mdstopo.front.content import tasks_part
 
-        part: Datasets = tasks_part(self.solved.values(), self.case, "combine/tasks") if self.solved else {}
+        kept = [found for key, found in self.solved.items() if key in self.used] or list(self.solved.values())
+        part: Datasets = tasks_part(kept, self.case, "combine/tasks") if kept else {}
         if self.utopia is not None and self.maxima is not None:
             signs = np.array([sign_of(objective) for objective in self.case.objectives])
             found = np.concatenate([visited * signs, (self.utopia * signs)[None]])
+            # of objectives of weight 0 nothing is known, nor needed
             part |= {
                 "combine/utopia": self.utopia,
                 "combine/maxima": self.maxima,

@@ -14,6 +14,11 @@ from contextlib import suppress
 from typing import IO, Any
 
 
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class WorkerProcess:
     """One process that runs a module, and a thread that listens to it.
 
@@ -21,7 +26,7 @@ class WorkerProcess:
     """
 
     def __init__(self, module: str, job: object, crew: int, inbox: "queue.Queue[tuple[WorkerProcess, Any]]") -> None:
-        threads = max(1, (os.cpu_count() or 1) // crew)
+        threads = max(1, cores() // crew)
         self._process = subprocess.Popen(
             [sys.executable, "-m", module],
             stdin=subprocess.PIPE,

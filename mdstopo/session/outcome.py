@@ -57,7 +57,8 @@ class Outcome:
 
     alpha (N,): the best design. objectives: raw G there, by name. initial_objectives: at the best start's
     first design. peaks: (time, value) of all that compete at the best design, highest first; empty for a run
-    that was stopped. history: columns by the names of the file's `iterations/...`, K + 1 rows. states: each
+    that was stopped. constraints (n_con,): h_j - h_0j there. combined, utopia, maxima: U of several objectives and what
+    it is made with, else None. history: columns by the names of the file's `iterations/...`, K + 1 rows. states: each
     start's last state, None where it has not begun; best_start: whose result this is. evaluations,
     iterations: of all starts. seconds: wall time of the iterations in this process; compile_seconds: of
     getting ready, loading or compiling kernels.
@@ -68,6 +69,10 @@ class Outcome:
     objectives: Mapping[str, float]
     initial_objectives: Mapping[str, float]
     peaks: Mapping[str, tuple[tuple[float, float], ...]]
+    constraints: NDArray[np.float64]
+    utopia: NDArray[np.float64] | None
+    maxima: NDArray[np.float64] | None
+    combined: float | None
     history: Mapping[str, NDArray[np.generic]]
     status: RunStatus
     reason: str

@@ -26,8 +26,8 @@ def best_of(case: Case, states: Sequence[State | None]) -> int | None:
 def iteration_columns(case: Case, state: State, before: int = 0, final: Floats | None = None) -> dict[str, Array]:
     """Columns of `iterations/...`, each (K + 1, ...), row 0 the start.
 
-    before: evaluations that came earlier, for the individual optima. final (n_obj,): raw values of the final design,
-    for what was not simulated on the way there because its weight is 0.
+    before: evaluations that came earlier, for the individual optima. final (2, n_obj): raw values of the best design
+    and of the last one, for what was not simulated on the way there because its weight is 0.
     """
     columns = state.history.to_arrays()
     rows = len(state.history)
@@ -38,8 +38,8 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
     # Where even the first evaluation failed, the engine has reported nothing.
     unknown = np.full((rows, len(case.objectives)), np.nan)
     objectives = np.array(columns.get("info/objectives", unknown), dtype=np.float64).reshape(rows, -1)
-    for row in {best_row(state), rows - 1} if final is not None else ():
-        objectives[row] = np.where(np.isnan(objectives[row]), final, objectives[row])
+    for row, values in zip((best_row(state), rows - 1), final if final is not None else (), strict=False):
+        objectives[row] = np.where(np.isnan(objectives[row]), values, objectives[row])
     return {
         "objectives": objectives,
         "peak_time": columns.get("info/peak_time", unknown).reshape(rows, -1),

@@ -21,7 +21,7 @@ from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
-from mdstopo.session.starts import run_start
+from mdstopo.session.starts import replaced, run_start
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
@@ -133,6 +133,7 @@ class _Run:
         self.warnings: tuple[str, ...] = tuple(mistake.message for mistake in case.warnings)
         self.finals: Datasets = {}
         self.final_objectives: Floats | None = None
+        self.constraints: Floats | None = None
         self.combining = Combining(case)
         self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
 
@@ -166,6 +167,7 @@ class _Run:
         status, reason = self.conclude(best)
         if status not in (RunStatus.RUNNING, RunStatus.INTERRUPTED):
             self.complete(engine, best)
+            status, reason = self.judge(best, status, reason)
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - compiled, compiled - began)
@@ -200,6 +202,11 @@ class _Run:
         if before is not None:
             self.initial = np.asarray(before, dtype=np.float64)
         self.states = restore(view, self.case.optimizer.starts)
+        if any(state is not None for state in self.states) and "combine/utopia" in view.arrays:
+            utopia, maxima = (
+                np.asarray(view.array(f"combine/{name}"), dtype=np.float64) for name in ("utopia", "maxima")
+            )
+            self.combining.fixed = utopia, maxima
 
     def open(self, path: Path, engine: Engine) -> None:
         """Collect what every checkpoint repeats."""
@@ -224,11 +231,7 @@ class _Run:
     def compare(self, stated: Floats, nearest: Floats) -> None:
         """A notice where the first design is not the stated one."""
         if self.states[0] is None and not np.array_equal(stated, nearest):
-            moved = float(np.abs(nearest - stated).max())
-            self.notify(
-                "the initial design violates bounds or volume rows: it is replaced by the nearest one that "
-                f"does not (largest change of alpha {moved:.3g})"
-            )
+            self.notify(replaced(stated, nearest))
 
     def iterate(
         self, make: MakeEngine, problem: Problem, path: Path | None, workers: int, scalarisation: Scalarisation | None
@@ -279,15 +282,41 @@ class _Run:
         self.peaks = {
             name: tuple((peak.time, peak.value) for peak in found) for name, found in evaluation.peaks.items()
         }
+        if evaluation.status.usable:
+            self.constraints = np.asarray(evaluation.constraints, dtype=np.float64)
         if evaluation.status.usable and len(self.case.objectives) > 1:
             names = [objective.name for objective in self.case.objectives]
-            self.final_objectives = np.array([evaluation.objectives[name] for name in names])
+            last = evaluation
+            if not np.array_equal(state.alpha, state.best_alpha):
+                last = engine.evaluate(state.alpha, gradient=False)
+            self.final_objectives = np.array([[each.objectives[name] for name in names] for each in (evaluation, last)])
         after = motions(self.case, engine, state.best_alpha)
         for name, motion in after.items():
             if not motion.status.ok:
                 self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
         self.warnings += advise(self.case, state.best_alpha, self.before, after)
         self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients)
+
+    def judge(self, best: int, status: RunStatus, reason: str) -> tuple[RunStatus, str]:
+        """The status, where no design keeps the constraints: then the optimiser has converged to nothing of use."""
+        state = self.states[best]
+        assert state is not None
+        if status is RunStatus.FAILED or state.best_violation <= self.case.optimizer.tolerance:
+            return status, reason
+        if self.constraints is None:
+            return status, reason
+        excess = [
+            {"limit": value, "at_least": -value, "equals": abs(value)}[row.sense] / (abs(row.bound) or 1.0)
+            for row, value in zip(self.case.constraints, self.constraints.tolist(), strict=True)
+        ]
+        i = int(np.argmax(excess))
+        row = self.case.constraints[i]
+        word = {"limit": "above its limit", "at_least": "below its least", "equals": "away from its"}[row.sense]
+        sentence = (
+            f"no design was found that keeps the constraints: constraints[{i}] is {abs(self.constraints[i]):.6g} "
+            f"{word} {row.bound:.6g}"
+        )
+        return (RunStatus.FAILED if status is RunStatus.CONVERGED else status), f"{sentence} ({reason})"
 
     def checkpoint(self, path: Path) -> None:
         """Save in mid-run; a full disk then is no reason to lose the run, it may have room at the end."""
@@ -343,6 +372,10 @@ class _Run:
             objectives=dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True)),
             initial_objectives=dict(zip(names, columns["objectives"][0].tolist(), strict=True)),
             peaks=self.peaks,
+            constraints=columns["constraints"][best_row(state)] if self.constraints is None else self.constraints,
+            utopia=self.combining.utopia,
+            maxima=self.combining.maxima,
+            combined=float(state.best_objective) if len(names) > 1 else None,
             history=columns,
             status=status,
             reason=reason,

@@ -45,6 +45,15 @@ def first_design(case: Case, problem: Problem, initial: Floats | None) -> tuple[
         raise CaseError([case.marks.mistake("constraints", str(error))], str(case.path or case.name)) from error
 
 
+def replaced(stated: Floats, nearest: Floats) -> str:
+    """The notice that the first design is not the stated one."""
+    moved = float(np.abs(nearest - stated).max())
+    return (
+        "the initial design violates bounds or volume rows: it is replaced by the nearest one that does not "
+        f"(largest change of alpha {moved:.3g})"
+    )
+
+
 def run_start(
     case: Case,
     problem: Problem,

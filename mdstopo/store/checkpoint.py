@@ -35,14 +35,18 @@ class Checkpointer:
         self._offered_at = self._saved_at
         self.count = 0
 
-    def offer(self) -> bool:
-        """To be called after each iteration; true if a checkpoint was written."""
+    def offer(self, urgent: bool = False) -> bool:
+        """To be called after each iteration; true if a checkpoint was written.
+
+        urgent: what has just been reached took long, so that it is to be saved unless saving takes longer still.
+        """
         now = self._clock()
         unsaved = now - self._saved_at
         iteration = now - self._offered_at
         self._offered_at = now
         # One more iteration like the last may carry the loss past the interval, so it counts already.
-        if unsaved + iteration < INTERVAL or unsaved < _COST_FACTOR * self._cost:
+        early = unsaved + iteration < INTERVAL or unsaved < _COST_FACTOR * self._cost
+        if early and not (urgent and self._cost < INTERVAL):
             return False
         self._save()
         self._saved_at = self._offered_at = self._clock()

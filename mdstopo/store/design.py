@@ -1,5 +1,6 @@
 """A design read from a file: `--alpha FILE`."""
 
+import re
 from pathlib import Path
 from tokenize import TokenError  # numpy parses the header of a .npy file as Python
 
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from mdstopo.store.errors import StoreError
 from mdstopo.store.reader import read_result
 
+_NOT_NEEDED = ("trajectories", "sensitivities", "optimizer", "members", "pareto/tasks", "pareto/visited")
 _SUFFIXES = ".npy, .txt or .h5 (a result file)"
 
 
@@ -16,18 +18,31 @@ def read_design(path: Path | str, count: int) -> NDArray[np.float64]:
     """The design variables in a file, (count,).
 
     `.npy` holds one array, `.txt` numbers separated by blanks or lines (text after # is ignored), `.h5` is a
-    result file, whose best design is taken.
+    result file, whose best design is taken, `front.h5:3` the design of point 3 of a front.
 
     Raises
     ------
     StoreError
         if the file cannot be read, does not hold `count` numbers, or holds negative or non-finite ones.
     """
-    path = Path(path)
+    path, point = _place(str(path))
+    if point is not None:
+        return _checked(path, _read_front(path, point), count)
     reader = {".npy": _read_npy, ".txt": _read_text, ".h5": _read_h5, ".hdf5": _read_h5}.get(path.suffix.lower())
     if reader is None:
         raise StoreError(f"{path}: a design is read from {_SUFFIXES}, not from {path.suffix or 'a bare name'!r}")
-    alpha = np.squeeze(reader(path))
+    return _checked(path, np.squeeze(reader(path)), count)
+
+
+def _place(text: str) -> tuple[Path, int | None]:
+    """`front.h5:3` is point 3 of a front."""
+    found = re.fullmatch(r"(.+\.(?:h5|hdf5)):(\d+)", text, re.IGNORECASE)
+    if found is None or Path(text).exists():
+        return Path(text), None
+    return Path(found[1]), int(found[2])
+
+
+def _checked(path: Path, alpha: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     if alpha.ndim == 0 and count == 1:
         alpha = alpha.reshape(1)
     if alpha.ndim != 1 or len(alpha) != count:
@@ -73,4 +88,20 @@ def _read_text(path: Path) -> NDArray[np.float64]:
 
 
 def _read_h5(path: Path) -> NDArray[np.float64]:
-    return read_result(path, leave_out=("trajectories", "sensitivities", "optimizer", "members")).alpha
+    view = read_result(path, leave_out=_NOT_NEEDED)
+    if view.kind == "pareto":
+        last = len(view.array("pareto/alpha")) - 1
+        raise StoreError(f"{path}: a front has several designs; write {path}:K with K from 0 to {last}")
+    if "design/alpha" not in view.arrays:
+        raise StoreError(f"{path}: this result of `{view.kind}` holds no design")
+    return view.alpha
+
+
+def _read_front(path: Path, point: int) -> NDArray[np.float64]:
+    view = read_result(path, leave_out=_NOT_NEEDED)
+    designs = view.arrays.get("pareto/alpha")
+    if designs is None:
+        raise StoreError(f"{path}: a result of `{view.kind}` has no points")
+    if point >= len(designs):
+        raise StoreError(f"{path}: there is no point {point}; the front has 0 to {len(designs) - 1}")
+    return np.asarray(designs[point], dtype=np.float64)

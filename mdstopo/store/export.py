@@ -18,7 +18,7 @@ _AXES = ("x", "y", "psi")
 
 
 def tables(view: ResultView, case: Case) -> dict[str, Table]:
-    """Header and rows by name: members, iterations, front, sweep, sensitivity histories, each load case's trajectory."""
+    """Header and rows by name: members, iterations, front, sweep, each load case's trajectory."""
     found: dict[str, Table] = {"members": _members(view)}
     names = view.lines("objectives")
     iterations = view.under("iterations")
@@ -29,7 +29,7 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
         texts = {key: view.lines(f"pareto/{key}") for key in ("status", "reason")}
         front = {key: value for key, value in front.items() if key not in ("alpha", "ends", "ends_alpha")}
         front |= {key: np.array(value) for key, value in texts.items() if value}
-        per_name = {key: names for key in ("weights", "objectives", "utopia", "maxima")}
+        per_name = dict.fromkeys(("weights", "objectives", "utopia", "maxima"), names)
         found["front"] = _columns("point", front, per_name, "weights")
     sweep = {key: value for key, value in view.under("sweep").items() if "/" not in key}
     if "objectives" in sweep:
@@ -51,7 +51,7 @@ def _members(view: ResultView) -> Table:
         range(len(p)), view.lines("members/group"), *p.T.tolist(), *q.T.tolist(), design.astype(int).tolist(),
     ]  # fmt: skip
     places = np.flatnonzero(design)
-    extra: dict[str, np.ndarray] = {}  # type: ignore[type-arg]
+    extra: dict[str, Any] = {}
     if "design/alpha" in view.arrays:
         extra["alpha"] = view.alpha
     if "pareto/alpha" in view.arrays:

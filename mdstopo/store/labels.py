@@ -21,7 +21,7 @@ _AXES = ("x", "y", "psi")
 
 @dataclass
 class Labels:
-    """extra: datasets that only are scales; scales: path -> scale of each dimension, by its path or ""; units by path."""
+    """extra: datasets that only are scales; scales: by path, the scale of each dimension; units: by path."""
 
     extra: Datasets = field(default_factory=dict)
     scales: dict[str, tuple[str, ...]] = field(default_factory=dict)

@@ -18,7 +18,8 @@ def solver(objectives, candidates, reach=np.inf, broken=()):
     def solve(task):
         near = [x for x in candidates if np.linalg.norm(x - task.start) <= reach]
         one = task.scalarisation
-        values = [one.value(objectives(x)) + 1e3 * np.maximum(one.excess(objectives(x)), 0).sum() for x in near]
+        table = np.array([objectives(x) for x in near])
+        values = one.values(table) + 1e3 * one.excesses(table)
         best = near[int(np.argmin(values))] if near else task.start
         failed = task.point in broken
         g = np.full(len(objectives(best)), np.nan) if failed else objectives(best)
@@ -148,9 +149,11 @@ def test_a_point_that_fails_fails_alone():
 
 def test_without_an_end_there_is_no_front():
     weights = weights_of_first([0.0, 1.0])
+    front, _ = carried_out(request(weights, "weighted_sum"), solver(convex, GRID, broken=(-2,)))
+    assert front.ends[1] is front.ends[0]  # the best that is known of the objective that failed alone
     with pytest.raises(NoEndError) as caught:
-        carried_out(request(weights, "weighted_sum"), solver(convex, GRID, broken=(-2,)))
-    assert caught.value.place == 1
+        carried_out(request(weights, "weighted_sum"), solver(convex, GRID, broken=(-1, -2)))
+    assert caught.value.place == 0
 
 
 def test_the_same_results_make_the_same_plan():
@@ -158,3 +161,28 @@ def test_the_same_results_make_the_same_plan():
     runs = [carried_out(request(weights, "nbi"), solver(concave, GRID, reach=0.4)) for _ in range(2)]
     assert runs[0][1] == runs[1][1]
     assert all(np.array_equal(a.alpha, b.alpha) for a, b in zip(runs[0][0].points, runs[1][0].points, strict=True))
+
+
+def test_designs_that_violate_constraints_come_last_and_are_no_ends():
+    """Half of the candidates are infeasible and better; they move neither utopia nor any point."""
+
+    def solve(task):
+        found = solver(convex, GRID)(task)
+        if task.point >= 0 and task.point % 2:
+            return replace(found, objectives=found.objectives - 0.5, violation=0.3)
+        return found
+
+    front, _ = carried_out(request(weights_of_first(np.linspace(0, 1, 7).tolist()), "weighted_sum"), solve)
+    assert front.utopia == pytest.approx([0, 0], abs=1e-7)
+    assert all(point.violation == 0.0 for point in front.points[::2])
+
+
+def test_utopia_that_moves_late_is_what_the_points_end_with():
+    """A better end is in nobody's reach but that of the points near it: utopia must follow what they find."""
+    start = np.array([0.9])
+    front, _ = carried_out(
+        request(weights_of_first(np.linspace(0, 1, 9).tolist()), "weighted_sum", start=start),
+        solver(convex, GRID, reach=0.3),
+    )
+    lowest = np.min([point.objectives for point in front.points], axis=0)
+    assert front.utopia == pytest.approx(lowest, abs=2e-3)

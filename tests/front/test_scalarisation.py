@@ -66,7 +66,7 @@ def test_the_highest_row_is_the_formula_at_the_highest_peaks(method, normalized,
     raw = np.array([part[0][0] for part in parts])
     g = (raw - LOW) / (HIGH - LOW) if normalized else raw
     assert rows[0] == pytest.approx(formula(one, g, raw), rel=1e-12)
-    assert one.value(raw) == pytest.approx(rows[0], rel=1e-12)
+    assert one.values(raw[None])[0] == pytest.approx(rows[0], rel=1e-12)
     assert (np.diff(rows) <= 0).all()
     assert gradients.shape == (len(rows), N)
 
@@ -111,7 +111,7 @@ def test_objectives_of_weight_zero_take_no_part():
 
 def test_below_utopia_the_power_goes_on_oddly():
     one = Scalarisation("weighted_exponential", np.array([1.0]), np.array([2.0]), np.array([3.0]), 2.0)
-    values = [one.value(np.array([x])) for x in (1.5, 2.0, 2.5)]
+    values = one.values(np.array([[1.5], [2.0], [2.5]]))
     assert values == pytest.approx([-0.25, 0.0, 0.25])
 
 
@@ -120,4 +120,4 @@ def test_a_product_of_something_that_is_not_positive_is_none_and_names_it():
     with pytest.raises(NotPositiveError) as caught:
         one.rows([(np.array([1.0]), np.zeros((1, N))), (np.array([-1.0]), np.zeros((1, N)))])
     assert caught.value.args == (1,)
-    assert np.isnan(one.value(np.array([1.0, 5.0, -1.0])))
+    assert np.isnan(one.values(np.array([[1.0, 5.0, -1.0]]))[0])
