@@ -9,6 +9,7 @@ COMMANDS: dict[str, str] = {
     "gradient": "Compare sensitivity methods on one design.",
     "show": "Say in words what a result file holds.",
     "plot": "Draw what a result file holds.",
+    "report": "Write one HTML page that shows a result in motion.",
     "export": "Write a result as CSV tables or JSON.",
     "new": "Write a starter case, with comments.",
     "schema": "Print the JSON Schema of the case format, for editors.",

@@ -48,7 +48,7 @@ def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
     columns = []
     for key, text in sets.items():
         if ":" in text:
-            columns.append([repr(value) for value in parse_range(text)])
+            columns.append([shortest(value) for value in parse_range(text)])
         else:
             columns.append([word.strip() for word in text.split(",")])
         if "" in columns[-1]:
@@ -217,6 +217,12 @@ class _Sweep:
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
         image = result_image(self.base, "sweep", status.value, reason, datasets, self.provenance, {}, ())
         replace_file(path, image)
+
+
+def shortest(value: float) -> str:
+    """A number as a user would write it."""
+    text = f"{value:.15g}"
+    return text if float(text) == value else repr(value)
 
 
 def lost(case: Case, result: Lost) -> Found:

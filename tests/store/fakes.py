@@ -106,6 +106,7 @@ class FakeEvaluation:
     gradients: dict[str, Floats]
     peaks: dict[str, tuple[FakePeak, ...]]
     status: Status = Status.OK
+    constraints: Floats = field(default_factory=lambda: np.zeros(1))
 
 
 @dataclass

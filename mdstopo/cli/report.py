@@ -1,0 +1,30 @@
+"""`mdstopo report`: one HTML page for a result."""
+
+from pathlib import Path
+
+import click
+
+from mdstopo.cli.options import FILE
+from mdstopo.cli.output import Output
+
+
+@click.command("report")
+@click.argument("result_path", metavar="RESULT", type=FILE)
+@click.option("--out", type=FILE, metavar="FILE", help="Where to (default: beside the result, ending in .html).")
+@click.option("--quiet", "-q", is_flag=True, help="Say nothing but mistakes.")
+def command(result_path: Path, out: Path | None, quiet: bool) -> int:
+    """Write one self-contained HTML page: the motion, responses, convergence, the front, the case."""
+    from mdstopo.plots.source import Source
+    from mdstopo.report.content import content
+    from mdstopo.report.page import page
+    from mdstopo.store.errors import StoreError
+
+    place = out or result_path.with_suffix(".html")
+    text = page(content(Source(result_path)))
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise StoreError(f"{place}: cannot be written: {error.strerror}") from error
+    Output(json=False, quiet=quiet).say(str(place))
+    return 0

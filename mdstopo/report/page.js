@@ -1,0 +1,206 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const at = (id) => document.getElementById(id);
+  const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"];
+  const state = { design: 0, load: data.load_cases[0], frame: 0, colour: "design", playing: false };
+  const cursors = [];
+
+  const number = (x, digits = 5) => (x === null || x === undefined ? "-" : String(Number(Number(x).toPrecision(digits))));
+  const text = (id, value) => { at(id).textContent = value; };
+  const motion = () => (data.designs[state.design].motions || {})[state.load];
+
+  // places: body coordinates to global ones
+  const place = (body, x, y, q) => {
+    if (body >= q.length / 3) return [x, y];
+    const c = Math.cos(q[3 * body + 2]), s = Math.sin(q[3 * body + 2]);
+    return [q[3 * body] + c * x - s * y, q[3 * body + 1] + s * x + c * y];
+  };
+  const current = () => { const m = motion(); return m ? m.q[state.frame] : data.start; };
+
+  // one window for all frames of a motion, so that it stands still
+  let view = null;
+  const fit = () => {
+    const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    const m = motion();
+    const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    for (const q of frames) data.bodies.forEach((body, b) => {
+      const index = body.name === "ground" ? q.length : b;
+      for (const [x, y] of body.outline.concat(body.points)) {
+        const p = place(index, x, y, q);
+        for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
+      }
+    });
+    const canvas = at("layout"), room = 30;
+    const scale = Math.min((canvas.width - 2 * room) / Math.max(high[0] - low[0], 1e-9), (canvas.height - 2 * room) / Math.max(high[1] - low[1], 1e-9));
+    view = { scale, x: canvas.width / 2 - scale * (low[0] + high[0]) / 2, y: canvas.height / 2 + scale * (low[1] + high[1]) / 2 };
+  };
+  const screen = (p) => [view.x + view.scale * p[0], view.y - view.scale * p[1]];
+
+  const shade = (share) => { // blue (push) over grey to orange (pull)
+    const t = Math.max(-1, Math.min(1, share));
+    const end = t < 0 ? [0, 114, 178] : [213, 94, 0], mid = [205, 205, 205], a = Math.sqrt(Math.abs(t));
+    return `rgb(${mid.map((m, k) => Math.round(m + a * (end[k] - m))).join(",")})`;
+  };
+
+  const draw = () => {
+    const canvas = at("layout"), g = canvas.getContext("2d"), q = current(), m = motion();
+    g.clearRect(0, 0, canvas.width, canvas.height);
+    data.bodies.forEach((body, b) => {
+      const ground = body.name === "ground", index = ground ? q.length : b;
+      g.beginPath();
+      body.outline.forEach(([x, y], k) => { const p = screen(place(index, x, y, q)); k ? g.lineTo(...p) : g.moveTo(...p); });
+      g.closePath();
+      const colour = ground ? "#555555" : COLOURS[(b + 2) % COLOURS.length];
+      g.globalAlpha = 0.12; g.fillStyle = colour; g.fill(); g.globalAlpha = 1; g.strokeStyle = colour; g.lineWidth = 1; g.stroke();
+      g.fillStyle = colour;
+      for (const [x, y] of body.points) { const p = screen(place(index, x, y, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
+      if (!ground) { const p = screen(place(index, 0, 0, q)); g.fillText(body.name, p[0] + 5, p[1] - 5); g.fillRect(p[0] - 3, p[1] - 0.5, 6, 1); g.fillRect(p[0] - 0.5, p[1] - 3, 1, 6); }
+    });
+    const rows = data.designs[state.design].members.rows;
+    const forces = state.colour === "force" && m && m.force ? m.force[state.frame] : null;
+    const most = forces ? Math.max(1e-12, ...m.force.map((row) => row.reduce((a, f) => Math.max(a, Math.abs(f)), 0))) : 1;
+    rows.forEach((row, k) => {
+      const p = screen(place(row[1], row[3], row[4], q)), r = screen(place(row[2], row[5], row[6], q));
+      g.strokeStyle = forces ? shade(forces[k] / most) : COLOURS[row[0] % 2];
+      g.globalAlpha = forces ? 0.9 : 0.25 + 0.65 * row[7];
+      g.lineWidth = 0.4 + 2 * row[7];
+      g.beginPath(); g.moveTo(...p); g.lineTo(...r); g.stroke();
+    });
+    g.globalAlpha = 1;
+    text("clock", m ? `t = ${number(m.t[state.frame], 4)} s` : "at the start");
+    const shown = `${rows.length} of ${data.designs[state.design].members.all} members are thick enough to be drawn.`;
+    text("legend", forces ? `${shown} Orange pulls, blue pushes; up to ${number(most, 3)} N.`
+      : state.colour === "force" ? `${shown} Forces are shown for springs and gaps only.` : `${shown} Width by design value; groups: ${data.designs[state.design].members.groups.join(", ")}.`);
+    for (const move of cursors) move();
+  };
+
+  // small charts
+  const SVG = "http://www.w3.org/2000/svg";
+  const element = (parent, tag, attributes, content) => {
+    const node = document.createElementNS(SVG, tag);
+    for (const [key, value] of Object.entries(attributes)) node.setAttribute(key, value);
+    if (content !== undefined) node.textContent = content;
+    parent.appendChild(node);
+    return node;
+  };
+  const ticks = (low, high) => {
+    const raw = (high - low) / 4 || 1, size = 10 ** Math.floor(Math.log10(raw));
+    const step = [1, 2, 5, 10].map((k) => k * size).find((s) => s >= raw);
+    const found = [];
+    for (let x = Math.ceil(low / step) * step; x <= high + 1e-9 * step; x += step) found.push(Math.abs(x) < 1e-9 * step ? 0 : x);
+    return found;
+  };
+  const chart = (parent, title, xLabel, yLabel, xs, ys, log) => {
+    const head = document.createElement("h2");
+    head.textContent = title;
+    parent.appendChild(head);
+    const W = 460, H = 190, L = 62, B = 34, T = 8, R = 10;
+    const svg = element(parent, "svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": title });
+    const f = log ? Math.log10 : (x) => x;
+    const finite = (v) => v.filter((x) => x !== null && Number.isFinite(x));
+    const [x0, x1] = [Math.min(...finite(xs)), Math.max(...finite(xs))];
+    let [y0, y1] = [f(Math.min(...finite(ys))), f(Math.max(...finite(ys)))];
+    if (y0 === y1) { y0 -= 0.5; y1 += 0.5; }
+    const pad = 0.06 * (y1 - y0);
+    y0 -= pad; y1 += pad;
+    const px = (x) => L + (W - L - R) * (x - x0) / ((x1 - x0) || 1), py = (y) => H - B - (H - B - T) * (f(y) - y0) / (y1 - y0);
+    for (const x of ticks(x0, x1)) { element(svg, "line", { x1: px(x), x2: px(x), y1: T, y2: H - B, stroke: "#e4e4e4" }); element(svg, "text", { x: px(x), y: H - B + 14, "text-anchor": "middle" }, number(x, 4)); }
+    for (const e of ticks(y0, y1)) { const y = log ? 10 ** e : e; element(svg, "line", { x1: L, x2: W - R, y1: py(y), y2: py(y), stroke: "#e4e4e4" }); element(svg, "text", { x: L - 5, y: py(y) + 4, "text-anchor": "end" }, number(y, 3)); }
+    element(svg, "text", { x: (L + W - R) / 2, y: H - 3, "text-anchor": "middle" }, xLabel);
+    element(svg, "text", { x: 12, y: (T + H - B) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(T + H - B) / 2})` }, yLabel);
+    return { svg, px, py, top: T, bottom: H - B };
+  };
+  const line = (c, xs, ys, colour) => element(c.svg, "polyline", {
+    points: xs.map((x, i) => (ys[i] === null ? null : `${c.px(x)},${c.py(ys[i])}`)).filter((p) => p).join(" "),
+    fill: "none", stroke: colour, "stroke-width": 1.6,
+  });
+
+  const responses = () => {
+    const parent = at("responses");
+    parent.replaceChildren();
+    cursors.length = 0;
+    const m = motion();
+    if (!m) return;
+    m.responses.forEach((each) => {
+      const place = data.objectives.findIndex((o) => o.name === each.name), objective = data.objectives[place];
+      const c = chart(parent, `${each.name}: ${objective.what}`, "time, s", `${each.name}, ${each.unit}`, m.times, each.values);
+      line(c, m.times, each.values, COLOURS[place % COLOURS.length]);
+      const cursor = element(c.svg, "line", { y1: c.top, y2: c.bottom, stroke: "#000", "stroke-dasharray": "3 3", class: "cursor" });
+      cursors.push(() => { const x = c.px(m.t[state.frame]); cursor.setAttribute("x1", x); cursor.setAttribute("x2", x); });
+    });
+  };
+
+  const convergence = () => {
+    if (!data.iterations) return;
+    data.objectives.forEach((objective, i) => {
+      const ys = data.iterations.objectives[i], xs = ys.map((_, k) => k);
+      const known = ys.filter((y) => y !== null), log = Math.min(...known) > 0 && Math.max(...known) > 20 * Math.min(...known);
+      line(chart(at("convergence"), `convergence of ${objective.name}`, "iteration", `${objective.name}, ${objective.unit}`, xs, ys, log), xs, ys, COLOURS[i % COLOURS.length]);
+    });
+  };
+
+  let marks = [];
+  const front = () => {
+    if (!data.front || data.objectives.length < 2) return;
+    const points = data.front.objectives, [a, b] = data.objectives;
+    const c = chart(at("front"), "the front: click a point to see its design", `${a.name}, ${a.unit}`, `${b.name}, ${b.unit}`, points.map((p) => p[0]), points.map((p) => p[1]));
+    marks = points.map((p, j) => {
+      if (p[0] === null) return null;
+      const usable = Boolean(data.designs[j].members);
+      const mark = element(c.svg, "circle", { cx: c.px(p[0]), cy: c.py(p[1]), r: 5, class: "point", tabindex: 0, role: "button", "data-point": j,
+        fill: data.front.dominated[j] ? "#fff" : "#0072B2", stroke: data.front.dominated[j] ? "#D55E00" : "#0072B2" });
+      element(mark, "title", {}, `point ${j}: ${a.name} ${number(p[0])}, ${b.name} ${number(p[1])}; weights ${data.front.weights[j].map((w) => number(w, 3)).join(", ")}; ${data.front.status[j]}`);
+      const choose = () => { if (usable) { state.design = j; state.frame = 0; refresh(); } };
+      mark.addEventListener("click", choose);
+      mark.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); choose(); } });
+      return mark;
+    });
+  };
+
+  const numbers = () => {
+    const rows = data.front ? data.front.objectives.map((p, j) => [`point ${j}`, ...p.map((x) => number(x, 7)), data.front.status[j]])
+      : data.iterations ? [["final", ...data.iterations.objectives.map((ys) => number(ys[ys.length - 1], 9)), data.status]] : [];
+    const table = document.createElement("table");
+    for (const row of [["", ...data.objectives.map((o) => `${o.name}, ${o.unit}`), ""], ...rows]) {
+      const tr = table.insertRow();
+      for (const cell of row) tr.insertCell().textContent = cell;
+    }
+    at("numbers").replaceChildren(table);
+  };
+
+  const refresh = () => {
+    const m = motion(), slider = at("time");
+    slider.max = m ? m.t.length - 1 : 0;
+    slider.value = state.frame;
+    marks.forEach((mark, j) => mark && mark.setAttribute("stroke-width", j === state.design ? 4 : 1.5));
+    document.body.dataset.design = state.design;
+    fit(); responses(); draw();
+  };
+  const show = (frame) => { state.frame = frame; at("time").value = frame; document.body.dataset.frame = frame; draw(); };
+
+  text("title", data.title);
+  text("status", `${data.status}: ${data.reason}`);
+  for (const warning of data.warnings) at("warnings").appendChild(Object.assign(document.createElement("li"), { textContent: warning }));
+  text("case", data.case);
+  for (const [key, value] of Object.entries({ ...data.versions, ...data.settings })) { const tr = at("versions").insertRow(); tr.insertCell().textContent = key; tr.insertCell().textContent = value; }
+  for (const name of data.load_cases) at("loadcase").appendChild(Object.assign(document.createElement("option"), { value: name, textContent: name }));
+  at("cases").hidden = data.load_cases.length < 2;
+  at("time").addEventListener("input", (event) => show(Number(event.target.value)));
+  at("loadcase").addEventListener("change", (event) => { state.load = event.target.value; state.frame = 0; refresh(); });
+  at("colour").addEventListener("change", (event) => { state.colour = event.target.value; draw(); });
+  at("play").addEventListener("click", () => {
+    state.playing = !state.playing;
+    text("play", state.playing ? "stop" : "play");
+    const step = () => {
+      const m = motion();
+      if (!state.playing || !m) return;
+      show((state.frame + 1) % m.t.length);
+      setTimeout(() => requestAnimationFrame(step), 40);
+    };
+    step();
+  });
+  state.design = Math.max(0, data.front ? data.designs.findIndex((d, j) => d.members && j >= Math.floor(data.designs.length / 2)) : 0);
+  front(); convergence(); numbers(); refresh();
+  document.body.dataset.ready = "yes";
+})();

@@ -1,0 +1,167 @@
+"""Pictures, exports and starter cases: what they hold, and what they refuse."""
+
+import csv
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from mdstopo.cli.group import run_group
+from mdstopo.plots.scenery import hull
+from mdstopo.plots.source import Source
+from mdstopo.plots.style import styled
+from mdstopo.plots.table import PLOTS, fitting
+from mdstopo.plots.watch import response_history
+from tests.front.support import CASE
+
+matplotlib = pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """A run, a front and a comparison of methods of one small case."""
+    folder = tmp_path_factory.mktemp("plots")
+    case = folder / "probe.yaml"
+    case.write_text(CASE)
+    made = {name: folder / f"{name}.h5" for name in ("run", "pareto", "gradient")}
+    assert run_group(["run", str(case), "--quiet", "--out", str(made["run"])]) == 0
+    assert run_group(["pareto", str(case), "--points", "3", "--quiet", "--out", str(made["pareto"])]) == 0
+    words = ["--method", "adjoint", "--method", "direct", "--history"]
+    assert run_group(["gradient", str(case), *words, "--quiet", "--out", str(made["gradient"])]) == 0
+    return made
+
+
+@pytest.mark.parametrize("kind", ["run", "pareto", "gradient"])
+def test_everything_a_result_has_is_drawn(results, kind, tmp_path, monkeypatch):
+    copy = tmp_path / "result.h5"
+    copy.write_bytes(results[kind].read_bytes())
+    assert run_group(["plot", str(copy), "--quiet"]) == 0
+    drawn = {path.stem.removeprefix("result-") for path in tmp_path.glob("*.png")}
+    assert drawn == set(fitting(Source(copy).view))
+    expected = {"run": "convergence", "pareto": "front", "gradient": "sensitivity-histories"}
+    assert expected[kind] in drawn
+    assert all(path.stat().st_size > 5000 for path in tmp_path.glob("*.png"))
+
+
+def test_every_picture_is_made_by_one_of_these_results(results):
+    assert set(PLOTS) == {name for path in results.values() for name in fitting(Source(path).view)}
+
+
+@pytest.mark.parametrize("ending", ["svg", "pdf"])
+def test_pictures_repeat_to_the_byte(results, ending, tmp_path):
+    for name in ("a", "b"):
+        words = ["plot", str(results["run"]), "convergence", "--out", str(tmp_path / f"{name}.{ending}"), "--quiet"]
+        assert run_group(words) == 0
+    assert (tmp_path / f"a.{ending}").read_bytes() == (tmp_path / f"b.{ending}").read_bytes()
+
+
+def test_axes_have_units_and_the_curves_their_data(results):
+    with styled() as module:
+        source = Source(results["run"])
+        figure = PLOTS["convergence"].draw(module, source)
+        axis = figure.axes[0]
+        assert axis.get_ylabel() == "G1, J"
+        assert np.array_equal(axis.lines[0].get_ydata(), source.view.array("iterations/objectives")[:, 0], True)
+        figure = PLOTS["histories"].draw(module, source)
+        assert [each.get_ylabel() for each in figure.axes] == ["G1, J", "G2, J"]
+        figure = PLOTS["layout"].draw(module, source, times=(0.0, 0.1))
+        assert [each.get_title("left") for each in figure.axes] == ["t = 0 s", "t = 0.1 s"]
+
+
+def test_a_history_has_its_objective_as_its_maximum(results):
+    source = Source(results["run"])
+    times = np.linspace(0.0, 0.2, 4001)
+    evaluation = source.engine.evaluate(source.alpha, gradient=False)
+    for load_case, name in (("rotation", "G1"), ("translation", "G2")):
+        history = response_history(source.engine, source.alpha, load_case, times)[name]
+        assert history.max() == pytest.approx(evaluation.objectives[name], rel=1e-6)
+
+
+def test_a_history_of_a_general_scene_is_what_the_engine_reduces(tmp_path):
+    text = CASE.replace("G2: {response: energy,", "G2: {response: {angle: {body: torso}}, over_time: mean,")
+    from mdstopo.case.reader import read_case
+    from mdstopo.engine import Evaluator
+
+    engine = Evaluator(read_case(text))
+    alpha = engine.case.initial
+    times = np.linspace(0.0, 0.2, 2001)
+    history = response_history(engine, alpha, "translation", times)["G2"]
+    mean = np.trapezoid(history, times) / 0.2
+    assert mean == pytest.approx(engine.evaluate(alpha, gradient=False).objectives["G2"], rel=1e-6)
+
+
+def test_outlines_are_convex_hulls():
+    points = np.random.default_rng(3).normal(size=(200, 2))
+    corners = hull(points)
+    edges = np.roll(corners, -1, axis=0) - corners
+    for corner, edge in zip(corners, edges, strict=True):
+        side = edge[0] * (points - corner)[:, 1] - edge[1] * (points - corner)[:, 0]
+        assert side.min() > -1e-12
+    assert len(hull(np.array([[0.0, 0.0], [1.0, 1.0], [0.0, 0.0]]))) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["landscape"], "no picture 'landscape'"),
+        (["front"], "has no front"),
+        (["convergence", "--out", "x.bmp"], "a picture ends in .png, .svg, .pdf"),
+        (["layout", "--time", "7"], "runs from 0 to 0.2 s"),
+        (["layout", "--load-case", "fall"], "no load case 'fall'"),
+        (["--point", "1"], "--point is for fronts"),
+        (["--out", "x.png"], "say which"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(results, words, said, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert run_group(["plot", str(results["run"]), *words]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_tables_hold_what_the_file_holds(results, tmp_path):
+    out = tmp_path / "tables"
+    assert run_group(["export", str(results["run"]), "--csv", "--out", str(out), "--quiet"]) == 0
+    names = {path.stem for path in out.glob("*.csv")}
+    assert names == {"members", "iterations", "trajectory-rotation", "trajectory-translation"}
+    with h5py.File(results["run"]) as file:
+        with (out / "iterations.csv").open() as stream:
+            rows = list(csv.DictReader(stream))
+        stored = file["iterations/objectives"][:, 1].tolist()
+        assert [float(row["objectives G2"]) if row["objectives G2"] else None for row in rows][-1] == stored[-1]
+        with (out / "members.csv").open() as stream:
+            members = list(csv.DictReader(stream))
+        assert [float(row["alpha"]) for row in members] == file["design/alpha"][()].tolist()
+
+
+def test_json_holds_every_dataset_and_null_for_what_is_not_known(results, tmp_path):
+    out = tmp_path / "front.json"
+    assert run_group(["export", str(results["pareto"]), "--json", "--out", str(out), "--quiet"]) == 0
+    content = json.loads(out.read_text())
+    with h5py.File(results["pareto"]) as file:
+        assert content["datasets"]["pareto/alpha"] == file["pareto/alpha"][()].tolist()
+    assert None in [value for row in content["datasets"]["pareto/visited/0"] for value in row]
+    assert run_group(["export", str(results["pareto"])]) == 2
+
+
+def test_finished_files_name_their_axes_and_units(results):
+    with h5py.File(results["run"]) as file:
+        q = file["trajectories/rotation/q"]
+        assert q.attrs["units"] == "m, rad"
+        assert q.dims[0][0][()].tolist() == file["trajectories/rotation/t"][()].tolist()
+        assert q.dims[1][0].asstr()[2] == "torso.psi"
+        objectives = file["iterations/objectives"]
+        assert objectives.dims[1][0].asstr()[()].tolist() == ["G1", "G2"]
+        assert objectives.attrs["units"] == "J"
+
+
+def test_the_starter_case_is_right_and_is_never_written_over_another(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_group(["new", "my-deck"]) == 0
+    assert run_group(["check", "my-deck.yaml", "--quiet"]) == 0
+    text = Path("my-deck.yaml").read_text()
+    assert 'title: "my deck"' in text
+    assert run_group(["new", "my-deck"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert run_group(["run", "my-deck.yaml", "--set", "optimizer.max_iterations=2", "--quiet"]) == 0

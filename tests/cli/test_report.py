@@ -1,0 +1,112 @@
+"""The page of a result, as data and in a real browser."""
+
+import json
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from mdstopo.cli.group import run_group
+from mdstopo.plots.source import Source
+from mdstopo.report.content import content
+from tests.front.support import CASE
+
+BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+#: what is done to the page: the slider is moved, a point is clicked, the colour changed; what came of it is written down
+PROBE = """
+<script>
+const seen = { errors };
+const pixels = () => { const c = document.getElementById("layout");
+  return c.getContext("2d").getImageData(0, 0, c.width, c.height).data.reduce((a, x, i) => (a * 31 + x * (i % 97)) % 1000003, 7); };
+seen.ready = document.body.dataset.ready;
+seen.before = pixels();
+const slider = document.getElementById("time");
+slider.value = 40; slider.dispatchEvent(new Event("input"));
+seen.clock = document.getElementById("clock").textContent;
+seen.moved = pixels();
+seen.cursor = document.querySelector(".cursor").getAttribute("x1");
+const colour = document.getElementById("colour");
+colour.value = "force"; colour.dispatchEvent(new Event("change"));
+seen.coloured = pixels();
+const point = document.querySelector('circle[data-point="0"]');
+if (point) { point.dispatchEvent(new Event("click")); seen.design = document.body.dataset.design; seen.clicked = pixels(); }
+seen.charts = document.querySelectorAll("svg").length;
+seen.ticks = [...document.querySelectorAll("svg text")].map((t) => t.textContent);
+document.title = "seen" + JSON.stringify(seen);
+</script>
+"""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    (folder / "probe.yaml").write_text(CASE)
+    made = {name: folder / f"{name}.h5" for name in ("run", "pareto")}
+    assert run_group(["run", str(folder / "probe.yaml"), "--quiet", "--out", str(made["run"])]) == 0
+    words = ["--points", "3", "--quiet", "--out", str(made["pareto"])]
+    assert run_group(["pareto", str(folder / "probe.yaml"), *words]) == 0
+    return made
+
+
+def test_the_page_needs_nothing_else_and_holds_the_case(results, tmp_path):
+    out = tmp_path / "page.html"
+    assert run_group(["report", str(results["run"]), "--out", str(out), "--quiet"]) == 0
+    text = out.read_text()
+    assert not re.search(r"(src|href)\s*=", text)
+    data = json.loads(re.search(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[1])
+    assert data["case"] == CASE
+    assert data["warnings"] == list(Source(results["run"]).view.warnings)
+
+
+def test_forces_and_responses_are_the_engines(results):
+    """The forces do the energy's work: dE/dt is the sum of f dL/dt, and E the response."""
+    source = Source(results["run"])
+    (design,) = content(source)["designs"]
+    motion = design["motions"]["translation"]
+    assert len(design["members"]["rows"]) == np.array(motion["force"]).shape[1]
+    lengths = []
+    for q in np.array(motion["q"]):
+        ends = []
+        for _, a, b, px, py, qx, qy, *_ in design["members"]["rows"]:
+            p, r = (_place(q, body, x, y) for body, x, y in ((a, px, py), (b, qx, qy)))
+            ends.append(np.hypot(*(r - p)))
+        lengths.append(ends)
+    lengths, force = np.array(lengths), np.array(motion["force"])
+    work = np.cumsum(0.5 * (force[1:] + force[:-1]) * np.diff(lengths, axis=0), axis=0).sum(axis=1)
+    energy = np.interp(motion["t"], motion["times"], motion["responses"][0]["values"])
+    # members too thin to be drawn hold a little of it
+    assert work[-1] == pytest.approx(energy[-1], rel=0.05)
+
+
+def _place(q, body, x, y):
+    c, s = np.cos(q[3 * body + 2]), np.sin(q[3 * body + 2])
+    return np.array([q[3 * body] + c * x - s * y, q[3 * body + 1] + s * x + c * y])
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser on this machine")
+@pytest.mark.parametrize("kind", ["run", "pareto"])
+def test_the_slider_moves_and_points_can_be_clicked(results, kind, tmp_path):
+    out = tmp_path / "page.html"
+    assert run_group(["report", str(results[kind]), "--out", str(out), "--quiet"]) == 0
+    watch = "<script>const errors = []; window.onerror = (m) => errors.push(String(m));</script>"
+    out.write_text(out.read_text().replace("<head>", f"<head>{watch}").replace("</body>", f"{PROBE}</body>"))
+    command = [
+        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
+        "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom",
+        out.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    seen = json.loads(re.search(r"<title>seen(.*?)</title>", done.stdout, re.DOTALL)[1])
+    assert seen["errors"] == []
+    assert seen["ready"] == "yes"
+    assert seen["clock"] == "t = 0.1 s"
+    assert len({seen["before"], seen["moved"], seen["coloured"]}) == 3
+    assert "NaN" not in seen["ticks"]
+    if kind == "pareto":
+        assert seen["design"] == "0"
+        assert seen["clicked"] != seen["coloured"]
+        assert seen["charts"] == 2
+    else:
+        assert seen["charts"] == 3
