@@ -22,6 +22,12 @@ def main() -> None:
         os._exit(_flushed(3))
     except BrokenPipeError:
         status = 0  # the reader has seen enough
+    except RuntimeError as error:
+        # an interrupt in the middle of a compilation makes the compiler stumble over what it left half done
+        if not _began_with_interrupt(error):
+            raise
+        _complain("interrupted")
+        os._exit(_flushed(3))
     sys.exit(_flushed(status))
 
 
@@ -40,6 +46,15 @@ def _dispatch(arguments: list[str]) -> int:
     from mdstopo.cli.group import run_group
 
     return run_group(arguments)
+
+
+def _began_with_interrupt(error: BaseException) -> bool:
+    seen: BaseException | None = error
+    while seen is not None:
+        if isinstance(seen, KeyboardInterrupt):
+            return True
+        seen = seen.__context__
+    return False
 
 
 def _interrupt(_number: int, _frame: object) -> None:

@@ -25,6 +25,8 @@ from mdstopo.cli.options import (
 from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -101,7 +103,7 @@ def command(
         for method, result in results.items():
             datasets |= sensitivity_part(result["gradients"], method)
         if differencing and not failure:
-            _difference(case, alpha, count, results, datasets)
+            failure = _difference(case, alpha, count, results, datasets)
         if history and not failure:
             failure = _histories(engine, case, alpha, datasets)
         status = RunStatus.FAILED if failure else RunStatus.CONVERGED
@@ -170,8 +172,8 @@ def _difference(
     count: int,
     results: dict[str, dict[str, Any]],
     datasets: dict[str, Any],
-) -> None:
-    """Add differences of some members to the results."""
+) -> str:
+    """Add differences of some members to the results; why there are none, where there are none."""
     import numpy as np
 
     from mdstopo.cli.gradient_numbers import chosen_members, differences
@@ -179,8 +181,20 @@ def _difference(
 
     members = chosen_members(case.n_design, count, case.optimizer.seed)
     tight = replace(case, solver=replace(case.solver, tolerance=min(case.solver.tolerance, _TIGHT)))
-    exact = Evaluator(tight)
-    found = differences(lambda x: exact.evaluate(x, gradient=False).objectives, alpha, members)
+    # fixed steps are differenced as they are: the tolerance would choose others, and too many
+    fixed = case.solver.integrator == "generalized_alpha"
+    exact = Evaluator(case if fixed else tight)
+
+    def objectives(x: "NDArray[np.float64]") -> "Mapping[str, float]":
+        found = exact.evaluate(x, gradient=False)
+        if not found.status.usable:
+            raise ArithmeticError(f"{found.status.value} {found.message}".strip())
+        return found.objectives
+
+    try:
+        found = differences(objectives, alpha, members)
+    except ArithmeticError as error:
+        return f"differences: {error}"
     for result in results.values():
         result["differences"] = {
             name: float(np.abs(gradient[members] - found[name]).max() / (np.abs(gradient).max() or 1.0))
@@ -188,6 +202,7 @@ def _difference(
         }
     datasets["differences/members"] = members.astype(np.int64)
     datasets |= {f"differences/{name}": values for name, values in found.items()}
+    return ""
 
 
 def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", datasets: dict[str, Any]) -> str:

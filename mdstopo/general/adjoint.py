@@ -4,7 +4,7 @@ A row of `extremes` (or an integral over all stages) pulls on states, accelerati
 accelerations and multipliers goes through the transposed balance and leaves a virtual displacement z; so does every
 stage of every step on the way back. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum f_i (b_i . T z). An event on
 the way changes the cotangents by saltation (`events`); a peak at an event is not stationary and adds
-(dg/dt) dt_e/dalpha.
+(dg/dt) dt_e/dalpha; an integral of what jumps there adds (g- - g+) dt_e/dalpha.
 """
 
 import numpy as np
@@ -14,12 +14,24 @@ from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces, inerter_force
 from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
-from mdstopo.general.responses import ENERGY, MEMBER_FORCE, largest_force, response
+from mdstopo.general.responses import (
+    ENERGY,
+    JOINT_FORCE,
+    JOINT_MOMENT,
+    MEMBER_FORCE,
+    POINT,
+    largest_force,
+    response,
+)
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import DESIGN, FORCES
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.table import law
+
+#: share of the value inside a step below which an integrand has no direction of its own, or may have turned round; and
+#: by which two forces may differ where the largest changes hands
+ASIDE, VANISHING = 1e-6, 0.02
 
 
 @kernel
@@ -106,8 +118,11 @@ def free_only(model, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def through_events(model, track, state, lam_q, lam_v):  # type: ignore[no-untyped-def]
-    """Pull cotangents behind the events of a state back to before them (saltation), in place."""
+def through_events(model, track, state, lam_q, lam_v, drops):  # type: ignore[no-untyped-def]
+    """Pull cotangents behind the events of a state back to before them (saltation), in place.
+
+    drops (E,): by how much an integrand falls at each event (`event_drops`), or no rows.
+    """
     last = track.index[state, 3]
     first = track.index[state - 1, 3] if state > 0 else last
     for back in range(last - first):
@@ -120,15 +135,20 @@ def through_events(model, track, state, lam_q, lam_v):  # type: ignore[no-untype
         for d in range(lam_v.shape[0]):
             lam_q[d] -= pulled * track.salt[e, 0, d]
             lam_v[d] -= pulled * track.salt[e, 1, d]
+        if drops.shape[0] > 0:
+            for d in range(lam_v.shape[0]):
+                lam_q[d] -= drops[e] * track.salt[e, 0, d]
+                lam_v[d] -= drops[e] * track.salt[e, 1, d]
     free_only(model, lam_q)
     free_only(model, lam_v)
 
 
 @kernel
-def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_bar, desk, out, work):  # type: ignore[no-untyped-def]
+def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_bar, drops, desk, out, work):  # type: ignore[no-untyped-def]
     """Pull cotangents of fraction c of step w's motion back to the start; every stage adds to out (M_padded,).
 
-    bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of all stages (no rows: none).
+    bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of all stages (no rows: none); drops as of
+    `through_events`.
     """
     n = lam_q.shape[0]
     z = np.empty((17, n))
@@ -149,7 +169,7 @@ def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_ba
         c = 1.0
         before = track.index[w, 1]
         if before >= 0:
-            through_events(model, track, before + 1, lam_q, lam_v)
+            through_events(model, track, before + 1, lam_q, lam_v, drops)
         w = before
 
 
@@ -162,7 +182,8 @@ def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, 
     no_rows = np.empty((0, model.size[0]))
     w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, out, work)
     if w >= 0:
-        sweep(tag, model, tables, strength, track, w, c, bars[0], bars[1], none, no_rows, desk, out, work)
+        no_drops = np.empty(0)
+        sweep(tag, model, tables, strength, track, w, c, bars[0], bars[1], none, no_rows, no_drops, desk, out, work)
 
 
 @kernel
@@ -208,7 +229,7 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     explicit_part(model, segment, j, who, t, strength, q, v, a, 1.0, out)
     at = k if c <= 0.0 else k + 1
     if c <= 0.0 and k > 0:
-        through_events(model, track, k, bars[0], bars[1])
+        through_events(model, track, k, bars[0], bars[1], np.empty(0))
     if (c <= 0.0 and k > 0) or c >= 1.0:
         event = _first_event(track, at)
         if event >= 0:
@@ -240,8 +261,107 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
     if gradient:
         lam_q = np.zeros(n)
         lam_v = np.zeros(n)
-        sweep(tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, desk, out, work)
+        drops = event_drops(model, strength, track, count, j, square, desk)
+        sweep(tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, drops, desk, out, work)
     return total
+
+
+@kernel
+def event_drops(model, strength, track, count, j, square, desk):  # type: ignore[no-untyped-def]
+    """(E,): g_j (or its square) before each event, less that after it; the integral feels when the event is."""
+    events = track.index[count, 3]
+    drops = np.zeros(events)
+    values = np.empty(2)
+    for e in range(events):
+        state = track.event[e, 0]
+        if state <= 0 or state >= count:
+            continue
+        for side in range(2):
+            restore_modes(track, e + side, strength)
+            values[side] = value_at(
+                model, strength, track.index[state - 1, 2], track.t[state], track.state[state], j, desk
+            )
+        if square:
+            values *= values
+        drops[e] = values[0] - values[1]
+    return drops
+
+
+@kernel
+def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-untyped-def]
+    """g_j at a state (2, n), in the modes that members are in."""
+    n = model.mass.shape[0]
+    q = state[0].copy()
+    v = state[1].copy()
+    a = np.empty(n)
+    lam = np.empty(model.size[0])
+    bars = np.empty((3, n))
+    row_bar = np.empty(model.size[0])
+    balance(model, strength, segment, t, q, v, np.bool_(False), desk, a, lam)
+    who = -1
+    if model.response[j, 0] == MEMBER_FORCE:
+        who = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
+    return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+
+
+@kernel
+def one_sided(model, strength, segment, track, w, at, j, who, value, t, desk, own, own_rows):  # type: ignore[no-untyped-def]
+    """g_j and its slopes at a stage of step w as they go on from inside the step, which ends where g_j has a kink.
+
+    An absolute value or a norm that all but vanishes at the stage may have turned round there, and the largest force
+    may be another's, by what the stage is off by; then the integrand is followed as the smooth function that it is
+    inside. In place: own (3, n), own_rows (n_row,). Returns the value, and whose force it is.
+    """
+    o = track.index[w, 0]
+    inside = o + (track.index[w + 1, 0] - o) // 2
+    if inside == at:
+        return value, who
+    n = model.mass.shape[0]
+    state = np.empty((3, n))
+    lam = np.empty(model.size[0])
+    slopes = np.empty((3, n))
+    rows = np.empty(model.size[0])
+    stage = track.stage[inside]
+    mine = -1
+    if model.response[j, 0] == MEMBER_FORCE:
+        mine = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
+    size = response(
+        model, strength, segment, j, mine, t, stage[0], stage[1], stage[2], track.lam[inside], desk, slopes, rows
+    )
+    if mine != who:  # nearly as large as the largest here: it is the largest inside
+        near = track.stage[at]
+        other = response(
+            model, strength, segment, j, mine, t, near[0], near[1], near[2], track.lam[at], desk, slopes, rows
+        )
+        if other < (1.0 - VANISHING) * value:
+            return value, who
+        own[:] = slopes
+        own_rows[:] = rows
+        return other, mine
+    if value > VANISHING * size:
+        return value, who
+    if value <= ASIDE * size:  # no direction of its own: that of a state a little inside
+        for i in range(3):
+            for d in range(n):
+                state[i, d] = track.stage[at, i, d] + ASIDE * (stage[i, d] - track.stage[at, i, d])
+        for r in range(model.size[0]):
+            lam[r] = track.lam[at, r] + ASIDE * (track.lam[inside, r] - track.lam[at, r])
+        response(model, strength, segment, j, who, t, state[0], state[1], state[2], lam, desk, own, own_rows)
+        return value, who
+    turned = 0.0
+    for i in range(3):
+        for d in range(n):
+            turned += own[i, d] * slopes[i, d]
+    for r in range(model.size[0]):
+        turned += own_rows[r] * rows[r]
+    if turned >= 0.0:
+        return value, who
+    for i in range(3):
+        for d in range(n):
+            own[i, d] = -own[i, d]
+    for r in range(model.size[0]):
+        own_rows[r] = -own_rows[r]
+    return -value, who
 
 
 @kernel
@@ -260,7 +380,9 @@ def integral_cotangents(tag, model, tables, strength, track, count, j, square, b
     total = 0.0
     out[:] = 0.0
     none = np.zeros(n)
-    energy = model.response[j, 0] == ENERGY
+    kind = model.response[j, 0]
+    energy = kind == ENERGY
+    may_be_kink = kind in (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT, POINT)
     for w in range(count):
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
@@ -281,6 +403,8 @@ def integral_cotangents(tag, model, tables, strength, track, count, j, square, b
             value = response(
                 model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[o + i], desk, own, own_rows
             )
+            if may_be_kink:
+                value, who = one_sided(model, strength, segment, track, w, o + i, j, who, value, t, desk, own, own_rows)
             factor = weight[i] * (2.0 * value if square else 1.0)
             total += weight[i] * (value * value if square else value)
             if not gradient:
@@ -292,5 +416,8 @@ def integral_cotangents(tag, model, tables, strength, track, count, j, square, b
                 rows_bar[o + i, r] = factor * own_rows[r]
             if energy:
                 add_design(model, segment, t, strength, stage[0], stage[1], stage[2], none, factor, out, work)
-            explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor, out)
+            # followed beyond a kink, an absolute value is the negative of itself
+            beyond = kind == MEMBER_FORCE and value < 0.0
+            own_factor = -factor if beyond else factor
+            explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], own_factor, out)
     return total

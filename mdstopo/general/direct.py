@@ -7,7 +7,7 @@ are each member's own. At events the derivatives jump by saltation. At the row's
 
 import numpy as np
 
-from mdstopo.general.adjoint import integral_cotangents, row_cotangents
+from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.balance import make_desk
 from mdstopo.general.duties import step_forward
 from mdstopo.general.events import member_rows
@@ -122,8 +122,11 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
 
 
 @kernel
-def jump(model, track, state, column):  # type: ignore[no-untyped-def]
-    """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows."""
+def jump(model, track, state, column, drops):  # type: ignore[no-untyped-def]
+    """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows.
+
+    drops as of `adjoint.through_events`: the last column, an integral's derivative, takes them in.
+    """
     n = model.mass.shape[0]
     if state == 0:
         return
@@ -136,6 +139,8 @@ def jump(model, track, state, column):  # type: ignore[no-untyped-def]
                 later -= track.salt[e, 0, d] * column[i, d] + track.salt[e, 1, d] * column[i, n + d]
             for d in range(n):
                 column[i, n + d] += track.salt[e, 2, d] * later
+            if drops.shape[0] > 0:
+                column[i, 4 * n] += drops[e] * later
 
 
 @entry
@@ -175,6 +180,7 @@ def push(  # type: ignore[no-untyped-def]
     stages = track.index[count, 0] if integral > 0 else 0
     stage_bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, n_row))
+    drops = np.empty(0)
     w = count
     c = 1.0
     last = count
@@ -182,6 +188,7 @@ def push(  # type: ignore[no-untyped-def]
         integral_cotangents(
             tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, desk, padded, work
         )
+        drops = event_drops(model, strength, track, count, j, integral == 2, desk)
     else:
         w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
         last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
@@ -195,7 +202,7 @@ def push(  # type: ignore[no-untyped-def]
         )
         if not settled:
             return k
-        jump(model, track, k + 1, column)
+        jump(model, track, k + 1, column, drops)
     if (
         integral == 0
         and w >= 0
@@ -243,4 +250,4 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
                 padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
         unscale_general(model.block, model.power, alpha, padded, out[k])
         if k > 0:
-            jump(model, track, k, column)
+            jump(model, track, k, column, np.empty(0))

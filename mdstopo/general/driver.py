@@ -1,6 +1,8 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
 import math
+from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -11,7 +13,8 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
-from mdstopo.general.model import COUNT, GROUP, INERTER, START, pack_general
+from mdstopo.general.kinks import kinks, landed, may_kink
+from mdstopo.general.model import COUNT, GROUP, INERTER, START, GeneralModel, pack_general
 from mdstopo.general.rivals import compete, members_peaks
 from mdstopo.general.track import GRAZES, track_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
@@ -43,7 +46,7 @@ class GeneralDriver:
         self.scene = scene
         self.method = method
         model = scene.model
-        self.ints, self.floats = pack_general(model)
+        self._packed = self.ints, self.floats = pack_general(model)
         self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
         self.reductions = np.zeros(len(scene.responses), dtype=np.int64)
         self.work = np.zeros(WORK, dtype=np.int64)
@@ -56,6 +59,8 @@ class GeneralDriver:
         self.gradients = np.zeros((count, ROWS, n_design))
         self.where = np.full(3, -1, dtype=np.int64)
         self.events = 0
+        #: where the steps of the last evaluation had to end (`kinks`)
+        self.landings: list[float] = []
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
         self._entry: Any = None
         self._message = ""
@@ -115,10 +120,25 @@ class GeneralDriver:
     def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
         code, count, time = self.run(alpha, gradient)
+        self.landings = self._kinks(count) if code == OK else []
+        if self.landings:
+            code, count, time = self.run(alpha, gradient, self.landings)
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient)
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]), self._grazing())
+
+    def _kinks(self, count: int) -> list[float]:
+        """Times at which what is integrated has kinks; steps are to end there (`kinks`)."""
+        found: list[float] = []
+        for j, name in enumerate(self.scene.reductions):
+            if name in INTEGRALS and may_kink(self.scene.model, j):
+                see = partial(self._see, j, count)
+                found += kinks(self.states()[0][: count + 1].copy(), see)
+        return found
+
+    def _see(self, j: int, count: int, places: FloatArray, exact: bool) -> FloatArray:
+        return self.visit(j, places, exact, count)[2]
 
     def _grazing(self) -> int:
         """A member (padded) that grazes where something is looked at, or -1."""
@@ -144,9 +164,7 @@ class GeneralDriver:
             self.found[j] = 1
             return
 
-        def see(places: FloatArray, exact: bool) -> FloatArray:
-            return self.visit(j, places, exact, count)[2]
-
+        see = partial(self._see, j, count)
         if compete(self.scene.model.response[j, 0], reduction):
             found = ranked(members_peaks(self, j, t, reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
         elif reduction == "final":
@@ -202,9 +220,13 @@ class GeneralDriver:
         )  # fmt: skip
         return total
 
-    def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
-        """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
+    def run(self, alpha: FloatArray, tangent: bool, landings: Sequence[float] = ()) -> tuple[int, int, float]:
+        """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached.
+
+        landings: times at which steps are to end, beside those of the model.
+        """
         self._alpha[:] = alpha
+        self.ints, self.floats = pack_general(landed(self._model(), landings)) if landings else self._packed
         while True:
             self.work[:] = 0
             code, count, self.events, time = self.entry.simulate(
@@ -226,6 +248,11 @@ class GeneralDriver:
     def message(self) -> str:
         """Who is to blame for how the last run ended, or nothing."""
         return self._message
+
+    def _model(self) -> GeneralModel:
+        """The model with the start that was assembled, where it was."""
+        model, n = self.scene.model, len(self.scene.model.mass)
+        return model._replace(q0=self._packed[1][n : 2 * n].copy(), v0=self._packed[1][2 * n : 3 * n].copy())
 
     def _explain(self, code: int, time: float) -> str:
         if code == OK:

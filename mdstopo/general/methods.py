@@ -26,7 +26,7 @@ def differentiate(driver: "GeneralDriver", method: str, alpha: FloatArray, looke
     gradients, message = np.zeros_like(looked.gradients), ""
     rows = looked.rows.copy()
     before = driver.work.copy()
-    _, count, _ = driver.run(alpha, True)
+    _, count, _ = driver.run(alpha, True, driver.landings)
     driver.work += before
     for j, reduction in enumerate(driver.scene.reductions):
         for r in range(int(looked.found[j])):

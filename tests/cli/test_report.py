@@ -14,12 +14,13 @@ from mdstopo.report.content import content
 from tests.front.support import CASE
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-#: what is done to the page: the slider is moved, a point is clicked, the colour changed; what came of it is written down
+#: what is done to the page: slider, colour, a point of the front; what came of it is written down
 PROBE = """
 <script>
 const seen = { errors };
 const pixels = () => { const c = document.getElementById("layout");
-  return c.getContext("2d").getImageData(0, 0, c.width, c.height).data.reduce((a, x, i) => (a * 31 + x * (i % 97)) % 1000003, 7); };
+  const image = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
+  return image.reduce((a, x, i) => (a * 31 + x * (i % 97)) % 1000003, 7); };
 seen.ready = document.body.dataset.ready;
 seen.before = pixels();
 const slider = document.getElementById("time");
@@ -31,7 +32,9 @@ const colour = document.getElementById("colour");
 colour.value = "force"; colour.dispatchEvent(new Event("change"));
 seen.coloured = pixels();
 const point = document.querySelector('circle[data-point="0"]');
-if (point) { point.dispatchEvent(new Event("click")); seen.design = document.body.dataset.design; seen.clicked = pixels(); }
+if (point) {
+  point.dispatchEvent(new Event("click"));
+  seen.design = document.body.dataset.design; seen.clicked = pixels(); }
 seen.charts = document.querySelectorAll("svg").length;
 seen.ticks = [...document.querySelectorAll("svg text")].map((t) => t.textContent);
 document.title = "seen" + JSON.stringify(seen);

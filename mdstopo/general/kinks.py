@@ -1,0 +1,133 @@
+"""Integrals over time of what has kinks: a norm that passes zero, the largest of several forces that changes hands.
+
+A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
+first looked at, and computed once more with steps that end at its kinks (and around bends that are nearly such). The
+integrand is continuous there, so that its derivatives need no term of their own.
+"""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from mdstopo.general.extremes import FRACTION, FRACTIONS, STEP, VALUE, peaks, sample
+from mdstopo.general.model import GeneralModel
+from mdstopo.general.responses import JOINT_FORCE, JOINT_MOMENT, MEMBER_FORCE, POINT
+from mdstopo.scene.model import FloatArray
+
+#: column of the norm in `GeneralModel.response` for points
+NORM = 2
+#: a low value counts as a kink, or nearly one, below this share of the highest
+LOW = 0.05
+#: bisections that find where the largest force changes hands
+HALVINGS = 60
+
+See = Callable[[FloatArray, bool], FloatArray]
+
+
+def may_kink(model: GeneralModel, j: int) -> bool:
+    """Whether response j is a norm, an absolute value, or a largest one."""
+    kind, component = int(model.response[j, 0]), int(model.response[j, 3])
+    return kind in (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT) or (kind == POINT and component == NORM)
+
+
+def kinks(t: FloatArray, see: See) -> list[float]:
+    """Times inside (t[0], t[-1]) at which steps are to end, from looks at the steps between times t (m + 1,)."""
+    samples = sample(t, see)
+    highest = float(np.abs(samples.value).max())
+    if highest == 0.0:
+        return []
+    found: list[float] = []
+    for row in peaks(samples, see, -1.0, 1e9):
+        low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
+        if low > LOW * highest or not t[0] < row[0] < t[-1]:
+            continue
+        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), see)
+        time = float(t[w] + c * (t[w + 1] - t[w]))
+        found.append(time)
+        found += _around(time, low, float(np.abs(samples.rate).max()), float(t[0]), float(t[-1]))
+    found += _changes_of_hands(t, samples.who, see)
+    return found
+
+
+def _sharpened(w: int, c: float, see: See) -> float:
+    """Where in step w a value comes down to zero and goes up again: rates near a kink are smeared, values are not.
+
+    On both sides the value is a line through zero, so that two values tell where.
+    """
+    for d in (3e-3, 1e-4, 3e-6, 1e-7):
+        if c <= d or c >= 1.0 - d:
+            break
+        left, right = see(np.array([[w, c - d], [w, c + d]]), True)[:, 0].tolist()
+        if left + right > 0.0:
+            c += d * (left - right) / (left + right)
+    return min(max(c, 0.0), 1.0)
+
+
+def _around(time: float, low: float, rate: float, start: float, end: float) -> list[float]:
+    """Times about a low value at distances that double, so that steps resolve a bend as sharp as it is low."""
+    if rate <= 0.0 or low <= 1e-9 * rate * (end - start):
+        return []
+    found, width = [], 2.0 * low / rate
+    while width < 0.05 * (end - start):
+        found += [each for each in (time - width, time + width) if start < each < end]
+        width *= 3.0
+    return found
+
+
+def _changes_of_hands(t: FloatArray, who: FloatArray, see: See) -> list[float]:
+    """Where the member with the largest force becomes another one."""
+    found = []
+    for w in range(len(t) - 1):
+        for i in range(len(FRACTIONS) - 1):
+            if who[w, i] == who[w, i + 1]:
+                continue
+            low, high, first = FRACTIONS[i], FRACTIONS[i + 1], who[w, i]
+            for _ in range(HALVINGS):
+                middle = 0.5 * (low + high)
+                if not low < middle < high:
+                    break
+                if see(np.array([[float(w), middle]]), True)[0, 2] == first:
+                    low = middle
+                else:
+                    high = middle
+            found.append(float(t[w] + high * (t[w + 1] - t[w])))
+    return found
+
+
+def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
+    """The model with further ends of segments; what acts in time is the same function as before."""
+    old = model.times
+    apart = 1e-10 * float(old[-1] - old[0])
+    new = list(old.tolist())
+    for time in sorted(times):
+        if min(abs(time - each) for each in new) > apart:
+            new.append(time)
+    new.sort()
+    whole = np.array(new)
+    parent = np.clip(np.searchsorted(old, whole[:-1], side="right") - 1, 0, len(old) - 2)
+    tau = whole[:-1] - old[parent]
+
+    def linear(array: FloatArray) -> FloatArray:
+        part = array[parent].copy()
+        part[..., 0] += tau.reshape(-1, *[1] * (part.ndim - 2)) * part[..., 1]
+        return part
+
+    d = model.drive[parent]
+    x = tau[:, None]
+    drive = np.stack(
+        [
+            d[..., 0] + x * (d[..., 1] + x * (d[..., 2] + x * d[..., 3])),
+            d[..., 1] + x * (2.0 * d[..., 2] + 3.0 * x * d[..., 3]),
+            d[..., 2] + 3.0 * x * d[..., 3],
+            d[..., 3],
+        ],
+        axis=-1,
+    )
+    return model._replace(
+        times=whole,
+        active=model.active[parent],
+        level=linear(model.level),
+        force=linear(model.force),
+        load_force=linear(model.load_force),
+        drive=drive.reshape(len(parent), *model.drive.shape[1:]),
+    )

@@ -1,0 +1,164 @@
+"""Integrals over time of what jumps at events, or has kinks: values and gradients against other ways to them."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from mdstopo import evaluate
+from mdstopo.case.reader import read_case
+
+#: a mass between a spring and a damped stop that it hits and leaves again
+STOP = """
+format: 1
+time: {end: 1}
+bodies:
+  a: {mass: 1, inertia: 1, position: [2, 0], velocity: [1, 0]}
+members:
+  s: {from: {body: ground, at: [0, 0]}, to: {body: a, at: [2, 0]}, law: {type: spring, stiffness: 3}}
+  g:
+    {from: {body: ground, at: [-1, 0]}, to: {body: a, at: [2, 0]}, law: {type: gap, stiffness: 20, damping: 4, gap: 0.2}}
+design: {initial: 0.5}
+objectives:
+  A: {response: {acceleration: {body: a, component: x}}, over_time: mean}
+  V: {response: {velocity: {body: a, component: x}}, over_time: final}
+  F: {response: {member_force: {group: g}}, over_time: rms}
+combine: {weights: {A: 1, V: 1, F: 1}}
+solver: {integrator: runge_kutta}
+"""
+
+#: an oscillator whose force, place and speed pass zero: x = 2 + sin(3 t) / 3 at alpha = 1
+SWING = """
+format: 1
+time: {end: 3}
+bodies:
+  a: {mass: 1, inertia: 1, position: [2, 0], velocity: [1, 0]}
+members:
+  s: {from: {body: ground, at: [0, 0]}, to: {body: a, at: [2, 0]}, law: {type: spring, stiffness: 9}}
+design: {initial: 1}
+objectives:
+  F: {response: {RESPONSE}, over_time: integral}
+"""
+
+
+def differences(case, name, alpha, size=1e-5):
+    found = np.zeros(len(alpha))
+    for i in range(len(alpha)):
+        for k, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+            for sign in (1.0, -1.0):
+                x = alpha.copy()
+                x[i] += sign * k * size
+                found[i] += sign * weight * evaluate(case, x, gradient=False).objectives[name] / size
+    return found
+
+
+@pytest.mark.parametrize("method", ["adjoint", "direct"])
+@pytest.mark.parametrize("clip", [False, True])
+def test_an_integrand_that_jumps_at_an_event_feels_when_the_event_is(method, clip):
+    """The mean acceleration is the change of velocity: so are their gradients."""
+    case = read_case(STOP.replace("gap: 0.2}", f"gap: 0.2, clip: {str(clip).lower()}}}"))
+    alpha = np.array([0.5, 0.7])
+    found = evaluate(case, alpha, method=method)
+    assert found.objectives["A"] == pytest.approx(found.objectives["V"] - 1.0, rel=1e-8)
+    assert found.gradients["A"] == pytest.approx(found.gradients["V"], rel=1e-7)
+    assert found.gradients["F"] == pytest.approx(differences(case, "F", alpha), rel=1e-5)
+
+
+def exact(kind):
+    """The integral and its derivative by alpha, omega^2 = 9 alpha, from quadrature of the closed form."""
+    from scipy.integrate import quad
+
+    def value(alpha):
+        w = 3.0 * np.sqrt(alpha)
+        kinks = np.arange(1, 8) * np.pi / w if kind != "velocity" else (np.arange(8) + 0.5) * np.pi / w
+        g = {
+            "member_force": lambda t: 9.0 * alpha * abs(np.sin(w * t)) / w,
+            "displacement": lambda t: abs(np.sin(w * t)) / w,
+            "velocity": lambda t: abs(np.cos(w * t)),
+        }[kind]
+        edges = [0.0, *kinks[kinks < 3.0], 3.0]
+        return sum(quad(g, a, b, epsabs=1e-14)[0] for a, b in pairwise(edges))
+
+    h = 1e-4
+    slope = sum(w * (value(1 + k * h) - value(1 - k * h)) for k, w in ((1, 0.75), (2, -0.15), (3, 1 / 60))) / h
+    return value(1.0), slope
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+@pytest.mark.parametrize("method", ["adjoint", "direct"])
+@pytest.mark.parametrize(
+    ("kind", "response"),
+    [
+        ("member_force", "{member_force: {group: s}}"),
+        ("displacement", "{displacement: {body: a}}"),
+        ("velocity", "{velocity: {body: a}}"),
+    ],
+)
+def test_integrals_of_absolute_values_are_right_where_they_pass_zero(kind, response, method, tolerance):
+    case = read_case(SWING.replace("{RESPONSE}", response), overrides={"solver.tolerance": tolerance})
+    value, slope = exact(kind)
+    found = evaluate(case, method=method)
+    assert found.objectives["F"] == pytest.approx(value, rel=max(10 * tolerance, 1e-9))
+    assert found.gradients["F"] == pytest.approx([slope], rel=max(100 * tolerance, 1e-5))
+
+
+@pytest.mark.parametrize("over_time", ["mean", "rms", "integral"])
+def test_the_largest_of_several_forces_changes_hands(over_time):
+    text = """
+format: 1
+time: {end: 3}
+bodies:
+  a: {mass: 1, inertia: 1, position: [0, 0], velocity: [1, 0]}
+joints:
+  - {name: p, type: prismatic, bodies: [ground, a], at: [0, 0], axis: [1, 0]}
+points:
+  p: {body: ground, grid: {list: [[-3, 0], [0, 2]]}}
+  q: {body: a, grid: {list: [[0, 0], [0.1, 0.3]]}}
+members:
+  g: {from: p, to: q, connect: pairs, law: {type: spring, stiffness: 9, preload: 2}}
+design: {initial: 0.6}
+objectives:
+  F: {response: {member_force: {group: g}}, over_time: OVER}
+"""
+    case = read_case(text.replace("OVER", over_time))
+    alpha = np.array([0.7, 0.5])
+    tight = read_case(text.replace("OVER", over_time), overrides={"solver.tolerance": 1e-11})
+    found, better = evaluate(case, alpha), evaluate(tight, alpha)
+    assert found.objectives["F"] == pytest.approx(better.objectives["F"], rel=1e-7)
+    assert found.gradients["F"] == pytest.approx(differences(tight, "F", alpha), rel=1e-5)
+    assert evaluate(case, alpha, method="direct").gradients["F"] == pytest.approx(found.gradients["F"], rel=1e-9)
+
+
+def test_only_what_may_have_kinks_is_looked_at_twice():
+    smooth = evaluate(read_case(SWING.replace("{RESPONSE}", "{displacement: {body: a, component: x}}")))
+    kinked = evaluate(read_case(SWING.replace("{RESPONSE}", "{displacement: {body: a}}")))
+    assert kinked.work["steps"] > smooth.work["steps"]
+
+
+def test_landings_leave_tables_and_driven_motion_as_they_were():
+    text = """
+format: 1
+time: {end: 1}
+bodies:
+  cart: {mass: 1, inertia: 1, position: [0, 0]}
+  a: {mass: 1, inertia: 1, position: [1, 0.2]}
+motions:
+  - {body: cart, x: {acceleration: {table: [[0, 0], [0.3, 4], [1, -4]]}}, y: {velocity: 0}, angle: {velocity: 0}}
+members:
+  s: {from: {body: cart, at: [0, 0]}, to: {body: a, at: [1, 0.2]}, law: {type: spring, stiffness: 60, damping: 1}}
+loads:
+  - {body: a, force: [{table: [[0, 0], [0.4, 5], [1, 0]]}, 1]}
+design: {initial: 0.8}
+objectives:
+  F: {response: {member_force: {group: s}}, over_time: mean}
+  X: {response: {displacement: {body: a, component: x}}, over_time: final}
+combine: {weights: {F: 1, X: 1}}
+"""
+    from mdstopo import simulate
+
+    case = read_case(text)
+    found = evaluate(case)
+    # X is read off the motion that lands on the kinks of F; the plain motion must end at the same place
+    end = simulate(case).q[-1, 3]
+    assert found.objectives["X"] == pytest.approx(end - 1.0, rel=1e-8)
+    assert found.gradients["F"] == pytest.approx(differences(case, "F", np.array([0.8])), rel=1e-5)
