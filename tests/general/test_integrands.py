@@ -17,7 +17,9 @@ bodies:
 members:
   s: {from: {body: ground, at: [0, 0]}, to: {body: a, at: [2, 0]}, law: {type: spring, stiffness: 3}}
   g:
-    {from: {body: ground, at: [-1, 0]}, to: {body: a, at: [2, 0]}, law: {type: gap, stiffness: 20, damping: 4, gap: 0.2}}
+    from: {body: ground, at: [-1, 0]}
+    to: {body: a, at: [2, 0]}
+    law: {type: gap, stiffness: 20, damping: 4, gap: 0.2}
 design: {initial: 0.5}
 objectives:
   A: {response: {acceleration: {body: a, component: x}}, over_time: mean}
