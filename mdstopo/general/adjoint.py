@@ -14,15 +14,7 @@ from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces, inerter_force
 from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
-from mdstopo.general.responses import (
-    ENERGY,
-    JOINT_FORCE,
-    JOINT_MOMENT,
-    MEMBER_FORCE,
-    POINT,
-    largest_force,
-    response,
-)
+from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import DESIGN, FORCES
 from mdstopo.jit import kernel
@@ -305,47 +297,55 @@ def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-un
 
 
 @kernel
-def one_sided(model, strength, segment, track, w, at, j, who, value, t, desk, own, own_rows):  # type: ignore[no-untyped-def]
-    """g_j and its slopes at a stage of step w as they go on from inside the step, which ends where g_j has a kink.
+def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows):  # type: ignore[no-untyped-def]
+    """g_j at a stage, its slopes into own (3, n) and own_rows (n_row,), and whose force it is; who < 0: the largest."""
+    stage = track.stage[at]
+    t = track.when[at]
+    if model.response[j, 0] == ENERGY:
+        general_forces(
+            model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk.rel, desk.sums, desk.f,
+            desk.k, desk.c, desk.turn,
+        )  # fmt: skip
+    if who < 0 and model.response[j, 0] == MEMBER_FORCE:
+        who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
+    value = response(
+        model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[at], desk, own, own_rows
+    )
+    return value, who
+
+
+@kernel
+def one_sided(  # type: ignore[no-untyped-def]
+    model, strength, segment, track, at, inside, j, who, value, mine, size, slopes, rows, desk, own, own_rows
+):
+    """g_j and its slopes at a stage as they go on from inside the step, which ends where g_j has a kink.
 
     An absolute value or a norm that all but vanishes at the stage may have turned round there, and the largest force
     may be another's, by what the stage is off by; then the integrand is followed as the smooth function that it is
-    inside. In place: own (3, n), own_rows (n_row,). Returns the value, and whose force it is.
+    inside. In: who, value at the stage; mine, size, slopes (3, n), rows (n_row,) at the stage `inside`. In place: own
+    (3, n), own_rows (n_row,). Returns the value, and whose force it is.
     """
-    o = track.index[w, 0]
-    inside = o + (track.index[w + 1, 0] - o) // 2
-    if inside == at:
-        return value, who
     n = model.mass.shape[0]
-    state = np.empty((3, n))
-    lam = np.empty(model.size[0])
-    slopes = np.empty((3, n))
-    rows = np.empty(model.size[0])
-    stage = track.stage[inside]
-    mine = -1
-    if model.response[j, 0] == MEMBER_FORCE:
-        mine = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
-    size = response(
-        model, strength, segment, j, mine, t, stage[0], stage[1], stage[2], track.lam[inside], desk, slopes, rows
-    )
     if mine != who:  # nearly as large as the largest here: it is the largest inside
-        near = track.stage[at]
-        other = response(
-            model, strength, segment, j, mine, t, near[0], near[1], near[2], track.lam[at], desk, slopes, rows
-        )
+        others = np.empty((3, n))
+        others_rows = np.empty(model.size[0])
+        other, _ = at_stage(model, strength, segment, track, at, j, mine, desk, others, others_rows)
         if other < (1.0 - VANISHING) * value:
             return value, who
-        own[:] = slopes
-        own_rows[:] = rows
+        own[:] = others
+        own_rows[:] = others_rows
         return other, mine
     if value > VANISHING * size:
         return value, who
     if value <= ASIDE * size:  # no direction of its own: that of a state a little inside
+        state = np.empty((3, n))
+        lam = np.empty(model.size[0])
         for i in range(3):
             for d in range(n):
-                state[i, d] = track.stage[at, i, d] + ASIDE * (stage[i, d] - track.stage[at, i, d])
+                state[i, d] = track.stage[at, i, d] + ASIDE * (track.stage[inside, i, d] - track.stage[at, i, d])
         for r in range(model.size[0]):
             lam[r] = track.lam[at, r] + ASIDE * (track.lam[inside, r] - track.lam[at, r])
+        t = track.when[at]
         response(model, strength, segment, j, who, t, state[0], state[1], state[2], lam, desk, own, own_rows)
         return value, who
     turned = 0.0
@@ -382,29 +382,30 @@ def integral_cotangents(tag, model, tables, strength, track, count, j, square, b
     none = np.zeros(n)
     kind = model.response[j, 0]
     energy = kind == ENERGY
-    may_be_kink = kind in (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT, POINT)
+    bends = kinked(model, j)
+    slopes = np.zeros((3, n))
+    rows = np.zeros(n_row)
+    mine = -1
+    size = 0.0
     for w in range(count):
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
         weights_of(tag, model, tables, track, w, weight)
         o = track.index[w, 0]
+        inside = o + (track.index[w + 1, 0] - o) // 2
+        if bends:
+            size, mine = at_stage(model, strength, segment, track, inside, j, -1, desk, slopes, rows)
         for i in range(track.index[w + 1, 0] - o):
             if weight[i] == 0.0:
                 continue
             stage = track.stage[o + i]
             t = track.when[o + i]
-            general_forces(
-                model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk.rel, desk.sums, desk.f,
-                desk.k, desk.c, desk.turn,
-            )  # fmt: skip
-            who = -1
-            if model.response[j, 0] == MEMBER_FORCE:
-                who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
-            value = response(
-                model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[o + i], desk, own, own_rows
-            )
-            if may_be_kink:
-                value, who = one_sided(model, strength, segment, track, w, o + i, j, who, value, t, desk, own, own_rows)
+            value, who = at_stage(model, strength, segment, track, o + i, j, -1, desk, own, own_rows)
+            if bends and o + i != inside:
+                value, who = one_sided(
+                    model, strength, segment, track, o + i, inside, j, who, value, mine, size, slopes, rows, desk, own,
+                    own_rows,
+                )  # fmt: skip
             factor = weight[i] * (2.0 * value if square else 1.0)
             total += weight[i] * (value * value if square else value)
             if not gradient:

@@ -13,8 +13,9 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
-from mdstopo.general.kinks import kinks, landed, may_kink
+from mdstopo.general.kinks import kinks, landed
 from mdstopo.general.model import COUNT, GROUP, INERTER, START, GeneralModel, pack_general
+from mdstopo.general.responses import kinked
 from mdstopo.general.rivals import compete, members_peaks
 from mdstopo.general.track import GRAZES, track_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
@@ -132,7 +133,7 @@ class GeneralDriver:
         """Times at which what is integrated has kinks; steps are to end there (`kinks`)."""
         found: list[float] = []
         for j, name in enumerate(self.scene.reductions):
-            if name in INTEGRALS and may_kink(self.scene.model, j):
+            if name in INTEGRALS and kinked.py_func(self.scene.model, j):  # type: ignore[attr-defined]
                 see = partial(self._see, j, count)
                 found += kinks(self.states()[0][: count + 1].copy(), see)
         return found
@@ -197,15 +198,17 @@ class GeneralDriver:
         who: the member whose force is looked at; -1: at each place the one with the largest.
         """
         model = self.scene.model
-        limits, room, ints, strength = (
-            (self.limits, self.room, self.room_ints, self.strength) if steps is None else steps.kept
+        packed, limits, room, room_ints, strength = (
+            ((self.ints, self.floats), self.limits, self.room, self.room_ints, self.strength)
+            if steps is None
+            else steps.kept
         )
         out = np.zeros((3, len(places), len(model.mass)))
         lam = np.zeros((len(places), int(model.size[0]) + len(model.driven)))
         seen = np.zeros((len(places), 3))
         self.entry.visit(
-            self.entry.TAG, self.ints, self.floats, self.method.tables, limits, count, room, ints, strength, exact, j,
-            who, places, out, lam, seen, self.work,
+            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, strength, exact, j, who,
+            places, out, lam, seen, self.work,
         )  # fmt: skip
         return out, lam, seen
 
@@ -344,7 +347,9 @@ class GeneralSteps:
 
     def __init__(self, driver: GeneralDriver, count: int) -> None:
         self._driver = driver
-        self.kept = driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.strength.copy()
+        # the model too: a later evaluation may land on other times (`GeneralDriver.run`)
+        packed = driver.ints, driver.floats
+        self.kept = packed, driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.strength.copy()
         self.count = count
         t, state = driver.states()
         self.t: FloatArray = t[: count + 1].copy()

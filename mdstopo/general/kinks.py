@@ -11,23 +11,14 @@ import numpy as np
 
 from mdstopo.general.extremes import FRACTION, FRACTIONS, STEP, VALUE, peaks, sample
 from mdstopo.general.model import GeneralModel
-from mdstopo.general.responses import JOINT_FORCE, JOINT_MOMENT, MEMBER_FORCE, POINT
 from mdstopo.scene.model import FloatArray
 
-#: column of the norm in `GeneralModel.response` for points
-NORM = 2
 #: a low value counts as a kink, or nearly one, below this share of the highest
 LOW = 0.05
 #: bisections that find where the largest force changes hands
 HALVINGS = 60
 
 See = Callable[[FloatArray, bool], FloatArray]
-
-
-def may_kink(model: GeneralModel, j: int) -> bool:
-    """Whether response j is a norm, an absolute value, or a largest one."""
-    kind, component = int(model.response[j, 0]), int(model.response[j, 3])
-    return kind in (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT) or (kind == POINT and component == NORM)
 
 
 def kinks(t: FloatArray, see: See) -> list[float]:

@@ -31,8 +31,17 @@ KINDS = {
     "joint_force": (JOINT_FORCE, 0),
     "joint_moment": (JOINT_MOMENT, 1),
 }
+#: component of a point's motion that is a norm
+NORM = 2
 #: fraction of a step by which the rate of a response is differenced where it has no formula
 APART = 3e-4
+
+
+@kernel
+def kinked(model, j):  # type: ignore[no-untyped-def]
+    """Whether response j is a norm, an absolute value, or a largest one, which may have kinks in time."""
+    kind = model.response[j, 0]
+    return kind in (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT) or (kind == POINT and model.response[j, 3] == NORM)
 
 
 @kernel

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mdstopo import evaluate
+from mdstopo import evaluate, simulate
 from mdstopo.case.reader import read_case
 
 #: a mass between a spring and a damped stop that it hits and leaves again
@@ -156,11 +156,31 @@ objectives:
   X: {response: {displacement: {body: a, component: x}}, over_time: final}
 combine: {weights: {F: 1, X: 1}}
 """
-    from mdstopo import simulate
-
     case = read_case(text)
     found = evaluate(case)
     # X is read off the motion that lands on the kinks of F; the plain motion must end at the same place
     end = simulate(case).q[-1, 3]
     assert found.objectives["X"] == pytest.approx(end - 1.0, rel=1e-8)
     assert found.gradients["F"] == pytest.approx(differences(case, "F", np.array([0.8])), rel=1e-5)
+
+
+def test_a_motion_stays_itself_when_a_later_evaluation_lands_elsewhere():
+    loads = "loads:\n  - {body: a, force: [{table: [[0, 0], [2.4, 2], [3, -9]]}, 0]}\ndesign:"
+    text = SWING.replace("{RESPONSE}", "{member_force: {group: s}}").replace("design:", loads)
+    case, times = read_case(text), np.linspace(0.05, 2.95, 40)
+    motion = simulate(case)
+    before = motion.at(times)
+    evaluate(case)
+    after = motion.at(times)
+    assert np.array_equal(before.a, after.a)
+    assert np.array_equal(before.q, after.q)
+
+
+def test_a_component_that_changes_its_sign_is_no_norm():
+    """Its integral is a smooth function's: the motion is not landed on its zeros, and its gradient is exact."""
+    case = read_case(SWING.replace("{RESPONSE}", "{displacement: {body: a, component: x}}"))
+    found = evaluate(case)
+    # x - 2 = sin(w t) / w, w = 3 sqrt(alpha)
+    assert found.objectives["F"] == pytest.approx((1.0 - np.cos(9.0)) / 9.0, rel=1e-8)
+    slope = 1.5 * (3.0 * np.sin(9.0) / 9.0 - 2.0 * (1.0 - np.cos(9.0)) / 27.0)
+    assert found.gradients["F"] == pytest.approx([slope], rel=1e-8)
