@@ -1,84 +1,37 @@
 """How a front or a sweep shows that it is going: a live table on a terminal, now and then a line elsewhere."""
 
 import sys
-import time
-from collections.abc import Callable
-from types import TracebackType
 from typing import TYPE_CHECKING
 
-from mdstopo.cli.output import duration, number, write
+from mdstopo.cli import display as displays
+from mdstopo.cli.output import duration, number
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from mdstopo.front.session import Snapshot
 
-_EVERY = 3.0  # seconds between plain lines
-_REFRESH = 0.1  # seconds between changes of the table
 _ROWS = 25  # points that a table shows at once
 
 
-class Silent:
-    """Says nothing."""
+class Plain(displays.Plain["Snapshot"]):
+    """A line every few seconds."""
 
-    def __enter__(self) -> "Silent":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        return None
-
-    def __call__(self, snapshot: "Snapshot") -> None:
-        """Nothing."""
+    def _words(self, snapshot: "Snapshot") -> str:
+        return line(snapshot)
 
 
-class Plain(Silent):
-    """A line every few seconds: for logs. What is over before says nothing."""
+class Live(displays.Live["Snapshot"]):
+    """A table that changes in place."""
 
-    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock = clock
-        self._said_at = clock()
-
-    def __call__(self, snapshot: "Snapshot") -> None:
-        """Say it if it is time."""
-        now = self._clock()
-        if now - self._said_at >= _EVERY:
-            self._said_at = now
-            write(sys.stderr, line(snapshot))
+    def _picture(self, snapshot: "Snapshot") -> "Table":
+        return picture(snapshot)
 
 
-class Live(Silent):
-    """A table that changes in place, drawn with rich, which is imported only here."""
-
-    def __init__(self) -> None:
-        self._drawn_at = 0.0
-
-    def __enter__(self) -> "Live":
-        from rich.console import Console
-        from rich.live import Live as RichLive
-
-        self._live = RichLive(console=Console(stderr=True), auto_refresh=False, transient=True)
-        self._live.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._live.__exit__(kind, error, trace)
-
-    def __call__(self, snapshot: "Snapshot") -> None:
-        """Draw it, but not faster than an eye can follow."""
-        now = time.perf_counter()
-        if now - self._drawn_at >= _REFRESH:
-            self._drawn_at = now
-            self._live.update(picture(snapshot), refresh=True)
-
-
-def front_display(quiet: bool) -> Silent:
+def front_display(quiet: bool) -> "displays.Silent[Snapshot]":
     """The one that suits where standard error goes."""
     if quiet:
-        return Silent()
+        return displays.Silent()
     return Live() if sys.stderr.isatty() else Plain()
 
 

@@ -3,31 +3,20 @@
 import sys
 import time
 from collections.abc import Callable
-from types import TracebackType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
-from mdstopo.cli.output import duration, number, write
+from mdstopo.cli import display as displays
+from mdstopo.cli.output import duration, number
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from mdstopo.session.outcome import Progress
 
-_EVERY = 3.0  # seconds between plain lines
-_REFRESH = 0.1  # seconds between changes of the live line
+Silent = displays.Silent
 
 
-class Display(Protocol):
-    """A context manager that is told of every iteration."""
-
-    def __enter__(self) -> "Display": ...
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None: ...
-    def __call__(self, progress: "Progress") -> None: ...
-
-
-def display(quiet: bool) -> Display:
+def display(quiet: bool) -> "displays.Silent[Progress]":
     """The one that suits where standard error goes."""
     if quiet:
         return Silent()
@@ -70,66 +59,33 @@ def line(progress: "Progress") -> str:
     )
 
 
-class Silent:
-    """Says nothing."""
-
-    def __enter__(self) -> "Silent":
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        return None
-
-    def __call__(self, progress: "Progress") -> None:
-        """Nothing."""
-
-
-class Plain(Silent):
-    """A line every few seconds: for logs. A run that is over before says nothing."""
+class Plain(displays.Plain["Progress"]):
+    """A line every few seconds."""
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
-        self._clock = clock
-        self._said_at = clock()
+        super().__init__(clock)
         self._rate = Rate(clock)
 
     def __call__(self, progress: "Progress") -> None:
-        """Say it if it is time."""
+        """Count it, and say it if it is time."""
         self._rate.add()
-        now = self._clock()
-        if now - self._said_at >= _EVERY:
-            self._said_at = now
-            write(sys.stderr, f"{line(progress)}, {self._rate.words(progress)}")
+        super().__call__(progress)
+
+    def _words(self, progress: "Progress") -> str:
+        return f"{line(progress)}, {self._rate.words(progress)}"
 
 
-class Live(Silent):
-    """A line that changes in place, drawn with rich, which is imported only here."""
+class Live(displays.Live["Progress"]):
+    """A line that changes in place."""
 
     def __init__(self) -> None:
+        super().__init__()
         self._rate = Rate()
-        self._drawn_at = 0.0
-        self._latest: Progress | None = None
-
-    def __enter__(self) -> "Live":
-        from rich.console import Console
-        from rich.live import Live as RichLive
-
-        self._live = RichLive(console=Console(stderr=True), auto_refresh=False, transient=True)
-        self._live.__enter__()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._live.__exit__(kind, error, trace)
 
     def __call__(self, progress: "Progress") -> None:
-        """Draw it, but not faster than an eye can follow."""
+        """Count it, and draw it if it is time."""
         self._rate.add()
-        now = time.perf_counter()
-        if now - self._drawn_at >= _REFRESH:
-            self._drawn_at = now
-            self._live.update(self._picture(progress), refresh=True)
+        super().__call__(progress)
 
     def _picture(self, progress: "Progress") -> "Table":
         from rich.progress_bar import ProgressBar

@@ -1,0 +1,80 @@
+"""How what takes long shows that it is going: a picture on a terminal, now and then a plain line elsewhere."""
+
+import sys
+import time
+from collections.abc import Callable
+from types import TracebackType
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from mdstopo.cli.output import write
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+T = TypeVar("T")
+
+_EVERY = 3.0  # seconds between plain lines
+_REFRESH = 0.1  # seconds between changes of the picture
+
+
+class Silent(Generic[T]):
+    """Says nothing. A context manager that is told of every step of the work."""
+
+    def __enter__(self) -> "Silent[T]":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        return None
+
+    def __call__(self, progress: T) -> None:
+        """Nothing."""
+
+
+class Plain(Silent[T]):
+    """A line every few seconds: for logs. What is over before says nothing."""
+
+    def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
+        self._clock = clock
+        self._said_at = clock()
+
+    def __call__(self, progress: T) -> None:
+        """Say it if it is time."""
+        now = self._clock()
+        if now - self._said_at >= _EVERY:
+            self._said_at = now
+            write(sys.stderr, self._words(progress))
+
+    def _words(self, progress: T) -> str:
+        raise NotImplementedError
+
+
+class Live(Silent[T]):
+    """A picture that changes in place, drawn with rich, which is imported only here."""
+
+    def __init__(self) -> None:
+        self._drawn_at = 0.0
+
+    def __enter__(self) -> "Live[T]":
+        from rich.console import Console
+        from rich.live import Live as RichLive
+
+        self._live = RichLive(console=Console(stderr=True), auto_refresh=False, transient=True)
+        self._live.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._live.__exit__(kind, error, trace)
+
+    def __call__(self, progress: T) -> None:
+        """Draw it, but not faster than an eye can follow."""
+        now = time.perf_counter()
+        if now - self._drawn_at >= _REFRESH:
+            self._drawn_at = now
+            self._live.update(self._picture(progress), refresh=True)
+
+    def _picture(self, progress: T) -> "Table":
+        raise NotImplementedError
