@@ -3,6 +3,7 @@
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
 #   make lint, make types         ruff; mypy
+#   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
 #   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
 #   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
@@ -25,10 +26,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test lint types reproduce bench readme clean
+.PHONY: help run test lint types docs reproduce bench readme clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,10p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,11p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -67,6 +68,13 @@ lint: $(VENV)/.ready-dev
 types: $(VENV)/.ready-dev
 	$(BIN)/mypy
 
+$(VENV)/.ready-docs: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/.ready-docs
+	$(BIN)/python -m mkdocs build --strict
+
 # what benchmarks compare with beside the peers
 $(VENV)/.ready-bench: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --editable '.[ga]'
@@ -79,5 +87,5 @@ readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

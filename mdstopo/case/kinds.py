@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 from mdstopo.case.nodes import SCALAR, Node
@@ -137,10 +138,11 @@ class Text(Value):
 
 @frozen
 class Word(Value):
-    """One of a few words. instead: what is allowed besides, for the message."""
+    """One of a few words. instead: what is allowed besides, for the message; meanings: what each word means."""
 
     words: tuple[str, ...]
     instead: str = ""
+    meanings: tuple[str, ...] = ()
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """str or BAD."""
@@ -153,8 +155,14 @@ class Word(Value):
         return BAD
 
     def schema(self) -> Schema:
-        """enum."""
-        return {"type": "string", "enum": list(self.words)}
+        """enum, with its meanings where editors look for them."""
+        schema: Schema = {"type": "string", "enum": list(self.words)}
+        return {**schema, "enumDescriptions": list(self.meanings)} if any(self.meanings) else schema
+
+
+def explained(meanings: Mapping[str, str], instead: str = "") -> Word:
+    """One of the words that `meanings` explains."""
+    return Word(tuple(meanings), instead, tuple(meanings.values()))
 
 
 @frozen

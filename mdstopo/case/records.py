@@ -179,15 +179,19 @@ class Tagged(Value):
                 words = " | ".join(self.variants)
                 reading.mistake(path, f"the key {self.tag!r} is missing, allowed is {words}")
             return BAD
-        word = Word(tuple(self.variants)).read(entry[1], inside(path, self.tag), reading)
+        word = self._word().read(entry[1], inside(path, self.tag), reading)
         return BAD if word is BAD else self.variants[word].read(node, path, reading)
+
+    def _word(self) -> Word:
+        """The tag's value."""
+        return Word(tuple(self.variants), meanings=tuple(record.doc for record in self.variants.values()))
 
     def schema(self) -> Schema:
         """object whose further keys depend on the tag."""
         return {
             "type": "object",
             "required": [self.tag],
-            "properties": {self.tag: {"type": "string", "enum": list(self.variants)}},
+            "properties": {self.tag: self._word().schema()},
             "allOf": [
                 {
                     "if": {"properties": {self.tag: {"const": word}}, "required": [self.tag]},
@@ -200,19 +204,33 @@ class Tagged(Value):
 
 @frozen
 class Key(Value):
-    """One key of a mapping. default: the value where the key is left out (None: nothing)."""
+    """One key of a mapping.
+
+    doc: what it means; unit: what its numbers are in. default: the value where the key is left out (None: nothing);
+    otherwise: what is taken then, in words, where no constant is.
+    """
 
     name: str
     kind: Kind
     doc: str = ""
     required: bool = False
     default: Any = None
+    unit: str = ""
+    otherwise: str = ""
+
+    @property
+    def text(self) -> str:
+        """Meaning, unit, and what is taken where the key is left out."""
+        unit = f"in {self.unit}" if self.unit else ""
+        otherwise = f"default {self.otherwise}" if self.otherwise else ""
+        parts = [self.doc, unit, otherwise]
+        return ", ".join(part for part in parts if part)
 
     def schema(self) -> Schema:
         """The value's schema with the key's description and default."""
         schema = dict(self.kind.schema())
-        if self.doc:
-            schema["description"] = self.doc
+        if self.text:
+            schema["description"] = self.text
         if self.default is not None:
             schema["default"] = list(self.default) if isinstance(self.default, tuple) else self.default
         return schema
@@ -222,8 +240,8 @@ class Key(Value):
 class Record(Value):
     """A mapping with known keys.
 
-    one_of: of each of these sets exactly one key is needed; any_of: at least one of these; never_both: pairs;
-    needs: a key -> the one that must stand beside it.
+    doc: what it stands for, a sentence. one_of: of each of these sets exactly one key is needed; any_of: at least
+    one of these; never_both: pairs; needs: a key -> the one that must stand beside it.
     """
 
     what: str
@@ -232,6 +250,7 @@ class Record(Value):
     any_of: tuple[str, ...] = ()
     never_both: tuple[tuple[str, str], ...] = ()
     needs: tuple[tuple[str, str], ...] = ()
+    doc: str = ""
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """Fields (values may be BAD) or BAD."""
@@ -252,7 +271,7 @@ class Record(Value):
             elif key.required:
                 fields[name] = BAD
                 if name not in meant:
-                    explained = f" ({key.doc})" if key.doc else ""
+                    explained = f" ({key.text})" if key.text else ""
                     reading.mistake(path, f"the key {name!r} is missing{explained}")
             else:
                 fields[name] = key.default
@@ -306,6 +325,8 @@ class Record(Value):
             "properties": {key.name: key.schema() for key in self.keys},
             "additionalProperties": False,
         }
+        if self.doc:
+            schema["description"] = self.doc
         required = [key.name for key in self.keys if key.required]
         if required:
             schema["required"] = required

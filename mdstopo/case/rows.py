@@ -38,7 +38,11 @@ class FileName(Value):
         return {"type": "string", "minLength": 1}
 
 
-FILE = Record("a file of rows", (Key("file", FileName(), "columns of numbers, one header line allowed", True),))
+FILE = Record(
+    "a file of rows",
+    (Key("file", FileName(), "path, relative to the case file: columns of numbers, one header line allowed", True),),
+    doc="Rows from a file instead of in place.",
+)
 
 
 @frozen
@@ -228,7 +232,8 @@ class Signals(Value):
     @property
     def table(self) -> Record:
         """{table: rows}."""
-        return Record("a table of time", (Key("table", self.rows, f"rows {self.rows.row_text}", True),))
+        rows = Key("table", self.rows, f"rows {self.rows.row_text}, linear between them", True)
+        return Record("a table of time", (rows,), doc="A quantity over time.")
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """tuple[Signal, ...] or BAD."""

@@ -2,6 +2,9 @@
 
 import sys
 
+#: set by the shell that asks for completions, as click has it
+COMPLETE = "_MDSTOPO_COMPLETE"
+
 
 def main() -> None:
     """Run `mdstopo` with the process's arguments and end the process with its exit status.
@@ -32,6 +35,12 @@ def main() -> None:
 
 
 def _dispatch(arguments: list[str]) -> int:
+    import os
+
+    if not arguments and COMPLETE in os.environ:  # a shell asks what could come next
+        from mdstopo.cli.group import run_group
+
+        return run_group(arguments)
     # Help and version come from a table: click alone would double the time they take.
     if not arguments or arguments in (["--help"], ["-h"], ["help"]):
         from mdstopo.cli.commands import help_text

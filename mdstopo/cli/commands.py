@@ -13,7 +13,10 @@ COMMANDS: dict[str, str] = {
     "export": "Write a result as CSV tables or JSON.",
     "new": "Write a starter case, with comments.",
     "schema": "Print the JSON Schema of the case format, for editors.",
+    "completion": "Print what makes a shell complete commands, options and files.",
 }
+
+EXIT_STATUSES: dict[int, str] = {0: "done", 1: "failed", 2: "bad input", 3: "interrupted"}
 
 _INTRODUCTION = """\
 Usage: mdstopo COMMAND [OPTIONS] ...
@@ -27,11 +30,12 @@ Options:
   --version   Show the version.
   -h, --help  Show this, or a command's options: mdstopo run --help
 
-Exit status: 0 done, 1 failed, 2 bad input, 3 interrupted."""
+Exit status: {statuses}."""
 
 
 def help_text() -> str:
     """What `mdstopo --help` prints."""
     width = max(len(name) for name in COMMANDS)
     lines = [f"  {name:{width}}  {sentence}" for name, sentence in COMMANDS.items()]
-    return _INTRODUCTION.format(commands="\n".join(lines))
+    statuses = ", ".join(f"{number} {meaning}" for number, meaning in EXIT_STATUSES.items())
+    return _INTRODUCTION.format(commands="\n".join(lines), statuses=statuses)

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from mdstopo.cli.options import FILE
+from mdstopo.cli.options import FILE, result_argument
 from mdstopo.cli.output import Output
 
 
 @click.command("export")
-@click.argument("result_path", metavar="RESULT", type=FILE)
+@result_argument
 @click.option("--csv", "kind", flag_value="csv", help="Tables: members, iterations, front, trajectories.")
 @click.option("--json", "kind", flag_value="json", help="One JSON document with every dataset.")
 @click.option("--out", type=FILE, metavar="PLACE", help="Folder of the tables, or the JSON file (default: beside it).")

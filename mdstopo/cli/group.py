@@ -4,8 +4,10 @@ import sys
 from importlib import import_module
 
 import click
+from click.shell_completion import CompletionItem
 
 from mdstopo._version import __version__
+from mdstopo.cli import COMPLETE
 from mdstopo.cli.commands import COMMANDS, help_text
 
 
@@ -23,6 +25,12 @@ class LazyGroup(click.Group):
         command = import_module(f"mdstopo.cli.{cmd_name}").command
         assert isinstance(command, click.Command)
         return command
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """The commands from the table, without importing them."""
+        if incomplete.startswith("-"):
+            return super().shell_complete(ctx, incomplete)
+        return [CompletionItem(name, help=COMMANDS[name]) for name in COMMANDS if name.startswith(incomplete)]
 
     def get_help(self, ctx: click.Context) -> str:
         """The same text as the short way without click."""
@@ -63,7 +71,7 @@ cli.params.append(
 def run_group(arguments: list[str]) -> int:
     """Run one command; its exit status. Mistakes of the user become sentences on standard error."""
     try:
-        status = cli.main(arguments, prog_name="mdstopo", standalone_mode=False)
+        status = cli.main(arguments, prog_name="mdstopo", complete_var=COMPLETE, standalone_mode=False)
     except click.exceptions.Exit as end:
         return end.exit_code
     except click.Abort:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from mdstopo.cli.files import FileOf
 from mdstopo.cli.output import Output
 
 if TYPE_CHECKING:
@@ -18,11 +19,19 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 FILE = click.Path(path_type=Path)
+CASE_FILE = FileOf((".yaml", ".yml"))
+RESULT_FILE = FileOf((".h5",))
+DESIGN_FILE = FileOf((".npy", ".txt", ".h5"))
 
 
 def case_argument(function: F) -> F:
     """CASE, a YAML file."""
-    return click.argument("case_path", metavar="CASE", type=FILE)(function)
+    return click.argument("case_path", metavar="CASE", type=CASE_FILE)(function)
+
+
+def result_argument(function: F) -> F:
+    """RESULT, an HDF5 file."""
+    return click.argument("result_path", metavar="RESULT", type=RESULT_FILE)(function)
 
 
 def set_option(function: F) -> F:
@@ -52,7 +61,7 @@ def alpha_option(function: F) -> F:
     return click.option(
         "--alpha",
         "alpha_path",
-        type=FILE,
+        type=DESIGN_FILE,
         metavar="FILE",
         help="Take the design from a .npy, .txt or result file; FRONT.h5:K is point K.",
     )(function)

@@ -9,7 +9,15 @@ import click
 
 from mdstopo.cli.front_display import front_display
 from mdstopo.cli.interrupt import Interrupts
-from mdstopo.cli.options import FILE, open_case, out_option, output_options, overwrite_option, result_path, set_option
+from mdstopo.cli.options import (
+    CASE_FILE,
+    open_case,
+    out_option,
+    output_options,
+    overwrite_option,
+    result_path,
+    set_option,
+)
 from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
@@ -32,7 +40,7 @@ REFERENCE = 1.1
 
 
 @click.command("pareto")
-@click.argument("case_path", metavar="[CASE]", type=FILE, required=False, default=DEFAULT_CASE)
+@click.argument("case_path", metavar="[CASE]", type=CASE_FILE, required=False, default=DEFAULT_CASE)
 @click.option("--weights", metavar="a:b:step", help="Weights of the first of two objectives: a range, or a list a,b,c.")
 @click.option(
     "--points", type=click.IntRange(2), metavar="N", help=f"So many evenly spaced points (default {_POINTS})."

@@ -5,13 +5,20 @@ from typing import Any
 
 import click
 
-from mdstopo.cli.options import FILE, output_options
+from mdstopo.cli.options import FILE, output_options, result_argument
 from mdstopo.cli.output import Output
 
 
+def _pictures(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[str]:
+    """Names of pictures that begin so."""
+    from mdstopo.plots.table import PLOTS
+
+    return [name for name in PLOTS if name.startswith(incomplete)]
+
+
 @click.command("plot")
-@click.argument("result_path", metavar="RESULT", type=FILE)
-@click.argument("what", required=False, metavar="[WHAT]")
+@result_argument
+@click.argument("what", required=False, metavar="[WHAT]", shell_complete=_pictures)
 @click.option("--out", type=FILE, metavar="FILE", help="Where to: .png, .svg or .pdf (default: beside the result).")
 @click.option("--format", "ending", type=click.Choice(["png", "svg", "pdf"]), default="png", show_default=True)
 @click.option("--time", "times", type=float, multiple=True, metavar="T", help="Layout at this time; may be repeated.")

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import click
 
-from mdstopo.cli.options import FILE
+from mdstopo.cli.options import FILE, result_argument
 from mdstopo.cli.output import Output
 
 
 @click.command("report")
-@click.argument("result_path", metavar="RESULT", type=FILE)
+@result_argument
 @click.option("--out", type=FILE, metavar="FILE", help="Where to (default: beside the result, ending in .html).")
 @click.option("--quiet", "-q", is_flag=True, help="Say nothing but mistakes.")
 def command(result_path: Path, out: Path | None, quiet: bool) -> int:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdstopo.cli.options import FILE, output_options
+from mdstopo.cli.options import output_options, result_argument
 from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ _ROWS = 12  # iterates that a condensed history shows
 
 
 @click.command("show")
-@click.argument("result_path", metavar="RESULT", type=FILE)
+@result_argument
 @click.option("--members", "count", type=click.IntRange(0), default=10, show_default=True, help="How many members.")
 @output_options
 def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:

@@ -43,6 +43,9 @@ _SECOND = {
     "a": "coordinate",
 }
 
+#: in a group of rows, what has no row for each of them, however many rows there are
+_APART = {"ends", "ends_alpha", "ideal", "nadir"}
+
 
 def labels(case: Case, datasets: Mapping[str, Value]) -> Labels:
     """What a result file's datasets are measured in and run over."""
@@ -88,7 +91,7 @@ def _rows(case: Case, group: str, scale: str, first: str, datasets: Mapping[str,
         name = path.removeprefix(f"{group}/")
         if path == name or "/" in name or not isinstance(value, np.ndarray) or value.ndim not in (1, 2):
             continue
-        if len(value) == len(leader):
+        if len(value) == len(leader) and name not in _APART:
             second = (_second(case, group, name, value, found),) if value.ndim == 2 else ()
             found.scales[path] = (f"{group}/{scale}", *second)
 

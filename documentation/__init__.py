@@ -1,0 +1,1 @@
+"""What the documentation generates when it is built: the keys of a case, the commands, formulas as MathML."""

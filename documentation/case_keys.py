@@ -1,0 +1,201 @@
+"""The keys of a case as Markdown, from the definitions that the reader and the JSON Schema are made of."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Text, Version, Word
+from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record, Tagged, Vector
+from mdstopo.case.rows import FILE, FileName, Rows, Signals
+from mdstopo.case.schema import FORMAT
+
+#: where the page tells of tables of time and of rows from files
+ROWS = "rows"
+#: mappings that many keys share, told once
+_SHARED: dict[str, Record] = {"file": FILE, "table": Signals(("value",)).table}
+
+
+@dataclass(frozen=True)
+class Place:
+    """A mapping of the format: the key path at which it is first met, and its keys."""
+
+    path: str
+    record: Record
+    depth: int
+
+
+def places() -> dict[str, list[Place]]:
+    """Every mapping below a key of a case, each once, by that key; those of tables and files under `ROWS`."""
+    seen: set[int] = set()
+    found = {key.name: list(_below(key.kind, key.name, 0, seen)) for key in FORMAT.keys}
+    return {"": [Place("", FORMAT, 0)], **found, ROWS: [Place(path, each, 0) for path, each in _SHARED.items()]}
+
+
+def keys_of(section: str) -> str:
+    """The mappings below one key of a case, each as a heading with a table; "" for the case itself."""
+    known = places()
+    if not known.get(section):
+        raise ValueError(f"no mapping is below {section!r}; there are {', '.join(known)}")
+    anchors = {id(each.record): each.path for part in known.values() for each in part}
+    return "\n\n".join(_told(each, anchors) for each in known[section])
+
+
+def _below(kind: Kind, path: str, depth: int, seen: set[int]) -> Iterator[Place]:
+    """The mappings that a value of this kind holds, outer ones first."""
+    if isinstance(kind, Record):
+        if id(kind) in seen:
+            return
+        seen.add(id(kind))
+        yield Place(path, kind, depth)
+        for key in kind.keys:
+            yield from _below(key.kind, f"{path}.{key.name}", depth + 1, seen)
+    elif isinstance(kind, Tagged):
+        for word, record in kind.variants.items():
+            yield from _below(record, f"{path}.{word}", depth, seen)
+    else:
+        for part in _parts(kind):
+            yield from _below(part, path, depth, seen)
+
+
+def _parts(kind: Kind) -> list[Kind]:
+    """The kinds that a list, a mapping from names or a choice is made of."""
+    if isinstance(kind, (Vector, ListOf, Named, ByName)):
+        return [kind.item]
+    if isinstance(kind, ByShape):
+        return [part for part in (kind.scalar, kind.sequence, kind.mapping) if part is not None]
+    return []
+
+
+def _told(place: Place, anchors: dict[int, str]) -> str:
+    record = place.record
+    lines = []
+    if place.path:
+        heading = "#" * min(3 + place.depth, 4)
+        title = record.what[:1].upper() + record.what[1:]
+        lines += [f"{heading} {title} {{ #{place.path}-keys }}", "", _cell(record.doc), ""]
+    lines += [*_rules(record), "| key | value | default | meaning |", "| --- | --- | --- | --- |"]
+    for key in record.keys:
+        path = f"{place.path}.{key.name}" if place.path else ""
+        anchor = f'<a id="{path}"></a>' if path else ""
+        linked = not place.path and next(_below(key.kind, key.name, 0, set()), None) is not None
+        name = f"[`{key.name}`](#{key.name})" if linked else f"`{key.name}`"
+        unit = f", {_cell(key.unit)}" if key.unit else ""
+        cells = [anchor + name, _value(key.kind, anchors, path) + unit, _default(key), _meaning(key)]
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _rules(record: Record) -> list[str]:
+    """Which keys go with which."""
+    sentences = [f"Exactly one of {_names(names, 'and')} is needed." for names in record.one_of]
+    if record.any_of:
+        sentences.append(f"At least one of {_names(record.any_of, 'and')} is needed.")
+    sentences += [f"`{one}` and `{other}` exclude each other." for one, other in record.never_both]
+    sentences += [f"`{name}` needs `{other}` beside it." for name, other in record.needs]
+    return [" ".join(sentences), ""] if sentences else []
+
+
+def _names(names: tuple[str, ...], word: str) -> str:
+    quoted = [f"`{name}`" for name in names]
+    return f"{', '.join(quoted[:-1])} {word} {quoted[-1]}"
+
+
+def _default(key: Key) -> str:
+    if key.required:
+        return "**required**"
+    if key.otherwise:
+        return _cell(key.otherwise)
+    if key.default is None or key.default == ():
+        return "none"
+    return f"`{_text(key.default)}`" if _text(key.default) else "empty"
+
+
+def _text(value: object) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, tuple):
+        return f"[{', '.join(_text(part) for part in value)}]"
+    return str(value)
+
+
+def _meaning(key: Key) -> str:
+    """What a key means, and each of its words where they are explained."""
+    lines = [_cell(key.doc)]
+    words = words_of(key.kind)
+    if words is not None and any(words.meanings):
+        lines += [f"`{word}`: {_cell(meaning)}" for word, meaning in zip(words.words, words.meanings, strict=True)]
+    return "<br>".join(lines)
+
+
+def words_of(kind: Kind) -> Word | None:
+    if isinstance(kind, Word):
+        return kind
+    if isinstance(kind, NumberOrWord):
+        return kind.word
+    if isinstance(kind, ByShape) and isinstance(kind.scalar, Word):
+        return kind.scalar
+    return None
+
+
+def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
+    """What may stand there, in words; mappings are links to their tables."""
+    if isinstance(kind, Record):
+        return f"[{kind.what}](#{anchors.get(id(kind), path)}-keys)"
+    if isinstance(kind, Tagged):
+        links = [f"[`{word}`](#{anchors.get(id(each), f'{path}.{word}')}-keys)" for word, each in kind.variants.items()]
+        return f"{kind.what}: {', '.join(links)}"
+    if isinstance(kind, Vector):
+        return _several(kind)
+    if isinstance(kind, ListOf):
+        return f"list: {_value(kind.item, anchors, path)}"
+    if isinstance(kind, Named):
+        return f"mapping from names to {_value(kind.item, anchors, path)}"
+    if isinstance(kind, ByName):
+        return f"mapping from {_plural(kind.kind)} to {_value(kind.item, anchors, path)}"
+    if isinstance(kind, ByShape):
+        if isinstance(kind.sequence, ListOf) and kind.sequence.item is kind.mapping:
+            return f"{_value(kind.mapping, anchors, path)}, or a list of such"
+        return ", or ".join(_value(part, anchors, path) for part in _parts(kind))
+    return _cell(_simple(kind))
+
+
+def _several(kind: Vector) -> str:
+    """A list of a fixed length."""
+    if isinstance(kind.item, Vector):
+        return f"list of {kind.length}, each a {_several(kind.item)}"
+    if isinstance(kind.item, Ref):
+        return f"names of {kind.length} {_plural(kind.item.kind)}"
+    return f"list of {kind.length} {_cell(_simple(kind.item)).replace('number', 'numbers', 1)}"
+
+
+def _simple(kind: Kind) -> str:
+    """What a value that holds no mapping may be."""
+    if isinstance(kind, Number):
+        return kind.allowed().removeprefix("a ")
+    if isinstance(kind, Word):
+        return ", ".join(f"`{word}`" for word in kind.words)
+    if isinstance(kind, NumberOrWord):
+        return f"{_simple(kind.number)}, or {_simple(kind.word)}"
+    if isinstance(kind, Ref):
+        also = "".join(f", or `{word}`" for word in kind.also if word != "default")
+        return f"name of a {kind.kind}{', or index' if kind.index else ''}{also}"
+    if isinstance(kind, Rows):
+        return f"[rows](#{ROWS}) `{kind.row_text}`"
+    if isinstance(kind, Signals):
+        table = f"[table](#{ROWS}) of rows `{kind.rows.row_text}`"
+        constant = "number" if len(kind.names) == 1 else f"`[{', '.join(kind.names)}]`"
+        return f"{constant}, or {table}" if kind.constant else table
+    if isinstance(kind, Version):
+        return f"`{kind.number}`"
+    texts: dict[type, str] = {Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file"}
+    return texts[type(kind)]
+
+
+def _plural(noun: str) -> str:
+    return f"{noun[:-1]}ies" if noun.endswith("y") else f"{noun}s"
+
+
+def _cell(text: str) -> str:
+    """Text for a cell of a table."""
+    return text.replace("<", "&lt;").replace(">", "&gt;").replace("|", "\\|").replace("*", "\\*")

@@ -1,0 +1,123 @@
+"""What a shell is offered when TAB is pressed."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mdstopo.cli.commands import COMMANDS
+from mdstopo.cli.completion import SHELLS
+
+#: env runs programs, not functions: so does the script of click
+AS_BASH = """
+printf '#!/bin/sh\\nexec "{python}" -m mdstopo "$@"\\n' > "$HOME/mdstopo"; chmod +x "$HOME/mdstopo"; PATH="$HOME:$PATH"
+eval "$(mdstopo completion bash)"
+COMP_WORDS=({words}); COMP_CWORD={place}
+$(complete -p mdstopo | sed 's/.*-F \\([^ ]*\\).*/\\1/') mdstopo
+printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    """Cases, results and other files, some of them in folders."""
+    monkeypatch.chdir(tmp_path)
+    for name in (
+        "cases/a.yaml",
+        "cases/b.yml",
+        "cases/note.txt",
+        "results/deep/run.h5",
+        "results/deep/alpha.npy",
+        "x.py",
+    ):
+        place = Path(name)
+        place.parent.mkdir(parents=True, exist_ok=True)
+        place.touch()
+    return tmp_path
+
+
+def completed(*words: str) -> list[str]:
+    """The choices in a bash that has read the script, the last word being typed."""
+    quoted = " ".join(f"'{word}'" for word in ("mdstopo", *words))
+    script = AS_BASH.format(python=sys.executable, words=quoted, place=len(words))
+    environment = {**os.environ, "HOME": os.getcwd()}
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True, env=environment)
+    assert done.stderr == ""
+    return done.stdout.splitlines()
+
+
+def asked(shell: str, words: str, place: int) -> subprocess.CompletedProcess[str]:
+    """The program, asked as the shell's script asks it."""
+    question = {"_MDSTOPO_COMPLETE": f"{shell}_complete", "COMP_WORDS": words, "COMP_CWORD": str(place)}
+    environment = {**os.environ, **question}
+    return subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "mdstopo"],
+        capture_output=True,
+        text=True,
+        env=environment,
+        check=True,
+    )
+
+
+def offered(words: str, place: int) -> list[str]:
+    """Types and values of the choices."""
+    return asked("bash", words, place).stdout.split()
+
+
+def test_bash_completes_commands_options_values_and_files():
+    assert completed("") == list(COMMANDS)
+    assert completed("si") == ["simulate"]
+    assert completed("run", "--o") == ["--out", "--overwrite"]
+    assert completed("gradient", "--method", "") == ["adjoint", "direct", "iterative", "constant_load"]
+    assert completed("completion", "f") == ["fish"]
+    assert completed("check", "ca") == ["cases/a.yaml", "cases/b.yml"]
+
+
+def test_cases_results_and_designs_are_offered_by_their_endings():
+    assert offered("mdstopo run cases/", 2) == ["plain,cases/a.yaml", "plain,cases/b.yml"]
+    assert offered("mdstopo show res", 2) == ["plain,results/deep/run.h5"]
+    assert offered("mdstopo run cases/a.yaml --alpha r", 4) == [
+        "plain,results/deep/alpha.npy",
+        "plain,results/deep/run.h5",
+    ]
+    assert offered("mdstopo check ", 2) == ["plain,cases/", "plain,results/"]
+    assert offered("mdstopo check nothing", 2) == []
+    assert "plain,layout" in offered("mdstopo plot results/deep/run.h5 l", 3)
+    assert offered("mdstopo sweep s", 2) == ["plain,set"]
+
+
+def test_names_that_a_shell_must_quote_are_left_to_the_shell():
+    Path("two words.yaml").touch()
+    assert offered("mdstopo run t", 2) == ["file,t"]
+    assert offered("mdstopo run ~/", 2) == ["file,~/"]
+
+
+def test_hidden_files_are_offered_where_a_dot_is_typed():
+    Path(".hidden.yaml").touch()
+    assert "plain,.hidden.yaml" not in offered("mdstopo run ", 2)
+    assert offered("mdstopo run .h", 2) == ["plain,.hidden.yaml"]
+
+
+def test_completing_loads_nothing_heavy():
+    for words, place in (("mdstopo s", 1), ("mdstopo run cases/", 2)):
+        loaded = asked("bash", words, place).stderr
+        assert not {name for name in ("numpy", "numba", "h5py", "rich", "yaml") if f" {name}\n" in loaded}
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_there_is_a_script_for_every_shell(shell):
+    done = subprocess.run(
+        [sys.executable, "-m", "mdstopo", "completion", shell], capture_output=True, text=True, check=True
+    )
+    assert f"_MDSTOPO_COMPLETE={shell}_complete" in done.stdout
+    assert done.stderr == ""
+
+
+def test_another_shell_is_refused():
+    done = subprocess.run(
+        [sys.executable, "-m", "mdstopo", "completion", "csh"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert "'csh' is not one of" in done.stderr

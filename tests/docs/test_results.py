@@ -1,0 +1,85 @@
+"""The page on result files names every dataset that commands write, and no other."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import h5py
+import pytest
+
+from .pages import DOCS, blocks
+from .test_pages import run
+
+PAGE = (DOCS / "results.md").read_text(encoding="utf-8")
+#: what only the program reads
+OWN = ("optimizer/", "combine/tasks/", "pareto/tasks/", "sweep/tasks/")
+JOINTED = """\
+format: 1
+time: {end: 0.1}
+bodies: {arm: {mass: 1, inertia: 1, position: [1, 0]}}
+joints: [{name: pin, type: revolute, bodies: [ground, arm], at: [0, 0]}]
+motions: [{body: arm, angle: {acceleration: {file: turn.csv}}}]
+"""
+
+
+def named() -> dict[str, str]:
+    """The paths in the tables and in the sentence on scales, each with the pattern that it stands for."""
+    cells = re.findall(r"^\| (`.*?`) \|", PAGE, re.MULTILINE)
+    scales = re.search(r"scales of the axes:(.*?)\.\n", PAGE, re.DOTALL)
+    assert scales is not None
+    paths = [path for cell in [*cells, scales[1]] for path in re.findall(r"`([^`]+)`", cell)]
+    attributes = ("format", "mdstopo", "kind", "status", "reason", "name", "title", "case_path", "case_sha256")
+    found = {}
+    for path in paths:
+        if path not in attributes:
+            parts = re.split(r"<[^>]+>|\.\.\.", path)
+            found[path] = "[^/]+".join(re.escape(part) for part in parts)
+    return found
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
+    """The datasets in one file of each kind."""
+    folder = tmp_path_factory.mktemp("results")
+    (boat,) = [block for block in blocks(PAGE) if block.title == "boat.yaml"]
+    (folder / boat.title).write_text(boat.text, encoding="utf-8")
+    (folder / "jointed.yaml").write_text(JOINTED, encoding="utf-8")
+    (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
+    for command in (
+        "simulate jointed.yaml",
+        "simulate boat.yaml",
+        "run boat.yaml",
+        "run boat.yaml --alpha results/boat.simulate.h5 --out results/again.h5",
+        "gradient boat.yaml --history --differences --members 2",
+        "pareto boat.yaml --points 2 --starts 1",
+        "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
+    ):
+        done = run(f"mdstopo {command}", folder)
+        assert done.returncode == 0, done.stdout
+    found: set[str] = set()
+    for path in sorted(Path(folder, "results").glob("*.h5")):
+        with h5py.File(path) as file:
+            file.visititems(lambda name, node: found.add(name) if isinstance(node, h5py.Dataset) else None)
+    return {path for path in found if not path.startswith(OWN)}
+
+
+def test_every_dataset_of_a_result_is_on_the_page(written: set[str]) -> None:
+    patterns = list(named().values())
+    assert sorted(path for path in written if not any(re.fullmatch(pattern, path) for pattern in patterns)) == []
+
+
+def test_every_dataset_on_the_page_is_in_a_result(written: set[str]) -> None:
+    told = named()
+    assert len(told) > 50
+    assert [path for path, pattern in told.items() if not any(re.fullmatch(pattern, found) for found in written)] == []
+
+
+def test_every_attribute_on_the_page_is_in_a_result(tmp_path: Path) -> None:
+    (tmp_path / "case.yaml").write_text(JOINTED.replace("motions", "# motions"), encoding="utf-8")
+    assert run("mdstopo simulate case.yaml", tmp_path).returncode == 0
+    with h5py.File(tmp_path / "results" / "case.simulate.h5") as file:
+        there = set(file.attrs)
+    section = PAGE.partition("Attributes of the file itself:")[2].partition("| path |")[0]
+    cells = re.findall(r"^\| (`.*?`) \|", section, re.MULTILINE)
+    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == there
