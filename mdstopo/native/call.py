@@ -2,6 +2,7 @@
 
 import contextlib
 import ctypes
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -12,7 +13,6 @@ from mdstopo.native.store import CALL, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
-_machine: Any = None
 
 
 class _Excuse(ctypes.Structure):
@@ -25,22 +25,21 @@ class _Excuse(ctypes.Structure):
     )
 
 
-def _target_machine() -> Any:
-    global _machine
-    if _machine is None:
-        for start in ("initialize", "initialize_native_target", "initialize_native_asmprinter"):
-            with contextlib.suppress(RuntimeError):  # done by LLVM itself in later versions
-                getattr(llvm, start)()
-        _machine = llvm.Target.from_default_triple().create_target_machine(jit=True)
-    return _machine
+@functools.cache
+def _target() -> Any:
+    for start in ("initialize", "initialize_native_target", "initialize_native_asmprinter"):
+        with contextlib.suppress(RuntimeError):  # done by LLVM itself in later versions
+            getattr(llvm, start)()
+    return llvm.Target.from_default_triple()
 
 
 class Native:
     """An entry's machine code for one set of types of arguments."""
 
     def __init__(self, name: str, code: Code, types: str) -> None:
-        module = llvm.parse_assembly("")
-        self._engine = llvm.create_mcjit_compiler(module, _target_machine())
+        # an engine owns its target machine: each has one
+        machine = _target().create_target_machine(jit=True)
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         for part in (code.body, code.glue):
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(part))
         self._engine.finalize_object()
