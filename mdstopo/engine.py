@@ -41,6 +41,9 @@ if TYPE_CHECKING:
 #: else exceed ten tolerances on scenes whose members turn fast
 LOOSEST = 5e-5
 
+#: steps that a time history has at least
+HISTORY = 50
+
 
 class Evaluator:
     """A case, ready to be evaluated again and again.
@@ -169,16 +172,29 @@ class Evaluator:
         return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
-        """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`."""
+        """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`.
+
+        Adaptive steps that are too few to see a curve by are replaced by `HISTORY` fixed ones, or more: none is longer
+        than the shortest of them.
+        """
+        status, t, lines = self._histories(self.design(alpha), objective)
+        if not status.ok or len(t) > HISTORY or self.case.solver.step is not None:
+            return status, t, lines
+        step = min((t[-1] - t[0]) / HISTORY, float(np.diff(t).min()))
+        solver = replace(self.case.solver, step=step)
+        denser = Evaluator(replace(self.case, solver=solver), beside=False)._histories(self.design(alpha), objective)
+        return denser if denser[0].ok else (status, t, lines)
+
+    def _histories(self, design: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
         driver = self.driver(load_case)
         if isinstance(driver, Driver):
             from mdstopo.sensitivity.methods import histories
 
-            return histories(driver, self.design(alpha))
+            return histories(driver, design)
         from mdstopo.general.methods import histories as histories_general
 
-        return histories_general(driver, self.design(alpha), list(self._by_load_case[load_case]).index(objective))
+        return histories_general(driver, design, list(self._by_load_case[load_case]).index(objective))
 
     def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":
         """The case as the optimiser sees it; several objectives need a scalarisation."""

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mdstopo.jit import cache_folder
+from mdstopo.native.store import cache_folder
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case

@@ -23,7 +23,7 @@ from mdstopo.general.forces import (
     drive_state,
     general_forces,
 )
-from mdstopo.general.structures import DeskStructure, bundle
+from mdstopo.general.structures import bundle
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import SUMS
@@ -51,7 +51,7 @@ class Desk:
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(Desk, DeskStructure, DESK)
+bundle(Desk, DESK)
 
 
 @kernel

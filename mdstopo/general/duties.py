@@ -19,7 +19,7 @@ The tag is a tuple of zeros whose length says which method is meant.
 from collections.abc import Callable
 from typing import Any
 
-from numba.extending import overload
+from mdstopo.jit import by_type
 
 DUTIES: dict[str, dict[int, Any]] = {
     "point_of": {},
@@ -71,31 +71,31 @@ def _of(name: str, tag: Any) -> Any:
     return DUTIES[name][len(tag)].py_func
 
 
-@overload(point_of)
+@by_type(point_of)
 def _point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
     return _of("point_of", tag)
 
 
-@overload(step_back)
+@by_type(step_back)
 def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
     return _of("step_back", tag)
 
 
-@overload(step_forward)
+@by_type(step_forward)
 def _step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
     return _of("step_forward", tag)
 
 
-@overload(beside)
+@by_type(beside)
 def _beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
     return _of("beside", tag)
 
 
-@overload(derivatives)
+@by_type(derivatives)
 def _derivatives(tag):  # type: ignore[no-untyped-def]
     return _of("derivatives", tag)
 
 
-@overload(weights_of)
+@by_type(weights_of)
 def _weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
     return _of("weights_of", tag)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mdstopo.general.structures import ModelStructure, bundle
+from mdstopo.general.structures import bundle
 from mdstopo.jit import kernel
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -91,7 +91,7 @@ class ModelView:
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(ModelView, ModelStructure, GeneralModel._fields)
+bundle(ModelView, GeneralModel._fields)
 
 
 def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:

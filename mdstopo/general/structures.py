@@ -6,33 +6,33 @@ one. Inside kernels a structure is made and read like a named tuple; Python neve
 
 from typing import Any
 
-from numba import types
-from numba.experimental import structref
+from mdstopo.native.kernel import when_compiling
+
+_KINDS: dict[str, type] = {}
 
 
-class Structure(types.StructRef):
-    """Numba's type of a bundle; each bundle derives its own from this."""
-
-    def preprocess_fields(self, fields: Any) -> Any:
-        """Literal types would make every literal another structure."""
-        return tuple((name, types.unliteral(kind)) for name, kind in fields)
-
-
-@structref.register
-class ModelStructure(Structure):
-    """A `general.model.GeneralModel`."""
+def __getattr__(name: str) -> type:
+    """The types of structures, made when something is compiled: Numba's disk cache asks this module for them."""
+    try:
+        return _KINDS[name]
+    except KeyError:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
 
 
-@structref.register
-class DeskStructure(Structure):
-    """A `general.balance.Desk`."""
+def bundle(maker: type, fields: tuple[str, ...]) -> None:
+    """Let `maker(...)` in kernels make a structure from its fields, in their order; each maker has its own type."""
 
+    @when_compiling
+    def register() -> None:
+        from numba import types
+        from numba.experimental import structref
 
-@structref.register
-class TrackStructure(Structure):
-    """A `general.track.Track`."""
+        def preprocess_fields(self: Any, given: Any) -> Any:
+            """Literal types would make every literal another structure."""
+            return tuple((name, types.unliteral(kind)) for name, kind in given)
 
-
-def bundle(maker: type, kind: type, fields: tuple[str, ...]) -> None:
-    """Let `maker(...)` in kernels make a structure of type `kind` from its fields, in their order."""
-    structref.define_constructor(maker, kind, list(fields))
+        members = {"preprocess_fields": preprocess_fields, "__module__": __name__}
+        kind = type(f"{maker.__name__}Structure", (types.StructRef,), members)
+        _KINDS[kind.__name__] = kind
+        structref.register(kind)
+        structref.define_constructor(maker, kind, list(fields))

@@ -22,7 +22,7 @@ event     (E, 5) integers       the state at which it happened, member (padded),
 
 from typing import Any
 
-from mdstopo.general.structures import TrackStructure, bundle
+from mdstopo.general.structures import bundle
 from mdstopo.jit import kernel
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
@@ -37,7 +37,7 @@ class Track:
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(Track, TrackStructure, TRACK)
+bundle(Track, TRACK)
 
 
 def track_room(

@@ -27,10 +27,7 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 
 from typing import Any
 
-from numba import types
-from numba.extending import overload
-
-from mdstopo.jit import kernel
+from mdstopo.jit import by_type, kernel
 
 Implementation = Any  # a compiled function
 
@@ -94,12 +91,12 @@ def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
     """The Python function to be compiled for this type of steps; its parameters are named as the duty's."""
-    if not isinstance(steps, types.BaseNamedTuple):
+    kind = getattr(steps, "instance_class", None)  # of a named tuple's type
+    if kind is None:
         return None
-    by_type = getattr(steps, "instance_class")  # noqa: B009  (absent from Numba's annotations)
-    chosen = _DUTIES[name].get(by_type)
+    chosen = _DUTIES[name].get(kind)
     if chosen is None and name == "reach":
-        chosen = _DUTIES["point_of"].get(by_type)
+        chosen = _DUTIES["point_of"].get(kind)
     if chosen is None and name == "sample":
         chosen = sample_stages
     return None if chosen is None else chosen.py_func
@@ -116,48 +113,48 @@ def sample_stages(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def
     return m
 
 
-@overload(point_of)
+@by_type(point_of)
 def _point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
     return _implementation("point_of", steps)
 
 
-@overload(parent_of)
+@by_type(parent_of)
 def _parent_of(steps, w):  # type: ignore[no-untyped-def]
     return _implementation("parent_of", steps)
 
 
-@overload(stage_weights)
+@by_type(stage_weights)
 def _stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
     return _implementation("stage_weights", steps)
 
 
-@overload(reverse_step)
+@by_type(reverse_step)
 def _reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work
 ):
     return _implementation("reverse_step", steps)
 
 
-@overload(tangent_step)
+@by_type(tangent_step)
 def _tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
     return _implementation("tangent_step", steps)
 
 
-@overload(carried)
+@by_type(carried)
 def _carried(steps):  # type: ignore[no-untyped-def]
     return _implementation("carried", steps)
 
 
-@overload(reach)
+@by_type(reach)
 def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
     return _implementation("reach", steps)
 
 
-@overload(sample)
+@by_type(sample)
 def _sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
     return _implementation("sample", steps)
 
 
-@overload(steps_of)
+@by_type(steps_of)
 def _steps_of(tag, arrays):  # type: ignore[no-untyped-def]
     return _MAKERS[len(tag)].py_func

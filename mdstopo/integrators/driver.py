@@ -70,6 +70,8 @@ class Driver:
         self.scene = scene
         self.method = method
         self._entry: Any = None
+        self._simulate: Any = None
+        self._look: Any = None
         self._beside = beside
         self.packed = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
@@ -96,7 +98,7 @@ class Driver:
         if self._entry is None:
             self._entry = self.method.load()
             if self._beside is not None and self._beside.due:
-                self._entry.simulate.compile(_types(self._simulate_arguments(False)))
+                self._entry.simulate.compile(*self._simulate_arguments(False))
         return self._entry
 
     @property
@@ -109,9 +111,9 @@ class Driver:
 
     def compile_looking(self) -> None:
         """Compile what looks at the steps, without running it."""
-        self.entry.look.compile(_types(self._look_arguments(0, True)))
+        self.entry.look.compile(*self._look_arguments(0, True))
         room = self.limits, self.room, self.room_ints, self.strength
-        self.entry.dense.compile(_types(self._dense_arguments(0, *room)))
+        self.entry.dense.compile(*self._dense_arguments(0, *room))
 
     def _make_room(self, steps: int, stages: int) -> None:
         n, n_pair, damped, turning = self._shape
@@ -119,12 +121,15 @@ class Driver:
         self.limits = np.array([MAX_STEPS, steps, stages], dtype=np.int64)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
+        self._simulate = self._look = None  # they were prepared with the room as it was
 
     def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
         """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call."""
         code, count, time = self.run(alpha, gradient)
         if code == OK:
-            self.looking.look(*self._look_arguments(count, gradient))
+            if self._look is None:
+                self._look = self.looking.look.prepare(*self._look_arguments(count, gradient))
+            self._look((_COUNT, count), (_GRADIENT, gradient))
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.meeting[0]))
 
     def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
@@ -132,7 +137,9 @@ class Driver:
         self._alpha[:] = alpha
         while True:
             self.work[:] = 0
-            code, count, time = self.entry.simulate(*self._simulate_arguments(tangent))
+            if self._simulate is None:
+                self._simulate = self.entry.simulate.prepare(*self._simulate_arguments(tangent))
+            code, count, time = self._simulate((_TANGENT, tangent))
             if code != NEEDS_ROOM:
                 return code, count, time
             self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
@@ -178,10 +185,8 @@ class Driver:
         )  # fmt: skip
 
 
-def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
-    from numba import typeof
-
-    return tuple(typeof(argument) for argument in arguments)
+#: places of the numbers that change from call to call, in `_simulate_arguments` and `_look_arguments`
+_TANGENT, _COUNT, _GRADIENT = 5, 8, 10
 
 
 class DenseSteps:

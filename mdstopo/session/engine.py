@@ -65,9 +65,9 @@ def compiling(case: Case) -> str:
 
 def compilation_due(case: Case) -> bool:
     """Whether the kernels of this version have never been compiled here for such a case."""
-    from mdstopo.jit import cache_folder
+    from mdstopo.native.store import cache_folder
 
-    pattern = "general_*/*.nbi" if beyond_springs(case) else "integrators_*/*.nbi"
+    pattern = "mdstopo.general.*" if beyond_springs(case) else "mdstopo.integrators.*"
     return next(cache_folder().glob(pattern), None) is None
 
 

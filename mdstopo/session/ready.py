@@ -95,7 +95,7 @@ class _Toy:
 
 def _marker(case: Case) -> Path:
     """An empty file that says that the kernels for such cases are cached."""
-    from mdstopo.jit import cache_folder
+    from mdstopo.native.store import cache_folder
 
     family = "general" if beyond_springs(case) else "springs"
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"

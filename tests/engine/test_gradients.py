@@ -8,7 +8,7 @@ import pytest
 from mdstopo import evaluate
 from mdstopo.engine import Evaluator
 from mdstopo.status import Status
-from tests.engine.scenes import FEATURES, random_design, random_scene, read, spring_scene, with_solver
+from tests.engine.scenes import FEATURES, paper, random_design, random_scene, read, spring_scene, with_solver
 
 EVERYTHING = sorted(FEATURES)
 UNDAMPED = [f for f in EVERYTHING if f != "damping"]
@@ -155,3 +155,19 @@ def test_a_member_that_carries_nothing_at_zero_strength_still_has_a_gradient_at_
         values.append(evaluate(with_solver(case, tolerance=1e-12), alpha, gradient=False).objectives["G"])
     slope = (-3 * values[0] + 4 * values[1] - values[2]) / (2 * h)
     assert gradient[0] == pytest.approx(slope, rel=0, abs=1e-5 * np.abs(gradient).max())
+
+
+def test_a_time_history_has_steps_enough_to_see_and_is_the_gradient_of_shorter_motions():
+    """Collocation needs one step here; the history has fifty, each line the gradient of a motion that ends there."""
+    whole = Evaluator(with_solver(paper("fig6", ("objectives.G.over_time", "final")), tolerance=1e-10))
+    alpha = whole.case.initial
+    status, t, lines = whole.histories(alpha, "G")
+    assert status.ok
+    assert whole.integrator == "gauss"
+    assert len(t) > 50
+    assert lines.shape == (len(t), len(alpha))
+    assert np.abs(lines[-1] - whole.evaluate(alpha).gradients["G"]).max() <= 1e-8 * np.abs(lines[-1]).max()
+    k = len(t) // 3
+    early = ("objectives.G.over_time", "final"), ("time.end", float(t[k]))
+    gradient = Evaluator(with_solver(paper("fig6", *early), tolerance=1e-10)).evaluate(alpha).gradients["G"]
+    assert np.abs(lines[k] - gradient).max() <= 1e-8 * np.abs(gradient).max()

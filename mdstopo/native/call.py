@@ -1,0 +1,107 @@
+"""Machine code in memory, and calls into it."""
+
+import contextlib
+import ctypes
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+
+from mdstopo.native.store import CALL, Code
+
+#: a call: status, 0 where all went well, of the block of numbers
+_CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
+
+
+class _Excuse(ctypes.Structure):
+    _fields_ = (
+        ("data", ctypes.c_void_p),
+        ("size", ctypes.c_int32),
+        ("hash", ctypes.c_void_p),
+        ("maker", ctypes.c_void_p),
+        ("computed", ctypes.c_int32),
+    )
+
+
+@functools.cache
+def _target() -> Any:
+    for start in ("initialize", "initialize_native_target", "initialize_native_asmprinter"):
+        with contextlib.suppress(RuntimeError):  # done by LLVM itself in later versions
+            getattr(llvm, start)()
+    return llvm.Target.from_default_triple()
+
+
+class Native:
+    """An entry's machine code for one set of types of arguments."""
+
+    def __init__(self, name: str, code: Code, types: str) -> None:
+        # an engine owns its target machine: each has one
+        machine = _target().create_target_machine(jit=True)
+        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        for part in (code.body, code.glue):
+            self._engine.add_object_file(llvm.ObjectFileRef.from_data(part))
+        self._engine.finalize_object()
+        self._call = _CALL(self._engine.get_function_address(CALL))
+        self._name = name
+        self._kinds = types.split()
+        self._result = code.result.strip("()")
+        self._single = not code.result.startswith("(")
+        if code.result == "none":
+            self._result = ""
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.prepare(*arguments)()
+
+    def prepare(self, *arguments: Any) -> Callable[..., Any]:
+        """These arguments as a block, ready to be called; see `Entry.prepare`."""
+        numbers: list[int] = []
+        places: list[int] = []
+        for kind, argument in zip(self._kinds, arguments, strict=True):
+            places.append(len(numbers))
+            if kind[0] in "dq?":
+                numbers.append(argument.ctypes.data)
+                numbers.extend(argument.shape)
+            elif kind[0] == "t":
+                numbers.extend(argument)
+            else:
+                numbers.append(0 if kind == "f" else int(argument))
+        first = len(numbers)
+        block = np.zeros(first + len(self._result) + 1, dtype=np.int64)
+        block[:first] = numbers
+        floats = block.view(np.float64)
+        views = {"f": floats, "i": block, "b": block}
+        for kind, place, argument in zip(self._kinds, places, arguments, strict=True):
+            if kind == "f":
+                floats[place] = argument
+        address = ctypes.c_void_p(block.ctypes.data)
+        slots = [(views[letter], first + k, letter) for k, letter in enumerate(self._result)]
+        function, kinds, single = self._call, self._kinds, self._single
+
+        def call(*changes: tuple[int, Any], kept: Any = arguments) -> Any:
+            for place, value in changes:
+                views[kinds[place]][places[place]] = value
+            if function(address):
+                self._fail(int(block[-1]))
+            if not slots:
+                return None
+            found = [view[k].item() if letter != "b" else bool(view[k]) for view, k, letter in slots]
+            return found[0] if single else tuple(found)
+
+        return call
+
+    def _fail(self, address: int) -> None:
+        """Raise what the compiled code raised: its class and arguments, pickled where Numba keeps them.
+
+        Numba's record: the pickle's address and size, its hash, how arguments known only then are made, their number.
+        """
+        import pickle
+
+        if not address:
+            raise RuntimeError(f"the compiled {self._name} failed")
+        record = _Excuse.from_address(address)
+        raised, arguments = pickle.loads(ctypes.string_at(record.data, record.size))[:2]
+        if record.computed > 0:
+            raise raised(f"in the compiled {self._name}")
+        raise raised(*(arguments or ()))

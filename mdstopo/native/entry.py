@@ -1,0 +1,113 @@
+"""A compiled function that Python calls.
+
+Its machine code takes one block of eight-byte numbers: for an array the address of its data and its lengths, for a
+number the number. What it returns comes after them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mdstopo.native.kernel import Kernel
+
+if TYPE_CHECKING:
+    from mdstopo.native.call import Native
+
+_LETTERS = {np.dtype(np.float64): "d", np.dtype(np.int64): "q", np.dtype(np.bool_): "?"}
+
+
+def types_of(arguments: tuple[Any, ...]) -> str | None:
+    """The types of arguments in letters; nothing where the machine code takes no such thing.
+
+    d2: a two-dimensional array of floats; b, i, f: truth, integer, float; t3: a tuple of three integers.
+    """
+    letters = []
+    for argument in arguments:
+        if isinstance(argument, np.ndarray):
+            letter = _LETTERS.get(argument.dtype)
+            if letter is None or not argument.flags.c_contiguous or not argument.flags.aligned:
+                return None
+            letters.append(f"{letter}{argument.ndim}")
+        elif isinstance(argument, (bool, np.bool_)):
+            letters.append("b")
+        elif isinstance(argument, (int, np.integer)):
+            letters.append("i")
+        elif isinstance(argument, (float, np.floating)):
+            letters.append("f")
+        elif type(argument) is tuple and all(type(each) is int for each in argument):
+            letters.append(f"t{len(argument)}")
+        else:
+            return None
+    return " ".join(letters)
+
+
+class Entry(Kernel):
+    """A compiled function that Python calls; other compiled functions may call it too."""
+
+    _cached = False  # its machine code is kept by `native.store`
+
+    def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
+        super().__init__(function, fastmath)
+        self._native: dict[str, Native | None] = {}
+        self._callable: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        native = self._for(arguments)
+        return self._by_numba(*arguments) if native is None else native(*arguments)
+
+    def prepare(self, *arguments: Any) -> Callable[..., Any]:
+        """The entry with these arguments, to be called again and again with other numbers by their position.
+
+        Arrays stay these arrays, wherever their contents change.
+        """
+        native = self._for(arguments)
+        if native is not None:
+            return native.prepare(*arguments)
+
+        def call(*changes: tuple[int, Any]) -> Any:
+            now = list(arguments)
+            for place, value in changes:
+                now[place] = value
+            return self._by_numba(*now)
+
+        return call
+
+    def compile(self, *arguments: Any) -> None:
+        """Have the machine code for such arguments on the disk, without calling it."""
+        self._for(arguments)
+
+    def _for(self, arguments: tuple[Any, ...]) -> Native | None:
+        types = types_of(arguments)
+        if types is None:
+            return None
+        if types not in self._native:
+            self._native[types] = self._ready(types)
+        return self._native[types]
+
+    def _ready(self, types: str) -> Native | None:
+        """Machine code for these types, from the disk or from Numba; nothing where only Numba itself can call it."""
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+            return None
+        from mdstopo.native import store
+        from mdstopo.native.call import Native
+
+        path = store.path_of(self.py_func.__module__, self.py_func.__qualname__, types)
+        code = store.read(path)
+        if code is None:
+            from mdstopo.native.build import build
+
+            code = build(self.dispatcher, types)
+            if code is None:
+                return None
+            store.write(path, code)
+        return Native(self.py_func.__qualname__, code, types)
+
+    def _by_numba(self, *arguments: Any) -> Any:
+        """Called through Numba's own wrapper: the slow way in, for what the machine code does not take."""
+        if self._callable is None:
+            self._callable = self._made()
+        return self._callable(*arguments)

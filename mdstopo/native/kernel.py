@@ -1,0 +1,92 @@
+"""A function to be compiled, which Numba takes for one of its own when it meets it in another.
+
+Numba asks an unknown global for its `_numba_type_`; only then is it imported here and the function handed to it.
+"""
+
+import contextlib
+import functools
+import importlib
+import sys
+from collections.abc import Callable
+from typing import Any
+
+_PENDING: list[Callable[[], None]] = []
+
+
+def when_compiling(register: Callable[[], None]) -> Callable[[], None]:
+    """Have this run before anything is compiled: what has to be entered in Numba's own tables."""
+    _PENDING.append(register)
+    return register
+
+
+def numba() -> Any:
+    """Numba, with everything entered that waits for it."""
+    module = _import_lean()
+    while _PENDING:
+        _PENDING.pop(0)()
+    return module
+
+
+def _import_lean() -> Any:
+    """Import Numba; in the command line's own process without scipy and cffi, which no kernel here uses.
+
+    They would cost 0.2 s. Elsewhere Numba may serve others too.
+    """
+    spared = {"scipy", "cffi"} - sys.modules.keys()
+    if "mdstopo.cli" not in sys.modules or "numba" in sys.modules or len(spared) < 2:
+        return importlib.import_module("numba")
+    for name in spared:
+        sys.modules[name] = None  # type: ignore[assignment]  # an import of it now fails, which Numba allows for
+    try:
+        module = importlib.import_module("numba")
+        module.config.DISABLE_ERROR_MESSAGE_HIGHLIGHTING = 1  # of messages that it only shows to itself
+        for user in ("numba.np.arraymath", "numba.core.typing.cffi_utils"):
+            with contextlib.suppress(ImportError):
+                importlib.import_module(user)
+    finally:
+        for name in spared:
+            del sys.modules[name]
+    return module
+
+
+class Kernel:
+    """A compiled function that other compiled functions call.
+
+    fastmath: the flags of its floating point. `py_func` is the function as written, to be run in Python.
+    """
+
+    _cached = True
+
+    def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+        self._fastmath = fastmath
+        self._dispatcher: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        raise TypeError(f"{self.py_func.__name__} is called by kernels only; from Python, call its py_func")
+
+    @property
+    def dispatcher(self) -> Any:
+        """Numba's object for it."""
+        if self._dispatcher is None:
+            # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
+            self._dispatcher = self._made(no_cpython_wrapper=True, cache=self._cached)
+        return self._dispatcher
+
+    @property
+    def _numba_type_(self) -> Any:
+        return self.dispatcher._numba_type_
+
+    def _made(self, **options: Any) -> Any:
+        """Numba's object for the function. Its disk cache serves kernels that several entries call."""
+        from mdstopo.native.store import cache_folder
+
+        compiler = numba()
+        kept, compiler.config.CACHE_DIR = compiler.config.CACHE_DIR, str(cache_folder())
+        try:
+            fastmath = set(self._fastmath) or False
+            made = compiler.njit(error_model="numpy", fastmath=fastmath, no_cfunc_wrapper=True, **options)
+            return made(self.py_func)
+        finally:
+            compiler.config.CACHE_DIR = kept

@@ -1,0 +1,212 @@
+"""Machine code that is kept on the disk: the same results as through Numba, errors that arrive, no Numba when warm."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdstopo.jit import entry, kernel
+from mdstopo.native import build, store
+from mdstopo.native.call import Native
+from mdstopo.native.entry import types_of
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@kernel
+def _norm(x):
+    total = 0.0
+    for value in x:
+        total += value * value
+    return np.sqrt(total)
+
+
+@entry
+def mixed(tag, x, table, marks, count, factor, yes, out):
+    """Every kind of argument and of result."""
+    for i in range(out.shape[0]):
+        out[i] = factor * x[i] * count + table[1, i] + tag[1]
+    return _norm(out), count + len(tag), yes and bool(marks[0])
+
+
+@entry
+def fails(x, how):
+    """Raises what it is asked for."""
+    if how == 1:
+        raise ValueError("asked for")
+    if how == 2:
+        return np.empty(1 << 46)[0]
+    if how == 3:
+        x[:] = np.zeros(x.shape[0] + 1)
+    return x[0]
+
+
+@entry
+def reshaped(x, rows):
+    """A view of other lengths, of an array that is let go."""
+    y = x.copy().reshape((rows, 2))
+    return y[y.shape[0] - 1, 1] if rows else -1.0
+
+
+@entry
+def allocates(times, size):
+    """Memory taken and given back."""
+    total = 0.0
+    for k in range(times):
+        x = np.zeros(size)
+        x[k % size] = 1.0
+        total += x.sum()
+    return total
+
+
+@entry
+def listed(times):
+    """A list that grows, of arrays."""
+    total = 0.0
+    for _ in range(times):
+        several = [np.ones(2)]
+        for k in range(1000):
+            several.append(np.full(3, float(k)))  # noqa: PERF401  (one after another, so that it grows)
+        total += several[-1][2] + len(several)
+    return total
+
+
+@entry
+def nothing(x):
+    """Returns nothing."""
+    x[0] = 3.0
+
+
+def _arguments():
+    return (0, 7), np.arange(3.0), np.ones((2, 3)), np.array([True]), 4, 0.1, True, np.zeros(3)
+
+
+def test_machine_code_gives_to_the_bit_what_numba_gives():
+    ours, theirs = _arguments(), _arguments()
+    found = mixed(*ours)
+    expected = mixed._by_numba(*theirs)
+    assert found == expected
+    assert [type(each) for each in found] == [float, int, bool]
+    assert np.array_equal(ours[-1], theirs[-1])
+    assert ours[-1][2] == 0.1 * 2.0 * 4 + 1.0 + 7.0
+
+
+def test_a_prepared_call_takes_other_numbers_and_sees_what_arrays_hold_now():
+    arguments = _arguments()
+    call = mixed.prepare(*arguments)
+    arguments[1][:] = 5.0
+    size, count, both = call((4, 2), (5, 0.5), (6, False))
+    assert np.array_equal(arguments[-1], np.full(3, 13.0))
+    assert size == pytest.approx(13.0 * np.sqrt(3.0), rel=1e-15)
+    assert (count, both) == (4, False)
+
+
+def test_arrays_that_machine_code_cannot_take_go_through_numba():
+    every_other = np.arange(6.0)[::2]
+    arguments = list(_arguments())
+    arguments[1] = every_other
+    assert types_of(tuple(arguments)) is None
+    straight = _arguments()
+    straight[1][:] = every_other
+    assert mixed(*arguments) == mixed(*straight)
+
+
+def test_an_entry_without_result_returns_none():
+    x = np.zeros(2)
+    assert nothing(x) is None
+    assert x[0] == 3.0
+
+
+def test_what_a_kernel_raises_arrives():
+    assert fails(np.ones(1), 0) == 1.0
+    with pytest.raises(ValueError, match="asked for"):
+        fails(np.ones(1), 1)
+    with pytest.raises(MemoryError):
+        fails(np.ones(1), 2)
+    with pytest.raises(ValueError):  # noqa: PT011  (its words are put together when it is raised)
+        fails(np.ones(2), 3)
+
+
+def test_views_of_other_lengths_are_right_and_wrong_ones_refused():
+    assert reshaped(np.arange(6.0), 3) == 5.0
+    assert reshaped(np.zeros(0), 0) == -1.0
+    with pytest.raises(ValueError, match="total size"):
+        reshaped(np.arange(6.0), 2)
+
+
+def test_memory_that_kernels_take_is_given_back():
+    resource = pytest.importorskip("resource")
+    allocates(10, 1_000_000)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    assert allocates(1000, 1_000_000) == 1000.0  # 8 GB if none came back
+    assert listed(1000) == 2000e3  # 130 MB if none came back
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 50_000
+
+
+def test_code_on_the_disk_that_was_damaged_is_not_used(tmp_path):
+    path = tmp_path / "a.code"
+    code = store.Code(b"body" * 100, b"glue", "(ib)")
+    store.write(path, code)
+    assert store.read(path) == code
+    data = path.read_bytes()
+    for damaged in (data[:-1], data[:10], b"", data.replace(b"bodybody", b"bodyxody", 1), data[:20] + b"}" + data[20:]):
+        path.write_bytes(damaged)
+        assert store.read(path) is None
+    assert store.read(tmp_path / "none.code") is None
+
+
+def test_code_that_needs_more_of_numba_than_is_provided_goes_through_numba(monkeypatch):
+    @entry
+    def summed(x):
+        return np.zeros(3).sum() + x[0]
+
+    monkeypatch.setattr(build, "PROVIDED", frozenset())
+    assert build.build(summed.dispatcher, "d1") is None
+    assert summed(np.full(1, 2.0)) == 2.0
+    assert summed._native == {"d1": None}
+
+
+def test_kernels_are_not_called_from_python():
+    with pytest.raises(TypeError, match="py_func"):
+        _norm(np.ones(2))
+
+
+def test_machine_code_read_from_the_disk_is_what_was_kept():
+    arguments = _arguments()
+    expected = mixed(*arguments)
+    types = types_of(arguments)
+    code = store.read(store.path_of(mixed.py_func.__module__, "mixed", types))
+    assert code is not None
+    again = _arguments()
+    assert Native("mixed", code, types)(*again) == expected
+    assert np.array_equal(again[-1], arguments[-1])
+
+
+CHECK = """
+import sys
+import mdstopo
+found = mdstopo.evaluate(mdstopo.load_case(sys.argv[1]))
+print(repr(found.objectives["G"]), found.gradients["G"].tobytes().hex()[:64], "numba" in sys.modules)
+"""
+
+
+@pytest.mark.parametrize("case", ["cases/fig6.yaml", "tests/general/cases"])
+def test_a_warm_process_gives_the_same_without_importing_numba(case, tmp_path):
+    path = ROOT / case
+    path = next(iter(sorted(path.glob("*.yaml")))) if path.is_dir() else path
+    script = tmp_path / "check.py"
+    script.write_text(CHECK)
+    env = os.environ | {"PYTHONPATH": str(ROOT)}
+
+    def run(**more):
+        done = subprocess.run(
+            [sys.executable, str(script), str(path)], capture_output=True, text=True, check=True, env=env | more
+        )
+        return done.stdout.split()
+
+    cold, warm = run(), run()
+    assert warm[:2] == cold[:2]
+    assert warm[2] == "False"
