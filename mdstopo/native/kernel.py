@@ -28,12 +28,12 @@ def numba() -> Any:
 
 
 def _import_lean() -> Any:
-    """Import Numba; in the command line's own process without scipy and cffi, which no kernel here uses.
+    """Import Numba; in a process of our own without scipy and cffi, which no kernel here uses.
 
     They would cost 0.2 s. Elsewhere Numba may serve others too.
     """
     spared = {"scipy", "cffi"} - sys.modules.keys()
-    if "mdstopo.cli" not in sys.modules or "numba" in sys.modules or len(spared) < 2:
+    if not _is_our_process() or "numba" in sys.modules or len(spared) < 2:
         return importlib.import_module("numba")
     for name in spared:
         sys.modules[name] = None  # type: ignore[assignment]  # an import of it now fails, which Numba allows for
@@ -47,6 +47,12 @@ def _import_lean() -> Any:
         for name in spared:
             del sys.modules[name]
     return module
+
+
+def _is_our_process() -> bool:
+    """Whether this is the command line, or a process that it started."""
+    started = getattr(sys.modules.get("__main__"), "__spec__", None)
+    return "mdstopo.cli" in sys.modules or (started is not None and started.name.startswith("mdstopo."))
 
 
 class Kernel:
