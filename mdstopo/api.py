@@ -19,6 +19,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
 from mdstopo.engine import Evaluator
+from mdstopo.error_estimate import ErrorEstimate
 from mdstopo.evaluation import Evaluation, FloatArray, Peak
 from mdstopo.integrators.trajectory import States, Trajectory
 from mdstopo.session.outcome import Outcome as Result
@@ -27,6 +28,7 @@ from mdstopo.session.outcome import Progress
 __all__ = [
     "Case",
     "CaseError",
+    "ErrorEstimate",
     "Evaluation",
     "Peak",
     "Progress",
@@ -80,16 +82,27 @@ def simulate(case: Case, alpha: ArrayLike | None = None, load_case: str | None =
     return _evaluator(case).trajectory(_design(case, alpha), load_case)
 
 
-def evaluate(case: Case, alpha: ArrayLike | None = None, *, method: str = "auto", gradient: bool = True) -> Evaluation:
+def evaluate(
+    case: Case,
+    alpha: ArrayLike | None = None,
+    *,
+    method: str = "auto",
+    gradient: bool = True,
+    error_estimate: bool = False,
+) -> Evaluation:
     """Compute objectives and constraints of one design, and their gradients with respect to alpha.
 
     alpha (N,): default the case's initial design; any finite alpha >= 0 is evaluated, bounds and rows do not matter.
-    method: adjoint, direct, iterative or constant_load; auto takes the case's `solver.sensitivity`.
+    method: adjoint, direct, iterative or constant_load; auto takes the case's `solver.sensitivity`. error_estimate:
+    compute it once more, much finer, and say in `Evaluation.errors` how far off the objectives and gradients are.
     Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha or method.
     """
     if method not in METHODS:
         raise ValueError(f"no sensitivity method {method!r}; there are: {', '.join(METHODS)}")
-    return _evaluator(case).evaluate(_design(case, alpha), gradient, None if method == "auto" else method)
+    evaluator, design = _evaluator(case), _design(case, alpha)
+    chosen = None if method == "auto" else method
+    found = evaluator.evaluate(design, gradient, chosen)
+    return evaluator.with_errors(design, found, chosen) if error_estimate else found
 
 
 def optimize(

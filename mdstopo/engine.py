@@ -28,6 +28,7 @@ from mdstopo.status import Status
 from mdstopo.warm import Beside
 
 if TYPE_CHECKING:
+    from mdstopo.error_estimate import Estimator
     from mdstopo.general.compile import GeneralScene
     from mdstopo.general.driver import GeneralDriver
     from mdstopo.optimizer.problem import Problem
@@ -113,7 +114,7 @@ class Evaluator:
         """
         design = self.design(alpha)
         method = sensitivity or self.sensitivity
-        if method == "iterative" and self.integrator != "generalized_alpha" and self.case.solver.integrator == "auto":
+        if self._is_for_generalized_alpha(method):
             return self._on_generalized_alpha.evaluate(design, gradient, method)
         edge = self._without_slope(design) if gradient else ""
         gradient = gradient and not edge
@@ -153,6 +154,22 @@ class Evaluator:
         if grazing and gradient and status.ok:
             status, message = Status.GRAZING, grazing
         return self._evaluation(design, looked, gradient, work, status, message)
+
+    def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
+        """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors."""
+        if self._is_for_generalized_alpha(sensitivity or self.sensitivity):
+            return self._on_generalized_alpha.with_errors(alpha, found, sensitivity)
+        return replace(found, errors=self._estimator.errors(self.design(alpha), found, sensitivity))
+
+    @cached_property
+    def _estimator(self) -> "Estimator":
+        from mdstopo.error_estimate import Estimator
+
+        return Estimator(self)
+
+    def _is_for_generalized_alpha(self, method: str) -> bool:
+        others = self.integrator != "generalized_alpha" and self.case.solver.integrator == "auto"
+        return method == "iterative" and others
 
     @cached_property
     def _on_generalized_alpha(self) -> "Evaluator":

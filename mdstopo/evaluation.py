@@ -2,11 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.error_estimate import ErrorEstimate
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +36,7 @@ class Evaluation:
     s (NaN for mean and integral); peaks: all that compete, highest first; constraints (n_con,): h_j - h_0j in the
     case's order; constraint_gradients (n_con, N); work: counts of what was done; status: what is not `usable`
     leaves values NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all
-    that compete.
+    that compete. errors: estimates of the errors of objectives and gradients, where they were asked for.
     """
 
     objectives: Mapping[str, float]
@@ -45,3 +49,4 @@ class Evaluation:
     status: Status
     message: str = ""
     constraint_peaks: Mapping[int, tuple[Peak, ...]] = field(default_factory=dict)
+    errors: "Mapping[str, ErrorEstimate]" = field(default_factory=dict)

@@ -59,6 +59,9 @@ _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves o
     metavar="N",
     help="How many members, chosen at random, the differences are taken for.",
 )
+@click.option(
+    "--error-estimate", "estimating", is_flag=True, help="Estimate the errors of values and gradients by finer steps."
+)
 @click.option("--history", is_flag=True, help="Store the time histories dg(t)/dalpha of the direct method.")
 @alpha_option
 @out_option
@@ -70,6 +73,7 @@ def command(
     methods: tuple[str, ...],
     differencing: bool,
     count: int,
+    estimating: bool,
     history: bool,
     alpha_path: Path | None,
     out: Path | None,
@@ -99,7 +103,7 @@ def command(
         engine = Evaluator(case)
         check_design(engine, alpha, alpha_path)
         datasets: dict[str, Any] = {"design/alpha": alpha}
-        results, failure = _all_methods(engine, alpha, methods)
+        results, failure = _all_methods(engine, alpha, methods, estimating)
         for method, result in results.items():
             datasets |= sensitivity_part(result["gradients"], method)
         if differencing and not failure:
@@ -139,10 +143,10 @@ def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str,
 
 
 def _all_methods(
-    engine: "Evaluator", alpha: "NDArray[np.float64]", methods: tuple[str, ...]
+    engine: "Evaluator", alpha: "NDArray[np.float64]", methods: tuple[str, ...], estimating: bool
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Gradients, time and disagreement by method, and why it failed where it did."""
-    from mdstopo.cli.gradient_numbers import disagreement, timed
+    from mdstopo.cli.gradient_numbers import disagreement, relative, timed
 
     results: dict[str, dict[str, Any]] = {}
     for method in methods:
@@ -158,6 +162,11 @@ def _all_methods(
             "message": evaluation.message if evaluation.status.ok else _in_words(evaluation),
             "disagreement": {name: disagreement(gradients[name], reference[name]) for name in gradients},
         }
+        if estimating:
+            errors = engine.with_errors(alpha, evaluation, method).errors
+            if not errors:
+                return results, f"{method}: no error estimate, because the finer motion failed"
+            results[method]["errors"] = {name: relative(errors[name], evaluation, name) for name in errors}
     return results, ""
 
 
@@ -227,7 +236,9 @@ def _say(
     path: Path,
 ) -> None:
     output.say(f"{case.title or case.name}: {failure or 'done'}")
-    rows = [["method", "objective", "value", "largest |dG/dalpha|", "differs by", "from differences by", "time"]]
+    head = ["method", "objective", "value", "largest |dG/dalpha|", "differs by", "from differences by", "time"]
+    estimated = any("errors" in result for result in results.values())
+    rows = [[*head, "error of value", "of gradient"] if estimated else head]
     for method, result in results.items():
         for name, gradient in result["gradients"].items():
             rows.append(
@@ -239,6 +250,7 @@ def _say(
                     number(result["disagreement"][name], 3),
                     number(result["differences"][name], 3) if "differences" in result else "",
                     duration(result["seconds"]),
+                    *(number(error, 2) for error in result.get("errors", {}).get(name, {}).values()),
                 ]
             )
     output.table(rows)

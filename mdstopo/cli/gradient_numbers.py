@@ -3,9 +3,14 @@
 import time
 from collections.abc import Callable, Mapping
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from mdstopo.error_estimate import ErrorEstimate
+    from mdstopo.evaluation import Evaluation
 
 Floats = NDArray[np.float64]
 Objectives = Callable[[Floats], Mapping[str, float]]
@@ -31,6 +36,13 @@ def disagreement(gradient: Floats, reference: Floats) -> float:
     largest = float(np.abs(reference).max(initial=0.0))
     difference = float(np.abs(gradient - reference).max(initial=0.0))
     return difference / largest if largest > 0.0 else difference
+
+
+def relative(error: "ErrorEstimate", evaluation: "Evaluation", name: str) -> dict[str, float]:
+    """An estimate over the value, and over the largest entry of the gradient; absolute where that is 0."""
+    value = abs(evaluation.objectives[name])
+    largest = float(np.abs(evaluation.gradients[name]).max(initial=0.0))
+    return {"value": error.value / (value or 1.0), "gradient": error.gradient / (largest or 1.0)}
 
 
 def chosen_members(count: int, wanted: int, seed: int) -> NDArray[np.intp]:

@@ -208,6 +208,15 @@ def test_gradient_compares_with_differences(capsys: pytest.CaptureFixture[str]) 
         assert file["differences/G"].shape == (4,)
 
 
+def test_gradient_estimates_its_errors_when_asked(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("gradient", "probe.yaml", "--error-estimate", "--set", "solver.tolerance=1e-5")
+    errors = answer(capsys, *words)["methods"]["direct"]["errors"]["G"]
+    assert 0.0 < errors["value"] < 1e-4
+    assert 0.0 < errors["gradient"] < 1e-4
+    _, out, _ = call(capsys, *words)
+    assert "error of value" in out.splitlines()[1]
+
+
 def test_gradient_stores_histories_of_the_direct_method(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "gradient", "probe.yaml", "--history")
     assert list(found["methods"]) == ["adjoint", "direct"]

@@ -1,0 +1,95 @@
+"""How far an evaluation is from the exact motion's: the same once more, much finer, and the difference.
+
+An embedded estimate would be cheaper, but it is of the motion, not of what is looked at: peaks, events and the reverse
+sweep have errors of their own. A finer evaluation has them all, smaller. Adaptive steps are computed to a thousandth of
+the tolerance, and again to a thousandth of that where no step has changed. Fixed steps are halved; where the method is
+of second order a third is added, which is what the halved steps still lack.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.evaluation import Evaluation, FloatArray
+
+if TYPE_CHECKING:
+    from mdstopo.engine import Evaluator
+
+FINER = 1e-3
+#: the tightest tolerance that double precision lets be kept
+TIGHTEST = 1e-13
+#: what rounding leaves in sums over a motion, relative
+ROUNDING = 1e-15
+
+
+@dataclass(frozen=True)
+class ErrorEstimate:
+    """Of one objective, absolute. value: of G; gradient: of the worst entry of dG/dalpha, NaN where there is none."""
+
+    value: float
+    gradient: float
+
+
+class Estimator:
+    """Error estimates for the evaluations of one evaluator; the finer ones are compiled once."""
+
+    def __init__(self, evaluator: "Evaluator") -> None:
+        self._evaluator = evaluator
+        self._to_tolerance: dict[float, Evaluator] = {}
+
+    def errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None) -> dict[str, ErrorEstimate]:
+        """Of an evaluation of alpha (N,), by objective; empty where it failed, or the finer one."""
+        if not found.status.usable:
+            return {}
+        second_order = self._evaluator.integrator == "generalized_alpha"
+        if second_order or self._evaluator.case.solver.step is not None:
+            finer = self._halved.evaluate(alpha, bool(found.gradients), sensitivity)
+        else:
+            finer = self._finer(alpha, found, sensitivity)
+        if not finer.status.usable:
+            return {}
+        factor = 4.0 / 3.0 if second_order else 1.0
+        return {name: _difference(found, finer, name, factor) for name in found.objectives}
+
+    def _finer(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None) -> Evaluation:
+        tolerance = self._evaluator.case.solver.tolerance
+        while tolerance > TIGHTEST:
+            tolerance = max(FINER * tolerance, TIGHTEST)
+            finer = self._at(tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
+            if finer.work != found.work:
+                return finer
+        # nothing finer can be had: a coarser one is farther off than what was found
+        return self._at(10.0 * tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
+
+    def _at(self, tolerance: float) -> "Evaluator":
+        if tolerance not in self._to_tolerance:
+            self._to_tolerance[tolerance] = self._again(tolerance)
+        return self._to_tolerance[tolerance]
+
+    @cached_property
+    def _halved(self) -> "Evaluator":
+        """The same evaluator with half its fixed steps."""
+        halved = self._again(self._evaluator.case.solver.tolerance)
+        for load_case in halved.scenes:
+            step = self._evaluator.driver(load_case).settings[2]
+            halved.driver(load_case).settings[2] = 0.5 * step
+        return halved
+
+    def _again(self, tolerance: float) -> "Evaluator":
+        case = self._evaluator.case
+        # a fixed step, so that none is chosen anew: `_halved` puts in its own
+        step = case.solver.step or (1.0 if self._evaluator.integrator == "generalized_alpha" else None)
+        solver = replace(case.solver, integrator=self._evaluator.integrator, tolerance=tolerance, step=step)
+        return type(self._evaluator)(replace(case, solver=solver), beside=False)
+
+
+def _difference(found: Evaluation, finer: Evaluation, name: str, factor: float) -> ErrorEstimate:
+    value, better = found.objectives[name], finer.objectives[name]
+    of_value = factor * abs(value - better) + ROUNDING * abs(value)
+    if name not in found.gradients or name not in finer.gradients:
+        return ErrorEstimate(of_value, np.nan)
+    gradient = found.gradients[name]
+    off = float(np.abs(gradient - finer.gradients[name]).max(initial=0.0))
+    return ErrorEstimate(of_value, factor * off + ROUNDING * float(np.abs(gradient).max(initial=0.0)))
