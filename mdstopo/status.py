@@ -6,6 +6,7 @@ file.
 """
 
 import enum
+from collections.abc import Sequence
 
 
 class Status(enum.Enum):
@@ -42,3 +43,13 @@ class RunStatus(enum.StrEnum):
     MAX_ITERATIONS = "max_iterations"
     INTERRUPTED = "interrupted"
     FAILED = "failed"
+
+
+def together(ends: Sequence[RunStatus], noun: str) -> tuple[RunStatus, str]:
+    """How several runs stand as one, and how many of them ended how. noun: what they are, in the plural."""
+    counts = {end: ends.count(end) for end in sorted(set(ends))}
+    words = ", ".join(f"{count} {end.value.replace('_', ' ')}" for end, count in counts.items())
+    reason = f"{len(ends)} {noun}: {words}"
+    if set(counts) == {RunStatus.FAILED}:
+        return RunStatus.FAILED, reason
+    return (RunStatus.MAX_ITERATIONS if RunStatus.MAX_ITERATIONS in counts else RunStatus.CONVERGED), reason

@@ -4,9 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.scenes import BEST_KNOWN, IDEAL, NADIR
 from mdstopo import load_case
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.measures import dominated, hypervolume, scaled
+from mdstopo.front.measures import REFERENCE, dominated, hypervolume, scaled
 from mdstopo.front.session import Ask, run_front
 from mdstopo.plots import design, front, layout
 from mdstopo.plots.source import Source
@@ -18,8 +19,6 @@ ITERATIONS = 100
 STEPS = 100
 MIDDLE = WEIGHTS // 2
 METHODS = ("direct", "iterative")
-#: scale of the hypervolume, and the best known of it
-IDEAL, NADIR, BEST_KNOWN = np.array([16.48, 35.19]), np.array([51.67, 122.87]), 0.9546
 
 
 def figure_7(desk: Desk) -> Numbers:
@@ -30,7 +29,7 @@ def figure_7(desk: Desk) -> Numbers:
         path = desk.path(f"fig7-{name}.h5")
         found[name] = points = _front(desk, name, path)
         good = points[~dominated(points)]
-        volume = hypervolume(scaled(good, IDEAL, NADIR), np.full(2, 1.1)) / BEST_KNOWN
+        volume = hypervolume(scaled(good, IDEAL, NADIR), np.full(2, REFERENCE)) / BEST_KNOWN
         numbers[name] = {"hypervolume": volume, "middle": points[MIDDLE].tolist(), "on the front": len(good)}
         with styled() as module:
             save(front.draw(module, Source(path), marked=MIDDLE), desk.path(f"fig7-{name}.png"))

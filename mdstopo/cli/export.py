@@ -18,10 +18,10 @@ def command(result_path: Path, kind: str | None, out: Path | None, quiet: bool) 
     """Write what a result file holds as --csv tables or as one --json document."""
     if kind is None:
         raise click.UsageError("say --csv or --json")
-    from mdstopo.plots.source import case_of
     from mdstopo.store.errors import StoreError
     from mdstopo.store.export import as_csv, as_json, tables
     from mdstopo.store.reader import read_result
+    from mdstopo.store.stored_case import case_of
 
     output = Output(json=False, quiet=quiet)
     view = read_result(result_path, leave_out=("optimizer", "resume", "pareto/tasks", "sweep/tasks", "combine/tasks"))

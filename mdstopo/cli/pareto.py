@@ -11,6 +11,7 @@ from mdstopo.cli.front_display import front_display
 from mdstopo.cli.interrupt import Interrupts
 from mdstopo.cli.options import (
     CASE_FILE,
+    EXIT,
     open_case,
     out_option,
     output_options,
@@ -31,12 +32,9 @@ if TYPE_CHECKING:
 
 METHODS = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product", "nbi", "nc")
 DEFAULT_CASE = Path("cases/fig7.yaml")
-EXIT = {"converged": 0, "max_iterations": 0, "failed": 1, "interrupted": 3}
 _POINTS = 21
 #: violation, relative to a constraint's bound, from which a point says so
 STATED = 1e-8
-#: the reference point of the hypervolume (`front.content`, which is not imported for this alone)
-REFERENCE = 1.1
 
 
 @click.command("pareto")
@@ -184,6 +182,8 @@ def front_rows(names: list[str], part: "Mapping[str, Any]") -> list[list[str]]:
 
 def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[str, Any]") -> list[list[str]]:
     """Utopia and maxima that the points were found with, and how good the front is."""
+    from mdstopo.front.measures import REFERENCE
+
     rows = [
         [title, ", ".join(f"{name} {number(value)}" for name, value in zip(names, part[title][0], strict=True))]
         for title in ("utopia", "maxima")

@@ -9,6 +9,7 @@ import click
 
 from mdstopo.cli.interrupt import Interrupts
 from mdstopo.cli.options import (
+    EXIT,
     alpha_option,
     case_argument,
     open_case,
@@ -25,7 +26,6 @@ from mdstopo.cli.progress import display
 if TYPE_CHECKING:
     from mdstopo.session.outcome import Outcome
 
-_EXIT = {"converged": 0, "max_iterations": 0, "failed": 1, "interrupted": 3}
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
 
 
@@ -85,7 +85,7 @@ def command(
         output.notice(f"warning: {warning}")
     if outcome.status == "interrupted":
         output.notice(f"interrupted; to go on: {again}")
-    return _EXIT[outcome.status]
+    return EXIT[outcome.status]
 
 
 def resume_command(

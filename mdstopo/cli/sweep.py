@@ -9,10 +9,18 @@ import click
 
 from mdstopo.cli.front_display import front_display
 from mdstopo.cli.interrupt import Interrupts
-from mdstopo.cli.options import case_argument, open_case, out_option, output_options, overwrite_option, result_path
+from mdstopo.cli.options import (
+    EXIT,
+    case_argument,
+    open_case,
+    out_option,
+    output_options,
+    overwrite_option,
+    result_path,
+)
 from mdstopo.cli.output import Output, duration, number
-from mdstopo.cli.pareto import EXIT, resumed
 from mdstopo.cli.pareto import command as pareto
+from mdstopo.cli.pareto import resumed
 
 if TYPE_CHECKING:
     from mdstopo.front.sweep import SweepOutcome

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.front.measures import dominated, hypervolume, neighbour_gaps, scaled, spacing
+from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, scaled, spacing
 from mdstopo.front.plan import TOLERATED, Front
 from mdstopo.front.tasks import Found
 from mdstopo.optimizer.structure import sign_of
@@ -22,8 +22,6 @@ from mdstopo.store.reader import ResultView
 
 Floats = NDArray[np.float64]
 
-#: the reference point of the hypervolume, in objectives scaled to the front's own ideal and nadir
-REFERENCE = 1.1
 _NUMBERS = ("combined", "kkt", "violation", "seconds")
 _COUNTS = ("point", "evaluations")
 _WORDS = ("key", "reason", "host")

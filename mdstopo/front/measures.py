@@ -6,6 +6,9 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+#: the reference point of a front's hypervolume, in objectives scaled to its own ideal and nadir
+REFERENCE = 1.1
+
 
 def dominated(points: Floats) -> Bools:
     """(W,) whether another point is at least as good in every objective and better in one; points (W, m).

@@ -18,12 +18,13 @@ from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.tasks import Found, StoppedError, Task, case_key, failed
 from mdstopo.optimizer.starts import random_feasible
 from mdstopo.optimizer.structure import sign_of
+from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even
 from mdstopo.session.crew import cores
 from mdstopo.session.engine import make_engine
 from mdstopo.session.ready import compile_apart
 from mdstopo.session.starts import first_design, replaced
-from mdstopo.status import RunStatus
+from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
@@ -112,7 +113,7 @@ def run_front(
     check(case)
     if len(np.unique(ask.directions, axis=0)) < len(ask.directions):
         raise ValueError("a direction is given twice")
-    run = _FrontRun(case, ask, on_progress or _ignore, stop_requested or _never, notify or _ignore, command)
+    run = _FrontRun(case, ask, on_progress or ignore, stop_requested or never, notify or ignore, command)
     if path is None:
         return run.go(None, workers, cluster, worth)
     place = prepare_place(path)
@@ -349,20 +350,4 @@ class _FrontRun:
 
 def verdict(front: Front) -> tuple[RunStatus, str]:
     """A front's status, and how its points stand."""
-    counts: dict[str, int] = {}
-    for point in front.points:
-        word = "failed" if point is None else point.status.value
-        counts[word] = counts.get(word, 0) + 1
-    words = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(counts.items()))
-    reason = f"{len(front.points)} points: {words}"
-    if counts.get("failed", 0) == len(front.points):
-        return RunStatus.FAILED, reason
-    return (RunStatus.MAX_ITERATIONS if "max_iterations" in counts else RunStatus.CONVERGED), reason
-
-
-def _ignore(_: object) -> None:
-    return None
-
-
-def _never() -> bool:
-    return False
+    return together([RunStatus.FAILED if point is None else point.status for point in front.points], "points")

@@ -17,9 +17,10 @@ from mdstopo.front.jobs import Setting, Trial
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.session import WORTH, Snapshot
 from mdstopo.front.tasks import Found, case_key, failed
+from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.crew import cores
 from mdstopo.session.ready import compile_apart
-from mdstopo.status import RunStatus
+from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
@@ -83,7 +84,7 @@ def run_sweep(
     base = load_case(case_path, dict(overrides))
     cases = _cases(case_path, overrides, tuple(sets), values)
     sweep = _Sweep(base, tuple(sets), values, cases, command)
-    tell = notify or _ignore
+    tell = notify or ignore
     place = prepare_place(path)
     with Lock(place):
         remove_leftovers(place)
@@ -96,7 +97,7 @@ def run_sweep(
         began = time.perf_counter()
         for case in cases:
             compile_apart(case, tell)
-        stop = stop_requested or _never
+        stop = stop_requested or never
         saver = Checkpointer(lambda: sweep.checkpoint(place, tell))
         due = [i for i, key in enumerate(sweep.runs) if key not in solved]
         sweep.solved = solved
@@ -174,13 +175,7 @@ class _Sweep:
 
     def verdict(self) -> tuple[RunStatus, str]:
         """How the runs have ended."""
-        counts: dict[str, int] = {}
-        for key in self.runs:
-            word = self.solved[key].status.value
-            counts[word] = counts.get(word, 0) + 1
-        words = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in sorted(counts.items()))
-        status = RunStatus.MAX_ITERATIONS if "max_iterations" in counts else RunStatus.CONVERGED
-        return (RunStatus.FAILED if set(counts) == {"failed"} else status), f"{len(self.runs)} runs: {words}"
+        return together([self.solved[key].status for key in self.runs], "runs")
 
     def snapshot(self) -> Snapshot:
         """Progress."""
@@ -228,11 +223,3 @@ def shortest(value: float) -> str:
 def lost(case: Case, result: Lost) -> Found:
     """What stands for a run that no worker finished; its key is empty, so that a resumed sweep tries again."""
     return failed(0, "", case.initial, len(case.objectives), result.reason)
-
-
-def _ignore(_: object) -> None:
-    return None
-
-
-def _never() -> bool:
-    return False

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.case.reader import read_case
 from mdstopo.store.errors import StoreError
 from mdstopo.store.reader import ResultView, read_result
+from mdstopo.store.stored_case import case_of
 
 if TYPE_CHECKING:
     from mdstopo.engine import Evaluator
@@ -28,14 +28,6 @@ class Motion:
 
     t: Floats
     q: Floats
-
-
-def case_of(view: ResultView) -> Case:
-    """The case in a result file as it was read, with what --set changed. Raises CaseError where files are gone."""
-    path = Path(view.case_path) if view.case_path else None
-    settings = view.settings.items()
-    overrides = {key.removeprefix("set "): str(value) for key, value in settings if key.startswith("set ")}
-    return read_case(view.case_text, path=path, overrides=overrides)
 
 
 class Source:

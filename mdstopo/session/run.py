@@ -15,6 +15,7 @@ from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
 from mdstopo.session.advice import advise
+from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import Combining, even, problem_of
 from mdstopo.session.engine import Engine, MakeEngine, make_engine
 from mdstopo.session.errors import WorkerError
@@ -96,8 +97,8 @@ def run_session(
         case = replace(case, optimizer=replace(case.optimizer, starts=starts))
     if initial is not None and (initial.shape != (case.n_design,) or not np.isfinite(initial).all()):
         raise ValueError(f"initial must be {case.n_design} finite numbers, one for each design variable")
-    tell = notify or _ignore
-    run = _Run(case, initial, on_iteration or _ignore, stop_requested or _never, tell, command)
+    tell = notify or ignore
+    run = _Run(case, initial, on_iteration or ignore, stop_requested or never, tell, command)
     if path is None:
         return run.go(engine, None, None, workers or 1)
     place = prepare_place(Path(path))
@@ -400,11 +401,3 @@ def _check_optimizable(case: Case) -> None:
         mistakes.append(case.marks.mistake("members", "an optimisation needs members with `design: true`"))
     if mistakes:
         raise CaseError(mistakes, str(case.path or case.name))
-
-
-def _ignore(_: object) -> None:
-    return None
-
-
-def _never() -> bool:
-    return False
