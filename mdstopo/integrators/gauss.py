@@ -55,6 +55,9 @@ MOST = max(LEVELS)
 FIXED_LEVEL = 1
 #: radians of the fastest vibration that the first window may span, so that the sweeps contract
 LONGEST = 6.0
+#: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
+SLOW = 0.26
+MOST_CAUTIOUS = 100.0
 
 
 @kernel
@@ -342,6 +345,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 for d in range(n):
                     tail = max(abs(coef[s - 1, d]), 0.1 * abs(coef[s - 2, d])) * 1.5 * h * h / (4.0 * s * s)
                     estimate = max(estimate, weight[d] * tail)
+                estimate *= caution(coef, weight, s)
                 if estimate <= tolerance or fixed_step > 0.0:
                     # the last clause: rounding is all that is left
                     if e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11):
@@ -413,6 +417,24 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 change = 0.9 * (tolerance / max(estimate, 1e-30)) ** (1.0 / (s + 1)) * 11.0 / s
                 wanted = h * min(max(change, 0.4), 2.0)
     return OK, count, t
+
+
+@kernel
+def caution(coef, weight, s):  # type: ignore[no-untyped-def]
+    """By how much the last coefficients understate what is left: 1 where they fall fast, up to MOST_CAUTIOUS.
+
+    Where they fall slowly, as where a member passes near zero length, the gradient is off by much more than the motion.
+    Measured on 200 random scenes: three gradients were off by 15 to 160 tolerances without it.
+    """
+    first = 1e-300
+    earlier = 1e-300
+    last = 0.0
+    for d in range(coef.shape[1]):
+        first = max(first, weight[d] * abs(coef[0, d]))
+        earlier = max(earlier, weight[d] * abs(coef[s - 3, d]))
+        last = max(last, weight[d] * abs(coef[s - 1, d]))
+    decay = max((last / first) ** (1.0 / (s - 1)), np.sqrt(last / earlier))
+    return min(max(1.0, (decay / SLOW) ** 6), MOST_CAUTIOUS)
 
 
 @kernel

@@ -22,6 +22,7 @@ from mdstopo.optimizer.safeguards import (
     failure,
     first_price,
     merit,
+    next_charge,
     next_convex,
     next_shift,
     next_trust,
@@ -83,6 +84,7 @@ class Gsao:
             trust=self.settings.number("trust_start") if self.trusted else 1.0,
             convex=self.settings.number("convex_start"),
             price=price,
+            charge=price,
             iteration=0,
             evaluations=1,
             small=0,
@@ -135,8 +137,8 @@ class Gsao:
     def _judge(self, state: State, sample: Sample) -> bool:
         """Accept or reject the evaluated trial and adapt what depends on that; whether it was accepted."""
         settings = self.settings
-        before = merit(state.objective, state.constraint_rows, state.price)
-        after = merit(sample.objective, sample.constraint_rows, state.price)
+        before = merit(state.objective, state.constraint_rows, state.charge)
+        after = merit(sample.objective, sample.constraint_rows, state.charge)
         actual = before - after
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         # A decrease that rounding decides is none: both sums carry it.
@@ -189,9 +191,11 @@ class Gsao:
             model = replace(model, kappa=model.kappa + weight * steepest / self.range)
             optimum = solve(model, lower, upper, self.problem.linear, state.price)
         promised, constraints = model.model(optimum.x)
-        before = merit(state.objective, state.constraint_rows, state.price)
+        if optimum.converged:
+            state.charge = next_charge(state.charge, optimum.multipliers[model.n_objective :], state.price)
+        before = merit(state.objective, state.constraint_rows, state.charge)
         state.trial = optimum.x
-        state.predicted = before - merit(promised, constraints, state.price)
+        state.predicted = before - merit(promised, constraints, state.charge)
         state.kkt = self._kkt(state, model, optimum) if optimum.converged else float("nan")
         if not optimum.converged and not state.predicted > 0.0:
             state.status = RunStatus.FAILED

@@ -20,6 +20,10 @@ CONVEX_CEILING = 1e6
 # much more than promised was held back by that term.
 TOO_CONVEX = 1.5
 PRICE_GROWTH = 10.0
+# A merit is exact where violations cost more than the multipliers; every bit more only punishes what a step along a
+# curved limit violates in second order, and makes steps short.
+CHARGE = 2.0
+CHARGE_FALL = 0.5
 PRICE_CEILING = 1e4
 
 
@@ -50,6 +54,11 @@ def scaled_violation(sample: Sample) -> float:
 def merit(objective: float, constraint_rows: Floats, price: Floats) -> float:
     """What a step must decrease: the objective and the price of all violations."""
     return objective + float(np.einsum("i,i->", price, np.maximum(constraint_rows, 0.0)))
+
+
+def next_charge(charge: Floats, multipliers: Floats, price: Floats) -> Floats:
+    """What violations cost in the merit, (C,): twice the multipliers, at most the price; it falls gradually."""
+    return np.minimum(np.maximum(CHARGE * multipliers, CHARGE_FALL * charge), price)
 
 
 def first_price(sample: Sample, settings: Settings) -> Floats:
@@ -117,7 +126,7 @@ def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, s
             f"the projected KKT residual, {state.kkt:.2g} of the largest gradient entry, "
             f"is within the tolerance {settings.tolerance:.2g}"
         )
-    if state.small >= 2:
+    if state.small >= 2 and state.violation <= settings.tolerance:
         share = settings.number("decrease_tolerance")
         return RunStatus.CONVERGED, (
             f"actual and predicted decrease were both below {share:.2g} of the objective twice running"

@@ -114,9 +114,9 @@ class State:
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
     the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
     shifts, `steps` (2, N) the last two accepted steps, `trust` the half width of the trust box in ranges,
-    `convex` the relative weight of the quadratic term, `price` (C,) of violations. Counters: `iteration`,
-    `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`. The best so far:
-    `best_alpha` (N,), `best_objective`, `best_violation`.
+    `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge` (C,) in
+    the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
+    The best so far: `best_alpha` (N,), `best_objective`, `best_violation`.
     """
 
     alpha: Floats
@@ -134,6 +134,7 @@ class State:
     trust: float
     convex: float
     price: Floats
+    charge: Floats
     iteration: int
     evaluations: int
     small: int

@@ -155,6 +155,33 @@ def test_nonlinear_constraints_are_met_from_an_infeasible_start():
     assert np.asarray(state.history.nonlinear).shape == (len(state.history), 1)
 
 
+@pytest.mark.parametrize(
+    ("preset", "n", "most"),
+    [("default", 5, 30), ("default", 20, 30), ("default", 100, 30), ("slp", 5, 60), ("slp", 20, 60)],
+)
+def test_the_optimiser_follows_a_curved_limit(preset, n, most):
+    """From a point on a sphere along it to the lowest: steps violate the limit in second order, and must not shrink."""
+    rng = np.random.default_rng(3)
+    slope = rng.uniform(-1.0, 1.0, n)
+    slope /= np.linalg.norm(slope)
+    away = rng.normal(size=n)
+    radius = 0.45
+
+    def sphere(x):
+        return np.array([np.sum((x - 0.5) ** 2) - radius**2]), 2.0 * (x - 0.5)[None, :]
+
+    problem = Toy(
+        lambda x: (np.array([10.0 + slope @ x]), slope[None, :].copy()),
+        0.5 + radius * away / np.linalg.norm(away),
+        0.0,
+        1.0,
+        constraints=sphere,
+    )
+    state = run(Gsao(problem, settings(preset, max_iterations=most)))
+    assert state.best_violation <= 1e-6
+    assert state.best_objective == pytest.approx(10.0 + slope.sum() / 2.0 - radius, abs=1e-4)
+
+
 def test_a_constraint_that_cannot_be_met_ends_at_the_least_violation():
     problem = Toy(
         lambda x: (np.array([np.sum(x)]), np.ones((1, 3))),
