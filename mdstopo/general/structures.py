@@ -6,13 +6,22 @@ one. Inside kernels a structure is made and read like a named tuple; Python neve
 
 from typing import Any
 
-from mdstopo.native.kernel import when_compiling
+from mdstopo.native.kernel import numba, when_compiling
 
 _KINDS: dict[str, type] = {}
+_ENDING = "Structure"
 
 
 def __getattr__(name: str) -> type:
-    """The types of structures, made when something is compiled: Numba's disk cache asks this module for them."""
+    """The types of structures, made when something is compiled.
+
+    Numba's disk cache asks this module for them, also in a process that compiles kernels for scenes without any: a
+    kernel's cache lists all the types that it was ever compiled for.
+    """
+    if name.endswith(_ENDING) and name not in _KINDS:
+        from mdstopo.general import balance, model, track  # noqa: F401  (which have them)
+
+        numba()
     try:
         return _KINDS[name]
     except KeyError:
@@ -32,7 +41,7 @@ def bundle(maker: type, fields: tuple[str, ...]) -> None:
             return tuple((name, types.unliteral(kind)) for name, kind in given)
 
         members = {"preprocess_fields": preprocess_fields, "__module__": __name__}
-        kind = type(f"{maker.__name__}Structure", (types.StructRef,), members)
+        kind = type(f"{maker.__name__}{_ENDING}", (types.StructRef,), members)
         _KINDS[kind.__name__] = kind
         structref.register(kind)
         structref.define_constructor(maker, kind, list(fields))
