@@ -74,6 +74,7 @@ $(VENV)/.ready-docs: $(VENV)/.ready
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/python -m mkdocs build --strict
+	@echo open site/index.html
 
 # what benchmarks compare with beside the peers
 $(VENV)/.ready-bench: $(VENV)/.ready

@@ -205,8 +205,10 @@ def _say(output: Output, outcome: "FrontOutcome") -> None:
     names = [objective.name for objective in case.objectives]
     part = outcome.part
     output.table(front_rows(names, part))
-    numbers = {} if outcome.quality is None else outcome.quality.numbers()
-    output.table(quality_rows(names, numbers, part))
+    good = outcome.quality
+    numbers = {} if good is None else good.numbers()
+    scale = {} if good is None else {"ideal": good.ideal, "nadir": good.nadir}
+    output.table(quality_rows(names, numbers, {**part, **scale}))
     output.table(
         [
             ["method", outcome.method],
