@@ -9,6 +9,9 @@ from mdstopo.plots.source import Source
 from mdstopo.plots.style import COLOURS, WIDTH
 from mdstopo.store.errors import StoreError
 
+#: points that a front may have to be numbered
+MOST_NUMBERED = 15
+
 
 def draw(module: Any, source: Source, visited: bool = True, marked: int | None = None) -> Any:
     """Two objectives in a plane; of more, every pair. marked: a point that gets a circle."""
@@ -33,10 +36,14 @@ def draw(module: Any, source: Source, visited: bool = True, marked: int | None =
             axis.plot(*points[dominated][:, [i, j]].T, "x", color=COLOURS[1], markersize=4, label="dominated")
         order = np.argsort(good[:, i])
         axis.plot(*good[order][:, [i, j]].T, "o-" if m == 2 else "o", color=COLOURS[0], linewidth=0.6, label="front")
+        if len(points) <= MOST_NUMBERED:
+            for number in np.flatnonzero(~dominated & np.isfinite(points).all(axis=1)).tolist():
+                place = tuple(points[number, [i, j]])
+                axis.annotate(str(number), place, xytext=(3, 3), textcoords="offset points", fontsize="small")
         if marked is not None:
             axis.plot(*points[marked, [i, j]], "o", color="black", fillstyle="none", markersize=9, label="marked")
         for k, limits in ((i, axis.set_xlim), (j, axis.set_ylim)):
-            room = 0.25 * max(float(high[k] - low[k]), 1e-12 * abs(float(high[k])))
+            room = 0.12 * max(float(high[k] - low[k]), 1e-12 * abs(float(high[k])))
             limits(low[k] - room, high[k] + 2.0 * room)
         for k, label in ((i, axis.set_xlabel), (j, axis.set_ylabel)):
             label(f"{objectives[k].name}, {unit_of_value(objectives[k])}")

@@ -46,6 +46,12 @@
   const draw = () => {
     const canvas = at("layout"), g = canvas.getContext("2d"), q = current(), m = motion();
     g.clearRect(0, 0, canvas.width, canvas.height);
+    const named = [];
+    const name = (text, x, y) => {  // below the names that would be written over
+      while (named.some(([x0, y0, w]) => x < x0 + w && x0 < x + g.measureText(text).width && Math.abs(y - y0) < 12)) y += 12;
+      named.push([x, y, g.measureText(text).width]);
+      g.fillText(text, x, y);
+    };
     data.bodies.forEach((body, b) => {
       const ground = body.name === "ground", index = ground ? q.length : b;
       g.beginPath();
@@ -55,7 +61,7 @@
       g.globalAlpha = 0.12; g.fillStyle = colour; g.fill(); g.globalAlpha = 1; g.strokeStyle = colour; g.lineWidth = 1; g.stroke();
       g.fillStyle = colour;
       for (const [x, y] of body.points) { const p = screen(place(index, x, y, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
-      if (!ground) { const p = screen(place(index, 0, 0, q)); g.fillText(body.name, p[0] + 5, p[1] - 5); g.fillRect(p[0] - 3, p[1] - 0.5, 6, 1); g.fillRect(p[0] - 0.5, p[1] - 3, 1, 6); }
+      if (!ground) { const p = screen(place(index, 0, 0, q)); name(body.name, p[0] + 5, p[1] - 5); g.fillRect(p[0] - 3, p[1] - 0.5, 6, 1); g.fillRect(p[0] - 0.5, p[1] - 3, 1, 6); }
     });
     const rows = data.designs[state.design].members.rows;
     const forces = state.colour === "force" && m && m.force ? m.force[state.frame] : null;
