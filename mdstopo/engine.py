@@ -8,7 +8,7 @@ simulation.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -62,6 +62,7 @@ class Evaluator:
         self.integrator, self.integrator_reason = choose(case.solver, self.beyond)
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         self._method = method_of(self.integrator, case.solver)
+        self._compiles_beside = beside
         self._beside = Beside(self.integrator) if beside and not self.beyond else None
         self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
         self._drivers: dict[str, AnyDriver] = {}
@@ -90,6 +91,7 @@ class Evaluator:
         ]
         self._work = np.zeros(WORK, dtype=np.int64)
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
+        self._others: dict[tuple[tuple[str, Any], ...], Evaluator] = {}
 
     # -- what a run asks
 
@@ -115,7 +117,7 @@ class Evaluator:
         design = self.design(alpha)
         method = sensitivity or self.sensitivity
         if self._is_for_generalized_alpha(method):
-            return self._on_generalized_alpha.evaluate(design, gradient, method)
+            return self.otherwise(sensitivity="iterative").evaluate(design, gradient, method)
         edge = self._without_slope(design) if gradient else ""
         gradient = gradient and not edge
         exact = gradient and method == "adjoint"
@@ -158,7 +160,7 @@ class Evaluator:
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors."""
         if self._is_for_generalized_alpha(sensitivity or self.sensitivity):
-            return self._on_generalized_alpha.with_errors(alpha, found, sensitivity)
+            return self.otherwise(sensitivity="iterative").with_errors(alpha, found, sensitivity)
         return replace(found, errors=self._estimator.errors(self.design(alpha), found, sensitivity))
 
     @cached_property
@@ -168,14 +170,17 @@ class Evaluator:
         return Estimator(self)
 
     def _is_for_generalized_alpha(self, method: str) -> bool:
+        """Whether `auto` has to give way to the steps that the iterative method is defined on."""
         others = self.integrator != "generalized_alpha" and self.case.solver.integrator == "auto"
         return method == "iterative" and others
 
-    @cached_property
-    def _on_generalized_alpha(self) -> "Evaluator":
-        """The same case on the steps that the iterative method is defined on."""
-        solver = replace(self.case.solver, sensitivity="iterative")
-        return Evaluator(replace(self.case, solver=solver))
+    def otherwise(self, **solver: Any) -> "Evaluator":
+        """The evaluator of the same case with other solver settings, made once for each set of them."""
+        key = tuple(sorted(solver.items()))
+        if key not in self._others:
+            case = replace(self.case, solver=replace(self.case.solver, **solver))
+            self._others[key] = Evaluator(case, self._compiles_beside)
+        return self._others[key]
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
         """The motion of one load case with the design alpha (N,)."""
@@ -198,8 +203,7 @@ class Evaluator:
         if not status.ok or len(t) > HISTORY or self.case.solver.step is not None:
             return status, t, lines
         step = min((t[-1] - t[0]) / HISTORY, float(np.diff(t).min()))
-        solver = replace(self.case.solver, step=step)
-        denser = Evaluator(replace(self.case, solver=solver), beside=False)._histories(self.design(alpha), objective)
+        denser = self.otherwise(step=step)._histories(self.design(alpha), objective)
         return denser if denser[0].ok else (status, t, lines)
 
     def _histories(self, design: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:

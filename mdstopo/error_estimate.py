@@ -6,7 +6,7 @@ the tolerance, and again to a thousandth of that where no step has changed. Fixe
 of second order a third is added, which is what the halved steps still lack.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -33,11 +33,10 @@ class ErrorEstimate:
 
 
 class Estimator:
-    """Error estimates for the evaluations of one evaluator; the finer ones are compiled once."""
+    """Error estimates for the evaluations of one evaluator."""
 
     def __init__(self, evaluator: "Evaluator") -> None:
         self._evaluator = evaluator
-        self._to_tolerance: dict[float, Evaluator] = {}
 
     def errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None) -> dict[str, ErrorEstimate]:
         """Of an evaluation of alpha (N,), by objective; empty where it failed, or the finer one."""
@@ -64,25 +63,19 @@ class Estimator:
         return self._at(10.0 * tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
 
     def _at(self, tolerance: float) -> "Evaluator":
-        if tolerance not in self._to_tolerance:
-            self._to_tolerance[tolerance] = self._again(tolerance)
-        return self._to_tolerance[tolerance]
+        return self._evaluator.otherwise(integrator=self._evaluator.integrator, tolerance=tolerance)
 
     @cached_property
     def _halved(self) -> "Evaluator":
         """The same evaluator with half its fixed steps."""
-        halved = self._again(self._evaluator.case.solver.tolerance)
+        coarse, solver = self._evaluator, self._evaluator.case.solver
+        if solver.step is not None:
+            return coarse.otherwise(integrator=coarse.integrator, step=0.5 * solver.step)
+        # a step of its own that no one else asks for, so that none is chosen anew: half of each load case's goes in
+        halved = coarse.otherwise(integrator=coarse.integrator, step=np.inf)
         for load_case in halved.scenes:
-            step = self._evaluator.driver(load_case).settings[2]
-            halved.driver(load_case).settings[2] = 0.5 * step
+            halved.driver(load_case).settings[2] = 0.5 * coarse.driver(load_case).settings[2]
         return halved
-
-    def _again(self, tolerance: float) -> "Evaluator":
-        case = self._evaluator.case
-        # a fixed step, so that none is chosen anew: `_halved` puts in its own
-        step = case.solver.step or (1.0 if self._evaluator.integrator == "generalized_alpha" else None)
-        solver = replace(case.solver, integrator=self._evaluator.integrator, tolerance=tolerance, step=step)
-        return type(self._evaluator)(replace(case, solver=solver), beside=False)
 
 
 def _difference(found: Evaluation, finer: Evaluation, name: str, factor: float) -> ErrorEstimate:
