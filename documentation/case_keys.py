@@ -86,17 +86,17 @@ def _told(place: Place, anchors: dict[int, str]) -> str:
 
 def _rules(record: Record) -> list[str]:
     """Which keys go with which."""
-    sentences = [f"Exactly one of {_names(names, 'and')} is needed." for names in record.one_of]
+    sentences = [f"Exactly one of {_names(names)} is needed." for names in record.one_of]
     if record.any_of:
-        sentences.append(f"At least one of {_names(record.any_of, 'and')} is needed.")
+        sentences.append(f"At least one of {_names(record.any_of)} is needed.")
     sentences += [f"`{one}` and `{other}` exclude each other." for one, other in record.never_both]
     sentences += [f"`{name}` needs `{other}` beside it." for name, other in record.needs]
     return [" ".join(sentences), ""] if sentences else []
 
 
-def _names(names: tuple[str, ...], word: str) -> str:
+def _names(names: tuple[str, ...]) -> str:
     quoted = [f"`{name}`" for name in names]
-    return f"{', '.join(quoted[:-1])} {word} {quoted[-1]}"
+    return f"{', '.join(quoted[:-1])} and {quoted[-1]}"
 
 
 def _default(key: Key) -> str:

@@ -57,7 +57,7 @@ def _result(kind: Any) -> str | None:
 
     letters = {types.boolean: "b", types.int64: "i", types.float64: "f"}
     if kind is types.none:
-        return "none"
+        return "()"
     if isinstance(kind, types.BaseTuple):
         parts = [letters.get(part) for part in kind.types]  # type: ignore[attr-defined]
         return None if None in parts else f"({''.join(part for part in parts if part)})"
@@ -119,7 +119,7 @@ def _glue(module: Any, function: Any, kinds: list[str], result: str) -> None:
             passed += [cast(value) for value in unfolded]
         else:
             passed += [cast(given()) for _ in range(int(kind[1:]) if kind[0] == "t" else 1)]
-    letters = "" if result == "none" else result.strip("()")
+    letters = result.strip("()")
     excuse = build.bitcast(slot(at + len(letters)), wanted[1])
     status = build.call(function, [held, excuse, *passed])
     for k, letter in enumerate(letters):

@@ -3,6 +3,7 @@
 import contextlib
 import ctypes
 import functools
+import struct
 from collections.abc import Callable
 from typing import Any
 
@@ -48,8 +49,6 @@ class Native:
         self._kinds = types.split()
         self._result = code.result.strip("()")
         self._single = not code.result.startswith("(")
-        if code.result == "none":
-            self._result = ""
 
     def __call__(self, *arguments: Any) -> Any:
         return self.prepare(*arguments)()
@@ -65,20 +64,19 @@ class Native:
                 numbers.extend(argument.shape)
             elif kind[0] == "t":
                 numbers.extend(argument)
+            elif kind == "f":
+                numbers.append(*struct.unpack("q", struct.pack("d", argument)))
             else:
-                numbers.append(0 if kind == "f" else int(argument))
+                numbers.append(int(argument))
         first = len(numbers)
         block = np.zeros(first + len(self._result) + 1, dtype=np.int64)
         block[:first] = numbers
-        floats = block.view(np.float64)
-        views = {"f": floats, "i": block, "b": block}
-        for kind, place, argument in zip(self._kinds, places, arguments, strict=True):
-            if kind == "f":
-                floats[place] = argument
+        views = {"f": block.view(np.float64), "i": block, "b": block}
         address = ctypes.c_void_p(block.ctypes.data)
         slots = [(views[letter], first + k, letter) for k, letter in enumerate(self._result)]
         function, kinds, single = self._call, self._kinds, self._single
 
+        # `kept`: the block holds addresses only, and the arrays have to live as long as the call
         def call(*changes: tuple[int, Any], kept: Any = arguments) -> Any:
             for place, value in changes:
                 views[kinds[place]][places[place]] = value

@@ -3,7 +3,6 @@
 import contextlib
 import functools
 import hashlib
-import importlib.util
 import json
 import os
 import sys
@@ -11,6 +10,8 @@ import tempfile
 import zlib
 from pathlib import Path
 from typing import NamedTuple
+
+from mdstopo.installed import version_of
 
 _ROOMS = ("general", "mechanics", "integrators", "responses", "sensitivity", "optimizer", "scene", "native")
 _COMPILER = ("numba", "llvmlite", "numpy")
@@ -25,7 +26,7 @@ class Code(NamedTuple):
     """Machine code of an entry.
 
     body, glue: object files, of the entry and of the function that calls it. result: a letter for each number that it
-    returns (i integer, f float, b truth), "none", or in parentheses for a tuple.
+    returns (i integer, f float, b truth), in parentheses for a tuple, which is empty where it returns nothing.
     """
 
     body: bytes
@@ -51,8 +52,7 @@ def cache_folder() -> Path:
     """Folder of the machine code that belongs to exactly this source, these versions and this processor.
 
     The name is a hash over every source file that holds kernels: a changed line anywhere means a fresh folder, never
-    stale code. Versions are hashed by the files that state them, because importing Numba to ask would take longer than
-    everything else.
+    stale code.
     """
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
@@ -61,23 +61,12 @@ def cache_folder() -> Path:
     with contextlib.suppress(RuntimeError):  # a processor whose features LLVM cannot tell
         digest.update(get_host_cpu_features().flatten().encode())
     for name in _COMPILER:
-        digest.update(_stated_version(name))
+        digest.update(f"{name} {version_of(name)}".encode())
     for setting in _SETTINGS:
         digest.update(f"{setting}={os.environ.get(setting)}".encode())
     for source in [package / "jit.py", *(path for room in _ROOMS for path in sorted((package / room).glob("**/*.py")))]:
         digest.update(source.read_bytes())
     return cache_root() / f"kernels-{digest.hexdigest()[:16]}"
-
-
-def _stated_version(name: str) -> bytes:
-    """The file in which a package states its version."""
-    found = importlib.util.find_spec(name)
-    if found is None or found.origin is None:
-        return b""
-    for stated in ("_version.py", "version.py"):
-        with contextlib.suppress(OSError):
-            return (Path(found.origin).parent / stated).read_bytes()
-    return b""
 
 
 def path_of(module: str, name: str, types: str) -> Path:
