@@ -59,7 +59,7 @@ def scenes() -> list[Scene]:
                     swing(min(periods, PIECE), **solver),
                     partial(_drift, periods, solver),
                     bound=1e-8 if long else 1e-10,
-                    limit=900.0 if long else 60.0,
+                    limit=3600.0 if long else 120.0,
                     long=long,
                 )
             )

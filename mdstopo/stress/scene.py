@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from mdstopo.case.model import Case
 
 #: wall time in which a scene has to end, in s; machines that are busy with other things are slow
-LIMIT = 60.0
+LIMIT = 120.0
 
 
 class Refused(Exception):  # noqa: N818 - a refusal is an outcome, not an error
