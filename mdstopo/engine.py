@@ -107,6 +107,11 @@ class Evaluator:
         unused = [name for name, looked in self._by_load_case.items() if not looked and self.case.objectives]
         return notes + [f"load case {name}: nothing looks at it" for name in unused]
 
+    @property
+    def held(self) -> int:
+        """Bytes of the steps that are held between calls."""
+        return sum(driver.room.nbytes for driver in self._drivers.values())
+
     def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
         """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
 

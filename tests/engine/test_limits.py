@@ -95,3 +95,14 @@ def test_a_narrow_pulse_is_followed_by_fixed_steps():
     scene["members"]["spring"]["law"] = law
     found = evaluate(read(scene, integrator="generalized_alpha", step=0.01))
     assert found.objectives["G"] == pytest.approx(1e5 * np.sqrt(np.pi / 1e10) / 2.0, rel=1e-4)
+
+
+def test_compiled_cases_do_not_keep_gigabytes_of_steps(monkeypatch):
+    from mdstopo import api
+
+    monkeypatch.setattr(api, "_HELD", 1)
+    monkeypatch.setattr(api, "_compiled", type(api._compiled)())
+    cases = [read(spring_scene(end=end, **LOADED)) for end in (1.0, 2.0, 3.0)]
+    for case in cases:
+        assert evaluate(case).status.ok
+    assert list(api._compiled) == [id(cases[-1])]
