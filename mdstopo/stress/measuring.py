@@ -1,4 +1,7 @@
-"""What scenes measure with: the engine's calls, whose refusals are raised, and errors relative to what is expected."""
+"""What scenes measure with: the engine's calls, whose refusals are raised, and errors relative to what is expected.
+
+Every call compiles its case anew: `mdstopo.simulate` keeps the last cases with all their steps, which are many here.
+"""
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
@@ -21,22 +24,27 @@ INTEGRATORS = (*ADAPTIVE, "generalized_alpha")
 
 def moved(case: "Case", alpha: ArrayLike | None = None) -> "Trajectory":
     """The motion; raises Refused where it ends early."""
-    import mdstopo
+    from mdstopo.engine import Evaluator
 
-    motion = mdstopo.simulate(case, alpha)
+    (load_case,) = case.load_cases
+    motion = Evaluator(case).trajectory(_design(case, alpha), load_case.name)
     if not motion.status.ok:
         raise Refused(f"{motion.status.value}: {motion.message}")
     return motion
 
 
-def valued(case: "Case", alpha: ArrayLike | None = None, **how: Any) -> "Evaluation":
+def valued(case: "Case", alpha: ArrayLike | None = None, gradient: bool = True) -> "Evaluation":
     """Objectives and gradients; raises Refused where there are none."""
-    import mdstopo
+    from mdstopo.engine import Evaluator
 
-    found = mdstopo.evaluate(case, alpha, **how)
+    found = Evaluator(case).evaluate(_design(case, alpha), gradient)
     if not found.status.usable:
         raise Refused(f"{found.status.value}: {found.message}")
     return found
+
+
+def _design(case: "Case", alpha: ArrayLike | None) -> Floats:
+    return case.initial if alpha is None else np.asarray(alpha, dtype=np.float64)
 
 
 def error(found: ArrayLike, expected: ArrayLike, scale: float | None = None) -> float:

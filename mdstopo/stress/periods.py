@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 PERIOD = 2.0 * np.pi
 AMPLITUDE = 0.4
 #: periods of one simulation: a motion may have a million steps, and every step is kept
-PIECE = 20_000
+PIECE = 5_000
 
 
 def swing(periods: int, x: float = 1.0, v: float = AMPLITUDE, **solver: Any) -> dict[str, Any]:
