@@ -45,6 +45,8 @@ METHODS = ("auto", "adjoint", "direct", "iterative", "constant_load")
 
 #: compiled cases kept, the most recently used last; each evaluator holds its case, so an id is never taken twice
 _KEPT = 8
+#: bytes of steps that they may hold beside the case in use: long motions have gigabytes of them
+_HELD = 2**28
 _compiled: OrderedDict[int, Evaluator] = OrderedDict()
 
 
@@ -54,7 +56,7 @@ def _evaluator(case: Case) -> Evaluator:
     found = _compiled.get(key)
     if found is None:
         found = _compiled[key] = Evaluator(case)
-        if len(_compiled) > _KEPT:
+        while len(_compiled) > _KEPT or (len(_compiled) > 1 and sum(each.held for each in _compiled.values()) > _HELD):
             _compiled.popitem(last=False)
     else:
         _compiled.move_to_end(key)

@@ -67,6 +67,7 @@ class Evaluator:
         self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
         self._drivers: dict[str, AnyDriver] = {}
         self._culprits: dict[str, Culprits] = {}
+        self._coarse: dict[str, str] = {}
         self._n = case.n_design
         self._rows = np.zeros((len(case.constraints), self._n))
         for i, row in enumerate(case.constraints):
@@ -109,6 +110,11 @@ class Evaluator:
         unused = [name for name, looked in self._by_load_case.items() if not looked and self.case.objectives]
         return notes + [f"load case {name}: nothing looks at it" for name in unused]
 
+    @property
+    def held(self) -> int:
+        """Bytes of the steps that are held between calls."""
+        return sum(driver.room.nbytes for driver in self._drivers.values())
+
     def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
         """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
 
@@ -128,6 +134,10 @@ class Evaluator:
             if not objectives:
                 continue
             driver = self.driver(name)
+            too_coarse = self._coarse_step(name, design)
+            if too_coarse:
+                status, message = Status.STEP_TOO_LARGE, too_coarse
+                break
             result = driver.evaluate(design, exact)
             status, culprit = self._verdict(name, design, result)
             if not status.ok:
@@ -186,10 +196,17 @@ class Evaluator:
         """The motion of one load case with the design alpha (N,)."""
         design = self.design(alpha)
         driver = self.driver(load_case)
+        too_coarse = self._coarse_step(load_case, design)
         status, steps = driver.simulate(design)
         message = ""
         if not status.ok:
             status, message = self._explain(load_case, design, status, float(steps.t[-1]), steps.state[-1])
+        elif too_coarse:
+            status, message = Status.STEP_TOO_LARGE, too_coarse
+        else:
+            meeting = driver.met(steps.count)
+            if meeting >= 0:
+                status, message = Status.ZERO_LENGTH, self._member(load_case, meeting)
         work = dict(zip(WORK_NAMES, driver.work.tolist(), strict=True))
         return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
 
@@ -291,6 +308,16 @@ class Evaluator:
                 driver.settings[2] = default_step(driver, self.case.initial)
             self._drivers[name] = driver
         return self._drivers[name]
+
+    def _coarse_step(self, name: str, design: FloatArray) -> str:
+        """Why the fixed step of generalized_alpha is far too large for a load case, or nothing; asked once."""
+        if self.integrator != "generalized_alpha" or self.case.solver.step is None:
+            return ""
+        if name not in self._coarse:
+            from mdstopo.coarse import coarse
+
+            self._coarse[name] = coarse(self.driver(name), design)
+        return self._coarse[name]
 
     def _culprit(self, name: str) -> Culprits:
         if name not in self._culprits:

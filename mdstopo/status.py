@@ -18,6 +18,7 @@ class Status(enum.Enum):
     STEP_LIMIT = "the integrator needed more steps than it may take"
     STEP_TOO_SMALL = "the step became too small to move time on"
     NEWTON_FAILED = "Newton's iteration of the implicit integrator did not converge"
+    STEP_TOO_LARGE = "the fixed step is far too large for the motion"
     SINGULAR = "the joints have become singular: they contradict or repeat each other in this configuration"
     CHATTERING = "a member switches again and again within next to no time"
     NO_GRADIENT = "the objective has a value but no gradient here"

@@ -8,6 +8,8 @@ from pathlib import Path
 BYTES_PER_MEMBER = 200
 """What a member costs from reading to result: indices, length, cost, and the optimiser's vectors."""
 BYTES_PER_POINT = 100
+SHARE_OF_STEPS = 8
+"""The steps of one simulation, all of which are kept, may take one part in this many of the memory."""
 _UNKNOWN = 8 * 2**30
 _LIMITS = ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory/memory.limit_in_bytes")
 
@@ -24,3 +26,8 @@ def total_memory() -> int:
         except (OSError, ValueError):
             continue
     return total
+
+
+def holds_steps(floats: int) -> bool:
+    """Whether there is room for the steps of a simulation that are so many numbers."""
+    return 8 * floats <= total_memory() // SHARE_OF_STEPS

@@ -13,6 +13,7 @@ COMMANDS: dict[str, str] = {
     "export": "Write a result as CSV tables or JSON.",
     "new": "Write a starter case, with comments.",
     "schema": "Print the JSON Schema of the case format, for editors.",
+    "stress": "Compute extreme scenes and compare each with an independent value.",
     "completion": "Print what makes a shell complete commands, options and files.",
 }
 

@@ -12,6 +12,7 @@ from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.responses import KINDS, POINT
+from mdstopo.integrators.choice import choose
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
@@ -64,7 +65,8 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         q0[3 * i : 3 * i + 3] = *body.position, body.angle
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
-    more = [t for group in case.members for law in group.laws for t in laws.landings(law)]
+    fine = choose(case.solver, "laws")[0] == "generalized_alpha"
+    more = [t for group in case.members for law in group.laws for t in laws.landings(law, fine)]
     more += motion_times(load_case)
     times = breakpoints(load_case, more)
     driven, drive = drives(load_case, times, q0, v0)

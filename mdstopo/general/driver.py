@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.errors import CaseError
+from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
@@ -19,7 +20,7 @@ from mdstopo.general.responses import kinked
 from mdstopo.general.rivals import compete, members_peaks
 from mdstopo.general.track import GRAZES, track_room
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
-from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, WORK, status_of
+from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
@@ -239,7 +240,14 @@ class GeneralDriver:
             if code != NEEDS_ROOM:
                 self._message = self._explain(code, time)
                 return code, count, time
+            if not holds_steps(2 * len(self.room)):
+                self._message = self._explain(STEP_LIMIT, time)
+                return STEP_LIMIT, count, time
             self._make_room(*(2 * int(size) for size in self.limits[1:4]))
+
+    def met(self, count: int) -> int:
+        """A member (padded) whose ends meet under force within the steps of the last run, or -1."""
+        return int(self.where[1])
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the design of the last run."""
@@ -262,7 +270,8 @@ class GeneralDriver:
             return ""
         when = f"at t = {time:.6g} s"
         if code == SINGULAR:
-            return f"{self._singular(int(self.where[0]))}, {when}"
+            steps = f", in steps of {self.settings[2]:.3g} s" if self.settings[2] > 0.0 else ""
+            return f"{self._singular(int(self.where[0]))}, {when}{steps}"
         if code == CHATTERING:
             return f"{self.member(int(self.where[0]))}, {when}"
         n, count = len(self.scene.model.mass), self._steps_until(time)

@@ -29,8 +29,10 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
+    TURN,
     copy_rows,
     deflection,
+    largest_turn,
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
@@ -324,8 +326,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     work[REJECTED] += 1
                     continue
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
-                wanted = h * min(max(change, 0.1), 4.0)
-                if error > tolerance:
+                turned = largest_turn(pair, q0, ends[0])
+                wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
+                if error > tolerance or turned > 1.1 * TURN:
                     work[REJECTED] += 1
                     continue
             happens = False

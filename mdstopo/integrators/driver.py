@@ -11,7 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for, status_of
+from mdstopo.case.memory import holds_steps
+from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.packing import pack
@@ -127,10 +128,18 @@ class Driver:
         """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call."""
         code, count, time = self.run(alpha, gradient)
         if code == OK:
-            if self._look is None:
-                self._look = self.looking.look.prepare(*self._look_arguments(count, gradient))
-            self._look((_COUNT, count), (_GRADIENT, gradient))
+            self._look_at(count, gradient)
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.meeting[0]))
+
+    def met(self, count: int) -> int:
+        """A member (padded) whose ends meet under force within the steps of the last run, or -1."""
+        self._look_at(count, False)
+        return int(self.meeting[0])
+
+    def _look_at(self, count: int, gradient: bool) -> None:
+        if self._look is None:
+            self._look = self.looking.look.prepare(*self._look_arguments(count, gradient))
+        self._look((_COUNT, count), (_GRADIENT, gradient))
 
     def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
         """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
@@ -142,6 +151,8 @@ class Driver:
             code, count, time = self._simulate((_TANGENT, tangent))
             if code != NEEDS_ROOM:
                 return code, count, time
+            if not holds_steps(2 * len(self.room)):
+                return STEP_LIMIT, count if time > self.scene.model.times[0] else 0, time
             self._make_room(2 * int(self.limits[1]), 2 * int(self.limits[2]))
 
     def rate_at_start(self) -> float:

@@ -32,6 +32,7 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     SWEEPS,
     TANGENTS,
+    TURN,
     carve,
     copy_rows,
     copy_tangents,
@@ -39,6 +40,7 @@ from mdstopo.integrators.steps import (
     keep_stage,
     keep_state,
     largest_difference,
+    largest_turn,
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
@@ -373,6 +375,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                     return NEWTON_FAILED, count, t
                 wanted = 0.5 * h
                 continue
+            turned = largest_turn(pair, q0, q[s - 1])
+            if turned > 1.1 * TURN and fixed_step <= 0.0:
+                work[REJECTED] += 1
+                wanted = h * TURN / turned
+                continue
 
             if count + 2 > steps.t.shape[0] or stages + s > steps.scalar.shape[0]:
                 return NEEDS_ROOM, count, t
@@ -415,7 +422,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             work[ACCEPTED] += 1
             if fixed_step <= 0.0:
                 change = 0.9 * (tolerance / max(estimate, 1e-30)) ** (1.0 / (s + 1)) * 11.0 / s
-                wanted = h * min(max(change, 0.4), 2.0)
+                wanted = h * min(max(change, 0.4), 2.0, TURN / max(turned, 1e-300))
     return OK, count, t
 
 

@@ -22,10 +22,12 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
+    TURN,
     carve,
     deflection,
     keep_stage,
     keep_state,
+    largest_turn,
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
@@ -245,8 +247,9 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                     work[REJECTED] += 1
                     continue
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
-                wanted = h * min(max(change, 0.1), 4.0)
-                if error > tolerance:
+                turned = largest_turn(pair, q0, ends[0])
+                wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
+                if error > tolerance or turned > 1.1 * TURN:
                     work[REJECTED] += 1
                     continue
             for p in range(n_pair):

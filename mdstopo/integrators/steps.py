@@ -54,6 +54,10 @@ def status_of(code: int) -> Status:
 
 FIELDS = ("t", "state", "index", "scalar", "stage", "pull", "K", "C", "turn")
 
+#: rad that the bodies of a pair may turn against each other in an adaptive step. The error of the motion does not see
+#: members that hardly move their bodies (a flywheel, a driven rotor); what is looked at does, and turns with them.
+TURN = 1.0
+
 #: columns of `index`, `scalar`, `stage`
 FIRST, LEVEL, SEGMENT = range(3)
 TIME, ENERGY, ENERGY_RATE = range(3)
@@ -168,6 +172,17 @@ def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
     c = rel[p, 2] - rel0[p, 2]
     s = rel[p, 3] - rel0[p, 3]
     return np.sqrt(x * x + y * y) + reach[p] * np.sqrt(c * c + s * s)
+
+
+@kernel
+def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
+    """How far the bodies of a pair turn against each other between two states (n,), rad, at most."""
+    largest = 0.0
+    for p in range(pair.shape[0]):
+        a = 3 * pair[p, 0] + 2
+        b = 3 * pair[p, 1] + 2
+        largest = max(largest, abs(after[b] - before[b] - after[a] + before[a]))
+    return largest
 
 
 @kernel

@@ -31,9 +31,9 @@ class Trajectory:
 
     t (T,): times of the accepted steps, start and end included; q, v, a (T, n): x, y, psi of each body as declared and
     their derivatives, a by the equations of motion, right-continuous where a load jumps; lam (T, n_rows): Lagrange
-    multipliers (no rows without joints and motions). status: anything but OK means that it ends early, at t[-1];
-    message says why. work: counts by name. reactions: Fx, Fy, M (T, 3) of each joint on its first body, at the joint,
-    global axes.
+    multipliers (no rows without joints and motions). status: anything but OK means that it ends early, at t[-1], or
+    goes on without being right (ZERO_LENGTH, STEP_TOO_LARGE); message says why. work: counts by name. reactions: Fx,
+    Fy, M (T, 3) of each joint on its first body, at the joint, global axes.
     """
 
     load_case: str

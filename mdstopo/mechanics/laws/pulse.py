@@ -12,9 +12,18 @@ def pulse_force(p, t):  # type: ignore[no-untyped-def]
     return p[0] * math.exp(-min(p[1] * min(s * s, 1e300), 745.0)), 0.0, 0.0, 0.0, 0.0
 
 
-def pulse_landings(rate: float, time: float) -> list[float]:
-    """Times that integrators land on, so that no step passes over a narrow pulse."""
+#: steps in the width of a pulse where they are of second order
+FINE = 16
+
+
+def pulse_landings(rate: float, time: float, fine: bool = False) -> list[float]:
+    """Times that integrators land on, so that no step passes over a narrow pulse.
+
+    fine: for steps of low order and given length, which have to follow the pulse itself.
+    """
     if not rate > 0.0:
         return []
     width = 1.0 / math.sqrt(rate)
+    if fine:
+        return [time + i / FINE * width for i in range(-6 * FINE, 6 * FINE + 1)]
     return [time + side * part * width for part in (1.0, 2.5, 4.0, 6.0) for side in (-1.0, 1.0)] + [time]

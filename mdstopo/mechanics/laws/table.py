@@ -151,11 +151,11 @@ def depends_on_rate(record: Law) -> bool:
     return False
 
 
-def landings(record: Law) -> list[float]:
-    """Times at which a law's force has a kink, a jump or a narrow peak."""
+def landings(record: Law, fine: bool = False) -> list[float]:
+    """Times at which a law's force has a kink, a jump or a narrow peak; fine: see `pulse_landings`."""
     times = [t for t in (record.active_from, record.active_until) if t is not None]
     if isinstance(record, TableLaw):
         times += record.table.times.tolist()
     if isinstance(record, PulseLaw):
-        times += pulse_landings(record.rate, record.time)
+        times += pulse_landings(record.rate, record.time, fine)
     return times

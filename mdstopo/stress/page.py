@@ -1,0 +1,68 @@
+"""The outcomes as the documentation shows them."""
+
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+
+from mdstopo.stress.registry import FAMILIES, scenes_of
+from mdstopo.stress.scene import Outcome
+
+
+def markdown_of(outcomes: Sequence[Outcome]) -> str:
+    """A table a family, and the machine."""
+    parts = []
+    by_name = {each.scene.name: each for each in outcomes}
+    for family, words in FAMILIES.items():
+        found = [by_name[scene.name] for scene in scenes_of(family) if scene.name in by_name]
+        if found:
+            rows = [_row(each) for each in found]
+            head = ["| scene | integrator | what is compared | outcome | error | bound | s |", "|" + " --- |" * 7]
+            parts += [f"### {words[0].upper()}{words[1:]} {{ #stress-{family} }}", "", *head, *rows, ""]
+    right = sum(each.ok for each in outcomes)
+    parts += [f"{right} of {len(outcomes)} scenes end as they have to. Computed on: {_machine()}."]
+    return "\n".join(parts)
+
+
+def _row(each: Outcome) -> str:
+    scene = each.scene
+    ended = each.outcome if each.ok else f"**{each.outcome}**"
+    if each.message:
+        ended += f": {_short(each.message)}"
+    if not each.ok and scene.fault:
+        ended += f": {scene.fault}"
+    if each.note:
+        ended += f"; {each.note}"
+    error = "" if each.error is None else f"{each.error:.1e}"
+    bound = "" if scene.culprit else f"{scene.bound:.0e}"
+    cells = f"`{scene.name}`", scene.integrator, scene.checks, ended, error, bound, f"{each.seconds:.2g}"
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _short(message: str) -> str:
+    """A message in a cell: one line, without the place in a file that nobody has."""
+    line = " ".join(message.split())
+    return line.removeprefix("<text>:")
+
+
+def _machine() -> str:
+    import os
+
+    import numba
+    import numpy
+
+    from mdstopo import __version__
+
+    return (
+        f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; "
+        f"Python {platform.python_version()}, NumPy {numpy.__version__}, Numba {numba.__version__}, "
+        f"mdstopo {__version__}"
+    )
+
+
+def _processor() -> str:
+    information = Path("/proc/cpuinfo")
+    if information.exists():
+        for line in information.read_text().splitlines():
+            if line.startswith("model name"):
+                return " ".join(line.partition(":")[2].split())
+    return platform.processor() or "an unknown processor"

@@ -1,0 +1,71 @@
+"""What a scene of the stress test is: a case, what is compared with what, and how it has to end."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mdstopo.case.model import Case
+
+#: wall time in which a scene has to end, in s; machines that are busy with other things are slow
+LIMIT = 120.0
+
+
+class Refused(Exception):  # noqa: N818 - a refusal is an outcome, not an error
+    """The engine refused to compute a scene; the text is the status with its culprit."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One scene.
+
+    data: the case. measure: the error of what the engine computes of it, relative to the independent value, and what
+    else is to be reported; it raises Refused where there is a refusal. A scene has to be right within `bound`, or,
+    where `culprit` names words, to be refused in a message that has them all. fault: why it is known not to end as it
+    has to. limit: seconds until it counts as one that hangs. long: only on demand.
+    """
+
+    name: str
+    checks: str
+    data: dict[str, Any]
+    measure: "Callable[[Case], float | tuple[float, str]]"
+    bound: float = 0.0
+    culprit: tuple[str, ...] = ()
+    fault: str = ""
+    limit: float = LIMIT
+    long: bool = False
+
+    @property
+    def expected(self) -> str:
+        """How it has to end."""
+        return "refused" if self.culprit else "right"
+
+    @property
+    def integrator(self) -> str:
+        """The integrator that the case asks for."""
+        return str(self.data.get("solver", {}).get("integrator", "auto"))
+
+    @property
+    def text(self) -> str:
+        """The case as a file; JSON is YAML."""
+        import json
+
+        return json.dumps({"format": 1, "title": self.checks, **self.data}, indent=2) + "\n"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a scene ended. outcome: right, wrong, refused, not finite, hangs, crashes; error: None where it has none."""
+
+    scene: Scene
+    outcome: str
+    error: float | None
+    message: str
+    seconds: float
+    note: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether it ended as it had to."""
+        named = all(word in self.message for word in self.scene.culprit)
+        return self.outcome == self.scene.expected and named
