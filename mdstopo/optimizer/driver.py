@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.interior import Optimum
@@ -21,6 +22,7 @@ from mdstopo.optimizer.safeguards import (
     better,
     failure,
     first_price,
+    largest_change,
     merit,
     next_convex,
     next_shift,
@@ -30,7 +32,10 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
+from mdstopo.optimizer.wide import is_wide, propose
 from mdstopo.status import RunStatus
+
+Indices = NDArray[np.intp]
 
 # Convex terms tried in turn, in the largest gradient entry over the range, where a subproblem resists.
 RESCUE_WEIGHTS = (0.01, 1.0)
@@ -121,7 +126,7 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
-        change = float(np.abs(tried - origin).max(initial=0.0))
+        change = largest_change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
 
     def reopen(self, state: State) -> State:
@@ -155,7 +160,10 @@ class Gsao:
                 violation,
             )
         if accepted:
-            state.steps = np.stack([state.steps[1], state.trial - state.alpha])
+            steps = np.empty_like(state.steps)
+            steps[0] = state.steps[1]
+            np.subtract(state.trial, state.alpha, out=steps[1])
+            state.steps = steps
             state.shift = next_shift(state.shift, state.steps, settings)
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
@@ -179,7 +187,13 @@ class Gsao:
 
     def _propose(self, state: State) -> None:
         """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
-        model = self._approximate(state)
+        chosen = self._competing(state)
+        if is_wide(state, len(chosen), self.problem.linear, self.settings):
+            found = propose(state, int(chosen[0]), self.lower, self.upper, self.problem.linear, self.settings)
+            if found is not None:
+                state.trial, state.predicted, state.kkt = found
+                return
+        model = self._approximate(state, chosen)
         lower, upper = self._box(state, model)
         optimum = solve(model, lower, upper, self.problem.linear, state.price)
         for weight in RESCUE_WEIGHTS:
@@ -202,13 +216,17 @@ class Gsao:
             dearer = np.minimum(PRICE_GROWTH * state.price, np.maximum(dearest, state.price))
             state.price = np.where(bought, dearer, state.price)
 
-    def _approximate(self, state: State) -> Approximation:
+    def _competing(self, state: State) -> Indices:
+        """The rows that compete for the objective, by their places."""
         settings = self.settings
+        if self.competitors is not None and settings.number("peaks") > 1:
+            return np.arange(len(state.rows))[: self.competitors]
         highest = float(state.rows.max())
         near = state.rows >= highest - settings.number("peak_window") * abs(highest)
-        chosen = np.flatnonzero(near)[: int(settings.number("peaks"))]
-        if self.competitors is not None and settings.number("peaks") > 1:
-            chosen = np.arange(len(state.rows))[: self.competitors]
+        return np.flatnonzero(near)[: int(settings.number("peaks"))]
+
+    def _approximate(self, state: State, chosen: Indices) -> Approximation:
+        settings = self.settings
         slopes = np.concatenate([state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))])
         distance = state.shift * self.range
         below = distance
@@ -269,7 +287,7 @@ class Gsao:
         return max(float(moved), complementarity)
 
     def _move(self, state: State) -> float:
-        return float((np.abs(state.trial - state.alpha) / self.range).max(initial=0.0))
+        return largest_change(state.trial, state.alpha, self.range)
 
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
