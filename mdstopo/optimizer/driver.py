@@ -32,7 +32,7 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import is_wide, propose
+from mdstopo.optimizer.wide import WIDE, adapt, is_wide, propose
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -160,11 +160,11 @@ class Gsao:
                 violation,
             )
         if accepted:
-            steps = np.empty_like(state.steps)
-            steps[0] = state.steps[1]
-            np.subtract(state.trial, state.alpha, out=steps[1])
-            state.steps = steps
-            state.shift = next_shift(state.shift, state.steps, settings)
+            if len(state.alpha) >= WIDE:
+                state.steps, state.shift = adapt(state, settings)
+            else:
+                state.steps = np.stack([state.steps[1], state.trial - state.alpha])
+                state.shift = next_shift(state.shift, state.steps, settings)
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
             state.rows, state.gradients = sample.rows, sample.gradients

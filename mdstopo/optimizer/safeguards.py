@@ -6,8 +6,6 @@ ratio of actual to predicted decrease; the convex term grows when the model prov
 approximation (Svanberg 2002).
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from mdstopo.optimizer.presets import Settings
@@ -23,6 +21,7 @@ CONVEX_CEILING = 1e6
 TOO_CONVEX = 1.5
 PRICE_GROWTH = 10.0
 PRICE_CEILING = 1e4
+# Numbers in a pass whose temporary arrays stay in cache.
 PART = 1 << 14
 
 
@@ -99,31 +98,25 @@ def next_convex(convex: float, ratio: float, too_low: bool, settings: Settings) 
 def next_shift(shift: Floats, steps: Floats, settings: Settings) -> Floats:
     """Distances of the shifts in ranges, (N,): wider where the last two steps agree, narrower where they
     oppose."""
-    grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
-    least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
-    out = np.empty_like(shift)
-    for part in _parts(len(shift)):
-        agreement = steps[0, part] * steps[1, part]
-        factor = np.where(agreement > 0.0, grow, np.where(agreement < 0.0, shrink, 1.0))
-        np.clip(shift[part] * factor, least, most, out=out[part])
-    return out
+    agreement = steps[0] * steps[1]
+    factor = np.where(
+        agreement > 0.0,
+        settings.number("shift_grow"),
+        np.where(agreement < 0.0, settings.number("shift_shrink"), 1.0),
+    )
+    return np.clip(shift * factor, settings.number("shift_minimum"), settings.number("shift_maximum"))
 
 
 def largest_change(x: Floats, y: Floats, unit: Floats | None = None) -> float:
     """max |x - y|, each in its unit where there is one."""
     most = 0.0
-    for part in _parts(len(x)):
+    for start in range(0, len(x), PART):
+        part = slice(start, start + PART)
         change = np.abs(x[part] - y[part])
         if unit is not None:
             change /= unit[part]
         most = max(most, float(change.max(initial=0.0)))
     return most
-
-
-def _parts(n: int) -> Iterator[slice]:
-    """Pieces of N numbers whose temporary arrays stay in cache."""
-    for start in range(0, n, PART):
-        yield slice(start, start + PART)
 
 
 def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, str]:

@@ -16,7 +16,7 @@ from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.wide_kernels import COST, HIGH, LOW, SAMPLE, SLOTS, wide_minimum, wide_residual
+from mdstopo.optimizer.wide_kernels import COST, HIGH, LOW, SAMPLE, SLOTS, wide_adapt, wide_minimum, wide_residual
 
 #: variables from which on this way is taken
 WIDE = 10_000
@@ -72,6 +72,14 @@ def propose(
     residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own)
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
     return Proposal(trial, state.objective - promised, max(residual, slack))
+
+
+def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
+    """The last two steps (2, N) and the distances of the shifts (N,), after the trial was accepted."""
+    steps, shifts = np.empty_like(state.steps), np.empty_like(state.shift)
+    limits = [settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")]
+    wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, *limits, steps, shifts)
+    return steps, shifts
 
 
 def _touch_up(

@@ -305,9 +305,9 @@ def _sort_out(
             # s < 0: d (t f - 1)/xi; else that of the other side, with its sign
             term = (reach[i] if s[i] < 0.0 else -reach[i]) * (t[i] * first[i] - 1.0) / power
             part += s[i] * term + 0.5 * pull * step if known else 0.0
-            share = a[i] * y[i] if known else 0.0
-            held += share
-            weight += abs(share)
+            spent = a[i] * y[i] if known else 0.0
+            held += spent
+            weight += abs(spent)
         change += part
         total += held
         size += weight
@@ -381,3 +381,18 @@ def wide_residual(
         moved = alpha[i] - (slope[i] + multiplier * cost[i]) / steepest
         most = max(most, abs(alpha[i] - max(lower[i], min(upper[i], moved))))
     return most
+
+
+@vector_entry
+def wide_adapt(
+    shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float, most: float,
+    steps: Floats, shifts: Floats,
+) -> None:  # fmt: skip
+    """In one pass what follows an accepted step: `steps` (2, N), the last one and this one, and the new `shifts`."""
+    for i in range(len(shift)):
+        step = trial[i] - alpha[i]
+        agreement = last[i] * step
+        factor = grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
+        steps[0, i] = last[i]
+        steps[1, i] = step
+        shifts[i] = min(max(shift[i] * factor, least), most)
