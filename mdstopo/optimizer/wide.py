@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.optimizer.presets import Settings
-from mdstopo.optimizer.problem import Floats, LinearRows
+from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide_kernels import COST, HIGH, LOW, SAMPLE, SLOTS, wide_adapt, wide_minimum, wide_residual
@@ -64,7 +64,7 @@ def propose(
         1e-12 * (2.0 * abs(bound) + abs(left)), trial, slots, place, live, x,
     )  # fmt: skip
     size += abs(bound)
-    if not (np.isfinite(change) and np.isfinite(multiplier)) or abs(miss) > 1e-9 * size and multiplier != 0.0:
+    if not (np.isfinite(change) and np.isfinite(multiplier)) or (abs(miss) > 1e-9 * size and multiplier != 0.0):
         return None
     _touch_up(trial, slots[:, :count], place[:count], linear, lower, upper, ROUNDING * size)
     promised = float(state.rows[row]) + change
@@ -77,13 +77,14 @@ def propose(
 def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
     """The last two steps (2, N) and the distances of the shifts (N,), after the trial was accepted."""
     steps, shifts = np.empty_like(state.steps), np.empty_like(state.shift)
-    limits = [settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")]
-    wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, *limits, steps, shifts)
+    grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
+    least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
+    wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, steps, shifts)
     return steps, shifts
 
 
 def _touch_up(
-    trial: Floats, slots: Floats, place: "np.ndarray[tuple[int], np.dtype[np.int64]]", linear: LinearRows,
+    trial: Floats, slots: Floats, place: Ints, linear: LinearRows,
     lower: Floats, upper: Floats, rounding: float,
 ) -> None:  # fmt: skip
     """Remove the last rounding errors of the volume row from the variables inside their boxes."""

@@ -232,7 +232,10 @@ def _estimate(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     gap: float, least: float, stride: int, slots: Floats, place: Ints, live: Ints, x: Floats,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """A bracket that probably holds the multiplier, and the likeliest, from every stride-th variable. gap: b - a x at the iterate."""
+    """A bracket that probably holds the multiplier, the likeliest in its middle, from every stride-th variable.
+
+    gap: b - a x at the iterate.
+    """
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
     N = len(alpha)
     n = 0
