@@ -4,15 +4,27 @@ A named tuple of thirty arrays is two hundred arguments to the compiler, at ever
 one. Inside kernels a structure is made and read like a named tuple; Python never sees one.
 """
 
+import importlib
 from typing import Any
 
-from mdstopo.native.kernel import when_compiling
+from mdstopo.native.kernel import numba, when_compiling
 
 _KINDS: dict[str, type] = {}
 
 
+#: the modules that have structures
+_OWNERS = ("model", "track", "balance")
+
+
 def __getattr__(name: str) -> type:
-    """The types of structures, made when something is compiled: Numba's disk cache asks this module for them."""
+    """The types of structures, made when something is compiled: Numba's disk cache asks this module for them.
+
+    It asks in a process that computes nothing general, too: kernels that both families share are in one file of it.
+    """
+    if name.endswith("Structure") and name not in _KINDS:
+        for owner in _OWNERS:
+            importlib.import_module(f"{__package__}.{owner}")
+        numba()
     try:
         return _KINDS[name]
     except KeyError:
