@@ -22,7 +22,6 @@ from mdstopo.optimizer.safeguards import (
     better,
     failure,
     first_price,
-    largest_change,
     merit,
     next_convex,
     next_shift,
@@ -32,7 +31,7 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, adapt, is_wide, propose
+from mdstopo.optimizer.wide import WIDE, adapt, is_wide, largest_change, propose
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -126,7 +125,7 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
-        change = largest_change(tried, origin)
+        change, _ = largest_change(tried, origin, self.range)
         return self._finish(state, sample, tried, change, accepted, began)
 
     def reopen(self, state: State) -> State:
@@ -287,7 +286,7 @@ class Gsao:
         return max(float(moved), complementarity)
 
     def _move(self, state: State) -> float:
-        return largest_change(state.trial, state.alpha, self.range)
+        return largest_change(state.trial, state.alpha, self.range)[1]
 
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float

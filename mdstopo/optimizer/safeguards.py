@@ -21,8 +21,6 @@ CONVEX_CEILING = 1e6
 TOO_CONVEX = 1.5
 PRICE_GROWTH = 10.0
 PRICE_CEILING = 1e4
-# Numbers in a pass whose temporary arrays stay in cache.
-PART = 1 << 14
 
 
 def failure(sample: Sample) -> str:
@@ -105,18 +103,6 @@ def next_shift(shift: Floats, steps: Floats, settings: Settings) -> Floats:
         np.where(agreement < 0.0, settings.number("shift_shrink"), 1.0),
     )
     return np.clip(shift * factor, settings.number("shift_minimum"), settings.number("shift_maximum"))
-
-
-def largest_change(x: Floats, y: Floats, unit: Floats | None = None) -> float:
-    """max |x - y|, each in its unit where there is one."""
-    most = 0.0
-    for start in range(0, len(x), PART):
-        part = slice(start, start + PART)
-        change = np.abs(x[part] - y[part])
-        if unit is not None:
-            change /= unit[part]
-        most = max(most, float(change.max(initial=0.0)))
-    return most
 
 
 def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, str]:

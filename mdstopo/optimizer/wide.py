@@ -16,7 +16,17 @@ from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.wide_kernels import COST, HIGH, LOW, SAMPLE, SLOTS, wide_adapt, wide_minimum, wide_residual
+from mdstopo.optimizer.wide_kernels import (
+    COST,
+    HIGH,
+    LOW,
+    SAMPLE,
+    SLOTS,
+    wide_adapt,
+    wide_change,
+    wide_minimum,
+    wide_residual,
+)
 
 #: variables from which on this way is taken
 WIDE = 10_000
@@ -68,7 +78,7 @@ def propose(
         return None
     _touch_up(trial, slots[:, :count], place[:count], linear, lower, upper, ROUNDING * size)
     promised = float(state.rows[row]) + change
-    own = max(float(state.gradients[0].max()), -float(state.gradients[0].min()))
+    own = steepest if row == 0 else float(np.abs(state.gradients[0]).max())
     residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own)
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
     return Proposal(trial, state.objective - promised, max(residual, slack))
@@ -81,6 +91,15 @@ def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
     least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
     wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, steps, shifts)
     return steps, shifts
+
+
+def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
+    """max |x - y|, and the largest in its unit."""
+    if len(x) >= WIDE:
+        plain, scaled = wide_change(x, y, unit)
+        return plain, scaled
+    change = np.abs(x - y)
+    return float(change.max(initial=0.0)), float((change / unit).max(initial=0.0))
 
 
 def _touch_up(

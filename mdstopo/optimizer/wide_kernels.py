@@ -399,3 +399,14 @@ def wide_adapt(
         steps[0, i] = last[i]
         steps[1, i] = step
         shifts[i] = min(max(shift[i] * factor, least), most)
+
+
+@vector_entry
+def wide_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
+    """max |x - y|, and the largest in its unit."""
+    plain, scaled = 0.0, 0.0
+    for i in range(len(x)):
+        change = abs(x[i] - y[i])
+        plain = max(plain, change)
+        scaled = max(scaled, change / unit[i])
+    return plain, scaled
