@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.machine import description
 from benchmarks.readme import replace_block
-from benchmarks.tables import Table
+from mdstopo.bench.machine import description
+from mdstopo.bench.tables import Table
 
 #: each section is a module with a function of the same name that yields tables
 SECTIONS = {

@@ -10,8 +10,8 @@ from statistics import fmean
 import numpy as np
 
 from benchmarks.scenes import CASES
-from benchmarks.tables import Table, verdict
 from mdstopo import Result, load_case, optimize
+from mdstopo.bench.tables import Table, verdict
 
 
 @dataclass(frozen=True)

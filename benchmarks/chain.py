@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from benchmarks.tables import Table
 from mdstopo import Case, simulate
+from mdstopo.bench.tables import Table
 from mdstopo.case.reader import read_case
 
 BODIES = (10, 30, 100, 300, 1000)

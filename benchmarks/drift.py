@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.tables import Table, verdict
 from mdstopo import Case, simulate
+from mdstopo.bench.tables import Table, verdict
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from benchmarks.genetic import POPULATION, genetic
 from benchmarks.scenes import BEST_KNOWN, CASES, IDEAL, NADIR
-from benchmarks.tables import Table, significant, verdict
 from mdstopo import Case, load_case
+from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.front.directions import weights_of_first
 from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, scaled
 from mdstopo.front.session import Ask, FrontOutcome, run_front

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from benchmarks.drift import drift
 from benchmarks.reference import Reference, solution
 from benchmarks.scenes import design, scene
-from benchmarks.tables import Table, verdict
 from mdstopo import evaluate
+from mdstopo.bench.tables import Table, verdict
 
 #: errors outside of this are those of rounding, or not yet of the leading order
 WINDOW = (1e-11, 1e-4)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.speed import LEVELS
-from benchmarks.tables import Table, significant, verdict
+from mdstopo.bench.tables import Table, significant, verdict
 
 TABLES = ("fig6", "random", "interior", "interior_random")
 OURS = "benchmarks.join_peers"

@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 
 from benchmarks.scenes import CASES
-from benchmarks.tables import Table, spread, verdict
+from mdstopo.bench.tables import Table, spread, verdict
 
 ROUNDS = 7
 

@@ -6,11 +6,12 @@ from functools import partial
 from statistics import median
 
 from benchmarks.force_pass import force_pass
-from benchmarks.reference import ADAPTIVE, agreement, reference, solution
+from benchmarks.reference import ADAPTIVE, agreement, reference
 from benchmarks.scenes import DESIGNS, SCENES, design, scene
-from benchmarks.tables import Table, spread
-from benchmarks.timing import interleaved
 from mdstopo import evaluate
+from mdstopo.bench.reference import solution
+from mdstopo.bench.tables import Table, spread
+from mdstopo.bench.timing import interleaved
 
 LEVELS = (1e-6, 1e-8, 1e-10)
 TOLERANCES = (1e-3, 2e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)

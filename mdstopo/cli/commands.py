@@ -11,6 +11,7 @@ COMMANDS: dict[str, str] = {
     "plot": "Draw what a result file holds.",
     "report": "Write one HTML page that shows a result in motion.",
     "export": "Write a result as CSV tables or JSON.",
+    "bench": "Measure scaling, work against precision, and what is left out.",
     "new": "Write a starter case, with comments.",
     "schema": "Print the JSON Schema of the case format, for editors.",
     "stress": "Compute extreme scenes and compare each with an independent value.",

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.interior import Optimum
@@ -31,7 +32,10 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
+from mdstopo.optimizer.wide import WIDE, adapt, is_wide, largest_change, propose
 from mdstopo.status import RunStatus
+
+Indices = NDArray[np.intp]
 
 # Convex terms tried in turn, in the largest gradient entry over the range, where a subproblem resists.
 RESCUE_WEIGHTS = (0.01, 1.0)
@@ -123,7 +127,7 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
-        change = float(np.abs(tried - origin).max(initial=0.0))
+        change, _ = largest_change(tried, origin, self.range)
         return self._finish(state, sample, tried, change, accepted, began)
 
     def reopen(self, state: State) -> State:
@@ -157,8 +161,11 @@ class Gsao:
                 violation,
             )
         if accepted:
-            state.steps = np.stack([state.steps[1], state.trial - state.alpha])
-            state.shift = next_shift(state.shift, state.steps, settings)
+            if len(state.alpha) >= WIDE:
+                state.steps, state.shift = adapt(state, settings)
+            else:
+                state.steps = np.stack([state.steps[1], state.trial - state.alpha])
+                state.shift = next_shift(state.shift, state.steps, settings)
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
             state.rows, state.gradients = sample.rows, sample.gradients
@@ -181,7 +188,13 @@ class Gsao:
 
     def _propose(self, state: State) -> None:
         """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
-        model = self._approximate(state)
+        chosen = self._competing(state)
+        if is_wide(state, len(chosen), self.problem.linear, self.settings):
+            found = propose(state, int(chosen[0]), self.lower, self.upper, self.problem.linear, self.settings)
+            if found is not None:
+                state.trial, state.predicted, state.kkt = found
+                return
+        model = self._approximate(state, chosen)
         lower, upper = self._box(state, model)
         optimum = solve(model, lower, upper, self.problem.linear, state.price)
         for weight in RESCUE_WEIGHTS:
@@ -206,13 +219,17 @@ class Gsao:
             dearer = np.minimum(PRICE_GROWTH * state.price, np.maximum(dearest, state.price))
             state.price = np.where(bought, dearer, state.price)
 
-    def _approximate(self, state: State) -> Approximation:
+    def _competing(self, state: State) -> Indices:
+        """The rows that compete for the objective, by their places."""
         settings = self.settings
+        if self.competitors is not None and settings.number("peaks") > 1:
+            return np.arange(len(state.rows))[: self.competitors]
         highest = float(state.rows.max())
         near = state.rows >= highest - settings.number("peak_window") * abs(highest)
-        chosen = np.flatnonzero(near)[: int(settings.number("peaks"))]
-        if self.competitors is not None and settings.number("peaks") > 1:
-            chosen = np.arange(len(state.rows))[: self.competitors]
+        return np.flatnonzero(near)[: int(settings.number("peaks"))]
+
+    def _approximate(self, state: State, chosen: Indices) -> Approximation:
+        settings = self.settings
         slopes = np.concatenate([state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))])
         distance = state.shift * self.range
         below = distance
@@ -273,7 +290,7 @@ class Gsao:
         return max(float(moved), complementarity)
 
     def _move(self, state: State) -> float:
-        return float((np.abs(state.trial - state.alpha) / self.range).max(initial=0.0))
+        return largest_change(state.trial, state.alpha, self.range)[1]
 
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float

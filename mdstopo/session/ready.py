@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.optimizer.wide import WIDE
 from mdstopo.scene.family import beyond_springs
 from mdstopo.session.engine import Engine, compiling, make_engine
 from mdstopo.session.starts import first_design, make_optimizer
@@ -60,10 +61,11 @@ def get_ready(
     Returns the stated first design (N,), the nearest one that keeps bounds and volume rows, and that one's motion in
     each load case. Raises CaseError where no design keeps the rows.
     """
-    optimizer = make_optimizer(case, _Toy())
-    state = optimizer.start()
-    if state.running:
-        optimizer.step(state)
+    for size in [3, WIDE] if case.n_design >= WIDE else [3]:
+        optimizer = make_optimizer(case, _Toy(size))
+        state = optimizer.start()
+        if state.running:
+            optimizer.step(state)
     stated, begin = first_design(case, problem, initial)
     before = motions(case, engine, begin)
     if case.n_members <= _SMALL:
@@ -77,20 +79,22 @@ def motions(case: Case, engine: Engine, alpha: Floats) -> dict[str, Motion]:
 
 
 class _Toy:
-    """A problem of three variables: enough to meet every kernel."""
+    """A problem of a few variables, two rows competing, or of very many with one: enough to meet every kernel."""
 
-    def __init__(self) -> None:
-        self.initial = np.full(3, 0.5)
-        self.lower = np.full(3, 0.001)
-        self.upper = np.ones(3)
-        self.linear = LinearRows(np.ones((1, 3)), np.array([1.5]), np.array([True]))
+    def __init__(self, size: int) -> None:
+        self.initial = np.full(size, 0.5)
+        self.lower = np.full(size, 0.001)
+        self.upper = np.ones(size)
+        self.linear = LinearRows(np.ones((1, size)), np.array([0.5 * size]), np.array([True]))
+        rising = np.linspace(1.0, 3.0, size)
+        self._slopes = np.array([rising, rising[::-1]] if size < WIDE else [rising])
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
-        """Two competing rows."""
-        slopes = np.array([[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
-        values = np.sum(slopes / x, axis=1)
+        """The rows and their slopes."""
+        values = np.sum(self._slopes / x, axis=1)
         order = np.argsort(-values, kind="stable")
-        return Sample(float(values.max()), values[order], (-slopes / x**2)[order], np.zeros(0), np.zeros((0, 3)))
+        slopes = (-self._slopes / x**2)[order]
+        return Sample(float(values.max()), values[order], slopes, np.zeros(0), np.zeros((0, len(x))))
 
 
 def _marker(case: Case) -> Path:
@@ -98,6 +102,7 @@ def _marker(case: Case) -> Path:
     from mdstopo.native.store import cache_folder
 
     family = "general" if beyond_springs(case) else "springs"
+    family += "-wide" if case.n_design >= WIDE else ""
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"
 
 

@@ -22,7 +22,7 @@ from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
-from mdstopo.session.starts import replaced, run_start
+from mdstopo.session.starts import is_moved, replaced, run_start
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
@@ -231,7 +231,7 @@ class _Run:
 
     def compare(self, stated: Floats, nearest: Floats) -> None:
         """A notice where the first design is not the stated one."""
-        if self.states[0] is None and not np.array_equal(stated, nearest):
+        if self.states[0] is None and is_moved(stated, nearest):
             self.notify(replaced(stated, nearest))
 
     def iterate(

@@ -45,6 +45,11 @@ def first_design(case: Case, problem: Problem, initial: Floats | None) -> tuple[
         raise CaseError([case.marks.mistake("constraints", str(error))], str(case.path or case.name)) from error
 
 
+def is_moved(stated: Floats, nearest: Floats) -> bool:
+    """Whether the first design is another than the stated one by more than the rounding of the rows' sums."""
+    return float(np.abs(nearest - stated).max()) > 1e-12
+
+
 def replaced(stated: Floats, nearest: Floats) -> str:
     """The notice that the first design is not the stated one."""
     moved = float(np.abs(nearest - stated).max())

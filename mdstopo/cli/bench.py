@@ -1,0 +1,89 @@
+"""`mdstopo bench`: the program measured with itself."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.options import CASE_FILE, FILE, output_options, set_option
+from mdstopo.cli.output import Output
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from mdstopo.bench.tables import Table
+
+
+@click.command("bench")
+@click.argument("what", metavar="WHAT", type=click.Choice(["scaling", "work-precision", "skip"]))
+@click.argument("case_path", metavar="[CASE]", type=CASE_FILE, required=False)
+@set_option
+@click.option("--members", type=click.IntRange(0), metavar="N", help="scaling: at most so many members.")
+@click.option("--bodies", type=click.IntRange(0), metavar="N", help="scaling: at most so many bodies.")
+@click.option("--picture", type=FILE, metavar="FILE", help="work-precision: draw it, as PNG, SVG or PDF.")
+@output_options
+def command(
+    what: str,
+    case_path: Path | None,
+    overrides: dict[str, str],
+    members: int | None,
+    bodies: int | None,
+    picture: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Measure the program on this machine.
+
+    scaling: time and memory against the number of members, up to a million, and of bodies. work-precision: run time
+    against error, over integrators, tolerances and sensitivity methods, of CASE or the paper's scene. skip: what is
+    left out where nothing asks for it, and what that is worth.
+    """
+    if case_path is not None and what != "work-precision":
+        raise click.UsageError(f"bench {what} takes no case")
+    output = Output(json=as_json, quiet=quiet)
+    tables = []
+    for table in _tables(what, case_path, overrides, members, bodies, picture, output):
+        tables.append(table)
+        output.say(table.markdown())
+    from mdstopo.bench.machine import description
+
+    machine = description()
+    output.say(f"Measured on: {machine}.")
+    output.document({"command": "bench", "what": what, "machine": machine, "tables": [_plain(t) for t in tables]})
+    return 0
+
+
+def _tables(
+    what: str,
+    case_path: Path | None,
+    overrides: dict[str, str],
+    members: int | None,
+    bodies: int | None,
+    picture: Path | None,
+    output: Output,
+) -> "Iterator[Table]":
+    if what == "scaling":
+        from mdstopo.bench.scaling import BODIES, MEMBERS, scaling
+
+        most, chain = (MEMBERS[-1] if members is None else members), (BODIES[-1] if bodies is None else bodies)
+        yield from scaling(most, chain, output.notice)
+    elif what == "skip":
+        from mdstopo.bench.skip import skip
+
+        yield from skip()
+    else:
+        from mdstopo.bench.work_precision import draw, paper, table, work_precision
+        from mdstopo.cli.options import open_case
+
+        case = paper(overrides) if case_path is None else open_case(case_path, overrides)
+        points = list(work_precision(case, output.notice))
+        yield table(case, points)
+        if picture is not None:
+            draw(case, points, picture)
+            output.say(str(picture))
+
+
+def _plain(table: "Table") -> dict[str, Any]:
+    columns = list(table.columns)
+    rows = [dict(zip(columns, row, strict=True)) for row in table.rows]
+    return {"title": table.title, "rows": rows, "notes": list(table.notes)}

@@ -1,0 +1,81 @@
+"""The benchmarks measure what they say, and what is left out is left out."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from mdstopo.bench import skip, work_precision
+from mdstopo.bench.scaling import exponent, whole_run
+from mdstopo.bench.scenes import chain, plate
+from mdstopo.case.reader import read_case
+
+
+@pytest.mark.parametrize(
+    "omission",
+    [skip.fixed_members, skip.undamped, skip.zero_weight, skip.shared_load_case, skip.reverse_from_the_peak],
+)
+def test_less_work_is_done(omission):
+    found = omission()
+    assert 0 < found.left_out.work < found.full.work
+
+
+@pytest.mark.parametrize("omission", [skip.inactive_members, skip.prescribed_body, skip.no_joints])
+def test_less_work_is_done_in_general_scenes(omission):
+    found = omission()
+    assert 0 < found.left_out.work < found.full.work
+
+
+def test_a_weight_of_zero_halves_the_work_of_two_load_cases():
+    found = skip.zero_weight()
+    assert found.left_out.work <= 0.6 * found.full.work
+
+
+def test_sharing_a_load_case_is_worth_two_simulations_of_three():
+    found = skip.shared_load_case()
+    assert 3 * found.left_out.work == found.full.work
+
+
+def test_scenes_have_the_size_that_is_asked_for():
+    for members in (100, 1_020, 10_000):
+        assert read_case(plate(members)).n_members == pytest.approx(members, rel=0.05)
+    case = read_case(chain(7))
+    assert (len(case.bodies), len(case.joints), case.n_members) == (7, 7, 7)
+
+
+def test_an_exponent_is_the_slope_of_logarithms():
+    sizes = [10.0, 100.0, 1000.0]
+    assert exponent(sizes, [3.0 * size**1.5 for size in sizes]) == pytest.approx(1.5)
+
+
+def test_a_whole_run_is_measured():
+    seconds, peak, file = whole_run(plate(100), iterations=2)
+    assert seconds > 0.0
+    assert 1e7 < peak < 1e9
+    assert file > 1_000
+
+
+def test_work_and_precision(monkeypatch, tmp_path):
+    monkeypatch.setattr(work_precision, "TOLERANCES", (1e-4, 1e-8))
+    monkeypatch.setattr(work_precision, "TOLERANCES_FIXED", (1e-3,))
+    monkeypatch.setattr(work_precision, "_ROUNDS", 1)
+    case = read_case(plate(100))
+    points = list(work_precision.work_precision(case))
+    assert {point.integrator for point in points} == {"gauss", "runge_kutta", "generalized_alpha"}
+    for point in points:
+        assert point.seconds > 0.0
+        assert point.gradient_error < (100.0 if point.integrator == "generalized_alpha" else 1.0) * point.tolerance
+    shown = work_precision.table(case, points)
+    assert len(shown.rows) == len(points)
+    pytest.importorskip("matplotlib")
+    work_precision.draw(case, points, tmp_path / "picture.svg")
+    assert "<svg" in (tmp_path / "picture.svg").read_text()
+
+
+def test_the_command_gives_its_tables_as_json():
+    command = [sys.executable, "-m", "mdstopo", "bench", "scaling", "--members", "0", "--bodies", "0", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["tables"] == []
+    refused = subprocess.run([*command[:4], "skip", "case.yaml"], capture_output=True, text=True, check=False)
+    assert refused.returncode == 2
