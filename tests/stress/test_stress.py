@@ -28,7 +28,7 @@ def watch() -> Iterator[Watch]:
         yield found
 
 
-@pytest.mark.parametrize("scene", _parameters())
+@pytest.mark.parametrize("scene", list(_parameters()))
 def test_a_scene_ends_as_it_has_to(scene: Scene, watch: Watch) -> None:
     outcome = watch.outcome(scene)
     assert outcome.ok, f"{outcome.outcome}, error {outcome.error}, bound {scene.bound}: {outcome.message}"
