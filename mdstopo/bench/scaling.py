@@ -1,6 +1,5 @@
 """`mdstopo bench scaling`: time and memory against the number of members and of bodies."""
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -116,6 +115,17 @@ class _Timed:
         return sample
 
 
+#: Runs a command and prints its seconds and its peak memory. A process of its own, because a child begins with the peak
+#: of the one that starts it.
+_WATCH = """
+import resource, subprocess, sys, time
+began = time.perf_counter()
+status = subprocess.run(sys.argv[1:], stdout=subprocess.DEVNULL).returncode
+print(time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
+sys.exit(status)
+"""
+
+
 def whole_run(text: str, iterations: int = ITERATIONS) -> tuple[float, int, int]:
     """`mdstopo run` of a case in a process of its own: seconds, peak memory and size of the file, bytes."""
     with tempfile.TemporaryDirectory() as folder:
@@ -123,15 +133,12 @@ def whole_run(text: str, iterations: int = ITERATIONS) -> tuple[float, int, int]
         case.write_text(text, encoding="utf-8")
         command = [sys.executable, "-m", "mdstopo", "run", str(case), "--out", str(result), "--quiet"]
         command += ["--set", f"optimizer.max_iterations={iterations}"]
-        began = time.perf_counter()
-        process = subprocess.Popen(command)
-        _, status, usage = os.wait4(process.pid, 0)
-        seconds = time.perf_counter() - began
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise RuntimeError(f"{' '.join(command)} ended with status {process.returncode}")
+        done = subprocess.run([sys.executable, "-I", "-c", _WATCH, *command], stdout=subprocess.PIPE, text=True, check=False)
+        if done.returncode:
+            raise RuntimeError(f"{' '.join(command)} ended with status {done.returncode}")
+        seconds, peak = done.stdout.split()
         unit = 1 if sys.platform == "darwin" else 1024
-        return seconds, usage.ru_maxrss * unit, result.stat().st_size
+        return float(seconds), int(peak) * unit, result.stat().st_size
 
 
 def _member_table(found: Sequence[Size]) -> Table:
