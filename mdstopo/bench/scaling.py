@@ -133,7 +133,8 @@ def whole_run(text: str, iterations: int = ITERATIONS) -> tuple[float, int, int]
         case.write_text(text, encoding="utf-8")
         command = [sys.executable, "-m", "mdstopo", "run", str(case), "--out", str(result), "--quiet"]
         command += ["--set", f"optimizer.max_iterations={iterations}"]
-        done = subprocess.run([sys.executable, "-I", "-c", _WATCH, *command], stdout=subprocess.PIPE, text=True, check=False)
+        watched = [sys.executable, "-I", "-c", _WATCH, *command]
+        done = subprocess.run(watched, stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode:
             raise RuntimeError(f"{' '.join(command)} ended with status {done.returncode}")
         seconds, peak = done.stdout.split()
