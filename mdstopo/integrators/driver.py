@@ -15,7 +15,7 @@ from mdstopo.case.memory import holds_steps
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.packing import pack
+from mdstopo.scene.packing import aligned, pack
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
@@ -85,7 +85,7 @@ class Driver:
         padded = scene.model.member.shape[1]
         count = len(reductions)
         self._alpha = np.zeros(n_design)  # one array for all designs: a read-only one would be another type
-        self.strength = np.zeros((3, padded))
+        self.strength = aligned((3, padded))
         self.padded = np.zeros((ROWS, padded))
         self.rows = np.zeros((count, ROWS, 4))
         self.found = np.zeros(count, dtype=np.int64)

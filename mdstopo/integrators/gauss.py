@@ -18,6 +18,15 @@ from collections import namedtuple
 import numpy as np
 
 from mdstopo.integrators.gauss_tables import LEVELS
+from mdstopo.integrators.rows import (
+    copy_row,
+    integrate_to_nodes,
+    largest_difference,
+    row_width,
+    scale_rows,
+    subtract_rows,
+    take_rows,
+)
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,
@@ -39,7 +48,6 @@ from mdstopo.integrators.steps import (
     deflection,
     keep_stage,
     keep_state,
-    largest_difference,
     largest_turn,
     motion_weights,
 )
@@ -63,45 +71,29 @@ MOST_CAUTIOUS = 100.0
 
 
 @kernel
-def integrate_to_nodes(matrix, s, factor, start, slope, c, a, out):  # type: ignore[no-untyped-def]
-    """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s."""
-    n = start.shape[0]
-    for i in range(s):
-        for d in range(n):
-            out[i, d] = start[d] + c[i] * slope[d]
-        for j in range(s):
-            w = factor * matrix[i, j]
-            for d in range(n):
-                out[i, d] += w * a[j, d]
-
-
-@kernel
 def _balance(  # type: ignore[no-untyped-def]
-    pair, inv_mass, table, s, q0, v0, hv0, h, f, k, c, turn, damped, turning, weight, ref, a, q, v, room, work
+    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, k, c, turn, damped, turning, weight, ref, a, q, v, room, work
 ):
-    """Solve the linearised balance for a (s, n) by sweeps; q, v become the states that belong to it.
+    """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
 
-    In: forces f and tangents at ref (2, s, n); a as a first guess; weight (n,) of `motion_weights`; room (3, s, n).
-    Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    In: forces f and tangents at ref (2, s, W); a as a first guess; weight (W,) of `motion_weights`; none (W,) zeros;
+    room (3, s, W). Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
     """
-    n = q0.shape[0]
     before = room[0]
     dx = room[1]
     rhs = room[2]
     q_ref = ref[0]
     v_ref = ref[1]
-    nodes = table[0, 0]
-    first = table[1]
-    second = table[2]
-    none = room[3, 0]
-    none[:] = 0.0
+    nodes = planes[0, 0]
+    first = planes[1]
+    second = planes[2]
     correction = 0.0
     last = np.inf
     growing = 0
     for sweep in range(81):
-        integrate_to_nodes(second, s, h * h, q0, hv0, nodes, a, q)
+        integrate_to_nodes(second, s, s, h * h, q0, hv0, nodes, a, q)
         if damped:
-            integrate_to_nodes(first, s, h, v0, none, nodes, a, v)
+            integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
         if sweep > 0:
             work[SWEEPS] += 1
             change = largest_difference(q, before, weight, s)
@@ -117,24 +109,18 @@ def _balance(  # type: ignore[no-untyped-def]
                     break
                 return -1.0
             last = change
-        for i in range(s):
-            for d in range(n):
-                before[i, d] = q[i, d]
-                rhs[i, d] = f[i, d]
-                dx[i, d] = q[i, d] - q_ref[i, d]
+        take_rows(q, s, before)
+        take_rows(f, s, rhs)
+        subtract_rows(q, q_ref, s, dx)
         subtract_products(pair, k, dx, rhs, s)
         if turning:
             add_turning(turn, dx, rhs, s)
         if damped:
-            for i in range(s):
-                for d in range(n):
-                    dx[i, d] = v[i, d] - v_ref[i, d]
+            subtract_rows(v, v_ref, s, dx)
             subtract_products(pair, c, dx, rhs, s)
-        for i in range(s):
-            for d in range(n):
-                a[i, d] = inv_mass[d] * rhs[i, d]
+        scale_rows(inv_mass, rhs, s, a)
     if not damped:
-        integrate_to_nodes(first, s, h, v0, none, nodes, a, v)
+        integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
     return largest_difference(q, q_ref, weight, s)
 
 
@@ -198,15 +184,16 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     c = np.empty((MOST if damped else 1, n_pair, 6, 6))
     turn = np.zeros((MOST if turning else 1, n))
     t_node = np.empty(MOST)
-    ref = np.empty((2, MOST, n))
-    f = np.empty((MOST, n))
-    q = np.empty((MOST, n))
-    v = np.empty((MOST, n))
-    a = np.empty((MOST, n))
-    coef = np.empty((MOST, n))
-    room = np.empty((4, MOST, n))
-    table = np.empty((3, MOST, MOST))
-    vectors = np.empty((8, n))
+    width = row_width(n)
+    rows = np.zeros((10, MOST, width))
+    ref = rows[0:2]
+    room = rows[2:5]
+    f = rows[5]
+    q = rows[6]
+    v = rows[7]
+    a = rows[8]
+    coef = rows[9]
+    vectors = np.zeros((11, width))
     weight = vectors[0]
     load = vectors[1]
     load_base = vectors[2]
@@ -215,7 +202,10 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     f_base = vectors[5]
     q0 = vectors[6]
     v0 = vectors[7]
-    v_base = np.empty(n)
+    v_base = vectors[8]
+    none = vectors[9]
+    inverse = vectors[10]  # of the masses
+    copy_row(inv_mass, inverse)
 
     # the start: forces and tangents give the first prediction, the first window and the scale of what matters
     for d in range(n):
@@ -291,7 +281,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             for d in range(n):
                 hv0[d] = h * v0[d]
             # nothing has moved yet: what the start's forces alone would do is the scale of the prediction
-            integrate_to_nodes(planes[2], s, h * h, q0, hv0, planes[0, 0], a, q)
+            integrate_to_nodes(planes[2], s, s, h * h, q0, hv0, planes[0, 0], a, q)
             relative_pose(pair, q[s - 1], v0, rel[s - 1])
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
@@ -303,10 +293,8 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             for newton in range(13):
                 if newton > 0:
                     # one pass over the members at all nodes
-                    for i in range(s):
-                        for d in range(n):
-                            ref[0, i, d] = q[i, d]
-                            ref[1, i, d] = v[i, d]
+                    take_rows(q, s, ref[0])
+                    take_rows(v, s, ref[1])
                     forces(model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
                     work[FORCES] += s
                     work[TANGENTS] += s
@@ -321,26 +309,15 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                     for p in range(n_pair):
                         scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
                     motion_weights(pair, rel[0], reach, scale, weight)
-                for i in range(s):
-                    table[0, 0, i] = planes[0, 0, i]
-                    for j in range(s):
-                        table[1, i, j] = planes[1, i, j]
-                        table[2, i, j] = planes[2, i, j]
                 e = _balance(
-                    pair, inv_mass, table, s, q0, v0, hv0, h, f, k, c, turn, damped, turning, weight, ref, a, q, v,
-                    room, work,
+                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, k, c, turn, damped, turning, weight, ref, a, q,
+                    v, room, work,
                 )  # fmt: skip
                 if e < 0.0:
                     break
                 if newton == 0:
                     continue
-                for i in range(s):
-                    for d in range(n):
-                        coef[i, d] = 0.0
-                    for j in range(s):
-                        w = planes[3, i, j]
-                        for d in range(n):
-                            coef[i, d] += w * a[j, d]
+                integrate_to_nodes(planes[3], s, s, 1.0, none, none, planes[0, 0], a, coef)
                 # what the next coefficient would add to the motion, from the last ones, and half as much again: peaks
                 # amplify what is left (measured on 150 random scenes)
                 estimate = 0.0
@@ -364,11 +341,9 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                     previous = np.inf
                     for i in range(s):
                         t_node[i] = t + h * planes[0, 0, i]
-                    none = room[0, 0]
-                    none[:] = 0.0
-                    _from_coefficients(planes[5], s, old, h * h, q0, hv0, planes[0, 0], coef, q)
-                    _from_coefficients(planes[4], s, old, h, v0, none, planes[0, 0], coef, v)
-                    _from_coefficients(planes[6], s, old, 1.0, none, none, planes[0, 0], coef, a)
+                    integrate_to_nodes(planes[5], s, old, h * h, q0, hv0, planes[0, 0], coef, q)
+                    integrate_to_nodes(planes[4], s, old, h, v0, none, planes[0, 0], coef, v)
+                    integrate_to_nodes(planes[6], s, old, 1.0, none, none, planes[0, 0], coef, a)
             if not accepted:
                 work[REJECTED] += 1
                 if fixed_step > 0.0:
@@ -442,16 +417,3 @@ def caution(coef, weight, s):  # type: ignore[no-untyped-def]
         last = max(last, weight[d] * abs(coef[s - 1, d]))
     decay = max((last / first) ** (1.0 / (s - 1)), np.sqrt(last / earlier))
     return min(max(1.0, (decay / SLOW) ** 6), MOST_CAUTIOUS)
-
-
-@kernel
-def _from_coefficients(plane, s, old, factor, start, slope, c, coef, out):  # type: ignore[no-untyped-def]
-    """out[i] = start + c_i slope + factor sum_k plane_ik coef[k] for i < s, k < old."""
-    n = start.shape[0]
-    for i in range(s):
-        for d in range(n):
-            out[i, d] = start[d] + c[i] * slope[d]
-        for j in range(old):
-            w = factor * plane[i, j]
-            for d in range(n):
-                out[i, d] += w * coef[j, d]

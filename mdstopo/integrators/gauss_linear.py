@@ -7,7 +7,16 @@ window, transposed or not, by sweeps that contract as the forward ones did.
 import numpy as np
 
 from mdstopo.integrators.contract import implement
-from mdstopo.integrators.gauss import COUNTS, TAG, GaussSteps, integrate_to_nodes
+from mdstopo.integrators.gauss import COUNTS, TAG, GaussSteps
+from mdstopo.integrators.rows import (
+    combine_rows,
+    copy_row,
+    integrate_to_nodes,
+    largest_difference,
+    row_width,
+    scale_rows,
+    take_rows,
+)
 from mdstopo.integrators.steps import REVERSE, SWEEPS
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
@@ -114,11 +123,26 @@ def reverse_step(  # type: ignore[no-untyped-def]
     turn = steps.turn[o : o + s] if turning else steps.turn
     spread = stage_q_bar.shape[0] > 0
     work[REVERSE] += 1
-    rhs = np.zeros((s, n))
-    x = np.empty((s, n))
-    u = np.empty((s, n))
-    y = np.zeros((s, n))
-    value = np.empty(n)
+    width = row_width(n)
+    rows = np.zeros((7, s, width))
+    rhs = rows[0]
+    x = rows[1]
+    u = rows[2]
+    y = rows[3]
+    z_row = rows[4]
+    value = rows[5]
+    none = rows[6]
+    inverse = np.zeros(width)  # of the masses
+    root = np.zeros(width)
+    copy_row(inv_mass, inverse)
+    for d in range(n):
+        root[d] = np.sqrt(inv_mass[d])
+    back_q = np.empty((s, s))  # the integrations, transposed
+    back_v = np.empty((s, s))
+    for i in range(s):
+        for j in range(s):
+            back_q[j, i] = second[i, j]
+            back_v[j, i] = first[i, j]
     beta_q = np.zeros(s)
     beta_v = np.zeros(s)
     if c_point >= 0.0:
@@ -132,39 +156,23 @@ def reverse_step(  # type: ignore[no-untyped-def]
             if spread:
                 for i in range(s):
                     rhs[j, d] += h * h * second[i, j] * stage_q_bar[i, d]
-            x[j, d] = rhs[j, d]
+    take_rows(rhs, s, x)
     last = np.inf
     for _ in range(200):
         work[SWEEPS] += 1
-        for i in range(s):
-            for d in range(n):
-                z[i, d] = inv_mass[d] * x[i, d]
-                u[i, d] = 0.0
-                y[i, d] = 0.0
-        subtract_transposed(pair, k, z, u, s)
+        scale_rows(inverse, x, s, z_row)
+        u[:] = 0.0
+        subtract_transposed(pair, k, z_row, u, s)
         if turning:
-            add_turning_transposed(turn, z, u, s)
+            add_turning_transposed(turn, z_row, u, s)
+        combine_rows(back_q, s, s, h * h, rhs, u, value)
         if damped:
-            subtract_transposed(pair, c, z, y, s)
-        change = 0.0
-        size = 0.0
-        for j in range(s):
-            for d in range(n):
-                value[d] = rhs[j, d]
-            for i in range(s):
-                w_q = h * h * second[i, j]
-                for d in range(n):
-                    value[d] += w_q * u[i, d]
-            if damped:
-                for i in range(s):
-                    w_v = h * first[i, j]
-                    for d in range(n):
-                        value[d] += w_v * y[i, d]
-            for d in range(n):
-                root = np.sqrt(inv_mass[d])
-                change = max(change, root * abs(value[d] - x[j, d]))
-                size = max(size, root * abs(value[d]))
-                x[j, d] = value[d]
+            y[:] = 0.0
+            subtract_transposed(pair, c, z_row, y, s)
+            combine_rows(back_v, s, s, h, value, y, value)
+        change = largest_difference(value, x, root, s)
+        size = largest_difference(value, none, root, s)
+        take_rows(value, s, x)
         if change <= 4e-16 * size or (change >= last and change <= 1e-13 * size):
             break
         last = change
@@ -192,34 +200,49 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
     k = steps.K[o : o + s]
     c = steps.C[o : o + s] if damped else steps.C
     turn = steps.turn[o : o + s] if turning else steps.turn
-    da = np.zeros((s, n))
-    dv_stage = np.empty((s, n))
-    rhs = np.empty((s, n))
-    none = np.zeros(n)
-    hdv = h * dv
+    width = row_width(n)
+    rows = np.zeros((6, s, width))
+    da = rows[0]
+    dq_row = rows[1]
+    dv_row = rows[2]
+    rhs = rows[3]
+    value = rows[4]
+    none = rows[5]
+    vectors = np.zeros((5, width))
+    inverse = vectors[0]  # of the masses
+    root = vectors[1]
+    start_q = vectors[2]
+    start_v = vectors[3]
+    hdv = vectors[4]
+    copy_row(inv_mass, inverse)
+    for d in range(n):
+        root[d] = 1.0 / np.sqrt(inv_mass[d]) if inv_mass[d] > 0.0 else 0.0
+        start_q[d] = dq[d]
+        start_v[d] = dv[d]
+        hdv[d] = h * dv[d]
     last = np.inf
     for _ in range(200):
-        integrate_to_nodes(planes[2], s, h * h, dq, hdv, planes[0, 0], da, dq_stage)
-        rhs[:] = force
-        subtract_products(pair, k, dq_stage, rhs, s)
-        if turning:
-            add_turning(turn, dq_stage, rhs, s)
-        if damped:
-            integrate_to_nodes(planes[1], s, h, dv, none, planes[0, 0], da, dv_stage)
-            subtract_products(pair, c, dv_stage, rhs, s)
-        change = 0.0
-        size = 0.0
+        integrate_to_nodes(planes[2], s, s, h * h, start_q, hdv, planes[0, 0], da, dq_row)
         for i in range(s):
             for d in range(n):
-                value = inv_mass[d] * rhs[i, d]
-                weight = 1.0 / np.sqrt(inv_mass[d]) if inv_mass[d] > 0.0 else 0.0
-                change = max(change, weight * abs(value - da[i, d]))
-                size = max(size, weight * abs(value))
-                da[i, d] = value
+                rhs[i, d] = force[i, d]
+        subtract_products(pair, k, dq_row, rhs, s)
+        if turning:
+            add_turning(turn, dq_row, rhs, s)
+        if damped:
+            integrate_to_nodes(planes[1], s, s, h, start_v, none[0], planes[0, 0], da, dv_row)
+            subtract_products(pair, c, dv_row, rhs, s)
+        scale_rows(inverse, rhs, s, value)
+        change = largest_difference(value, da, root, s)
+        size = largest_difference(value, none, root, s)
+        take_rows(value, s, da)
         if change <= 4e-16 * size or (change >= last and change <= 1e-13 * size):
             break
         last = change
-    integrate_to_nodes(planes[2], s, h * h, dq, hdv, planes[0, 0], da, dq_stage)
+    integrate_to_nodes(planes[2], s, s, h * h, start_q, hdv, planes[0, 0], da, dq_row)
+    for i in range(s):
+        for d in range(n):
+            dq_stage[i, d] = dq_row[i, d]
     beta_q = np.empty(s)
     beta_v = np.empty(s)
     reached = 1.0

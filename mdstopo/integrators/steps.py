@@ -119,7 +119,7 @@ def copy_tangents(source, target):  # type: ignore[no-untyped-def]
 def keep_state(times, state, k, t, q, v):  # type: ignore[no-untyped-def]
     """State k: time, q, v."""
     times[k] = t
-    for d in range(q.shape[0]):
+    for d in range(state.shape[2]):
         state[k, 0, d] = q[d]
         state[k, 1, d] = v[d]
 
@@ -153,7 +153,7 @@ def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_ou
                 k_out[o, p, i, j] = k[p, i, j]
                 if c_out.shape[0] > 0:
                     c_out[o, p, i, j] = c[p, i, j]
-    for d in range(q.shape[0]):
+    for d in range(stage.shape[2]):
         stage[o, 0, d] = q[d]
         stage[o, 1, d] = v[d]
         stage[o, 2, d] = own[d]
@@ -200,16 +200,3 @@ def motion_weights(pair, rel, reach, scale, weight):  # type: ignore[no-untyped-
             weight[b] = max(weight[b], 1.0 / scale[p])
             weight[b + 1] = max(weight[b + 1], 1.0 / scale[p])
             weight[b + 2] = max(weight[b + 2], turn)
-
-
-@kernel
-def largest_difference(x, y, weight, count):  # type: ignore[no-untyped-def]
-    """max over i < count and coordinates of weight |x - y|; NaN where one appears. x, y: (count, n)."""
-    worst = 0.0
-    for i in range(count):
-        for d in range(weight.shape[0]):
-            e = weight[d] * abs(x[i, d] - y[i, d])
-            if not np.isfinite(e):
-                return np.nan
-            worst = max(worst, e)
-    return worst

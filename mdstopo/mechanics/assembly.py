@@ -143,10 +143,10 @@ def member_sums(block, member, strength, rel, m, tangent, sums):  # type: ignore
 
 @kernel
 def add_loads(model, segment, t, q, f):  # type: ignore[no-untyped-def]
-    """f (n,) += the applied loads of a segment at time t in state q."""
+    """f (n or more,) += the applied loads of a segment at time t in state q."""
     tau = t - model.times[segment]
     force = model.force
-    for i in range(f.shape[0]):
+    for i in range(force.shape[1]):
         f[i] += force[segment, i, 0] + tau * force[segment, i, 1]
     if model.load_body.shape[0] == 0:
         return
@@ -341,7 +341,7 @@ def subtract_transposed(pair, k, x, out, count):  # type: ignore[no-untyped-def]
 def add_turning(turn, x, out, count):  # type: ignore[no-untyped-def]
     """out[i] += (load tangent) x[i] for i < count: each body's load changes with its own angle; turn (count, n)."""
     for i in range(count):
-        for b in range(0, x.shape[1], 3):
+        for b in range(0, turn.shape[1], 3):
             for d in range(b, b + 3):
                 out[i, d] += turn[i, d] * x[i, b + 2]
 
@@ -350,7 +350,7 @@ def add_turning(turn, x, out, count):  # type: ignore[no-untyped-def]
 def add_turning_transposed(turn, x, out, count):  # type: ignore[no-untyped-def]
     """out[i] += (load tangent)^T x[i] for i < count."""
     for i in range(count):
-        for b in range(0, x.shape[1], 3):
+        for b in range(0, turn.shape[1], 3):
             for d in range(b, b + 3):
                 out[i, b + 2] += turn[i, d] * x[i, d]
 
@@ -400,6 +400,8 @@ def design_gradient(pair, block, member, stage, z, used, out, work):  # type: ig
             relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
             for p in range(n_pair):
                 pair_displacement(pair, rel[j], p, z[i], u[j, p])
+                for axis in range(3):
+                    u[j, p, axis] = -u[j, p, axis]
             j += 1
     for k in range(block.shape[0]):
         if block[k, 4] < 0:
@@ -414,16 +416,16 @@ def design_gradient(pair, block, member, stage, z, used, out, work):  # type: ig
             l0 = member[4, lo:hi]
             ks = member[5, lo:hi]
             o = out[lo:hi]
+            if block[k, 3] == 0:
+                elastic_design(px, py, qx, qy, l0, ks, rel[:, p], u[:, p], o)
+                continue
             for j in range(count):
                 r = rel[j, p]
                 w = u[j, p]
-                if block[k, 3] == 0:
-                    elastic_design(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], -w[0], -w[1], -w[2], o)
-                else:
-                    viscous_design(
-                        px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
-                        r[0], r[1], r[2], r[3], r[4], r[5], r[6], -w[0], -w[1], -w[2], o,
-                    )  # fmt: skip
+                viscous_design(
+                    px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
+                    r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
+                )  # fmt: skip
 
 
 @kernel

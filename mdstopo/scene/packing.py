@@ -4,12 +4,16 @@
 Python, gives the same `Model` back as views. The first integers are the sizes.
 """
 
-from typing import Any, NamedTuple
+import math
+from typing import NamedTuple
 
 import numpy as np
 
 from mdstopo.jit import kernel
 from mdstopo.scene.model import FloatArray, IndexArray, Model
+
+#: numbers in a line of the cache
+_LINE = 8
 
 
 class Packed(NamedTuple):
@@ -37,12 +41,21 @@ def pack(model: Model) -> Packed:
         [np.array(sizes, dtype=np.int64)]
         + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows)]
     ).astype(np.int64)
-    parts: list[Any] = [
-        model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power, model.member, model.times,
-        model.force, model.load_arm, model.load_force,
-    ]  # fmt: skip
-    floats = np.concatenate([np.asarray(a, dtype=np.float64).ravel() for a in parts])
+    before = [model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power]
+    gap = -sum(len(a) for a in before) % _LINE  # members begin on a line of the cache
+    after = [model.member, model.times, model.force, model.load_arm, model.load_force]
+    parts = [np.asarray(a, dtype=np.float64).ravel() for a in (*before, np.zeros(gap), *after)]
+    floats = aligned((sum(len(part) for part in parts),))
+    np.concatenate(parts, out=floats)
     return Packed(ints, floats)
+
+
+def aligned(shape: tuple[int, ...]) -> FloatArray:
+    """An array of zeros that begins on a line of the cache: a wide vector across two costs twice."""
+    count = math.prod(shape)
+    room = np.zeros(count + _LINE)
+    first = -room.ctypes.data // 8 % _LINE
+    return room[first : first + count].reshape(shape)
 
 
 @kernel
@@ -72,6 +85,7 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     f += n_pair
     power = floats[f : f + n_block]
     f += n_block
+    f += -f % _LINE
     member = floats[f : f + 8 * padded].reshape((8, padded))
     f += 8 * padded
     times = floats[f : f + n_seg + 1]

@@ -103,6 +103,7 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):  # type: ign
     wide = hi - lo
     p = block[k, 0]
     r = rel[p]
+    unit = np.eye(3)
     lever = np.zeros(out.shape[0])
     out[:] = 0.0
     for axis in range(3):
@@ -114,7 +115,7 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):  # type: ign
         if block[k, 3] == 0:
             elastic_design(
                 member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[5, lo:hi], r[0], r[1], r[2], r[3], ux, uy, ut, o,
+                member[5, lo:hi], rel[p : p + 1], unit[axis : axis + 1], o,
             )  # fmt: skip
         else:
             viscous_design(

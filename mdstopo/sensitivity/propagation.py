@@ -91,6 +91,7 @@ def apply_matrix(pair, block, member, stage, s, matrix, first, last, adding, S, 
     rel = np.empty((s, n_pair, POSE))
     for i in range(s):
         relative_pose(pair, stage[i, 0], stage[i, 1], rel[i])
+    unit = np.eye(3)
     push = np.empty((3 * s, STRIP))
     fresh = np.empty((last - first, STRIP))
     for k in range(block.shape[0]):
@@ -117,7 +118,7 @@ def apply_matrix(pair, block, member, stage, s, matrix, first, last, adding, S, 
                 o = push[i, :wide]
                 o[:] = 0.0
                 if block[k, 3] == 0:
-                    elastic_design(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], ux, uy, ut, o)
+                    elastic_design(px, py, qx, qy, l0, ks, rel[i // 3 : i // 3 + 1, p], unit[axis : axis + 1], o)
                 else:
                     viscous_design(
                         px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6], ux, uy, ut, o

@@ -22,6 +22,7 @@ import math
 import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel
+from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
 
 ELASTIC = 0
 VISCOUS = 1
@@ -35,62 +36,78 @@ def _inverse_length(r2):  # type: ignore[no-untyped-def]
     return 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
 
 
-@member_kernel
+@kernel
 def elastic_force(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyped-def]
     """Return Q (3 numbers) and E of a tile of undamped springs."""
-    sum_x = 0.0
-    sum_y = 0.0
-    sum_t = 0.0
-    energy = 0.0
-    for i in range(k.shape[0]):
-        ax = c * qx[i] - s * qy[i]
-        ay = s * qx[i] + c * qy[i]
-        rx = dx + ax - px[i]
-        ry = dy + ay - py[i]
+    sum_x = zero()
+    sum_y = zero()
+    sum_t = zero()
+    energy = zero()
+    for i in range(0, k.shape[0], lanes()):
+        u = load(qx, i)
+        v = load(qy, i)
+        ax = c * u - s * v
+        ay = s * u + c * v
+        rx = ax - (load(px, i) - dx)
+        ry = ay - (load(py, i) - dy)
         r2 = rx * rx + ry * ry
-        y = _inverse_length(r2)
-        stretch = r2 * y - l0[i]
-        w = k[i] * stretch
+        y = inverse_root(r2, ZERO_LENGTH_SQUARED)
+        stretch = r2 * y - load(l0, i)
+        w = load(k, i) * stretch
         energy += w * stretch
         w *= y
         sum_x += w * rx
         sum_y += w * ry
         sum_t += w * (ax * ry - ay * rx)
-    return -sum_x, -sum_y, -sum_t, 0.5 * energy
+    return -total(sum_x), -total(sum_y), -total(sum_t), 0.5 * total(energy)
 
 
-@member_kernel
+@kernel
+def _seen(px, py, qx, qy, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """R q, r and 1/L of the members from i on."""
+    u = load(qx, i)
+    v = load(qy, i)
+    ax = c * u - s * v
+    ay = s * u + c * v
+    rx = ax - (load(px, i) - dx)
+    ry = ay - (load(py, i) - dy)
+    return ax, ay, rx, ry, inverse_root(rx * rx + ry * ry, ZERO_LENGTH_SQUARED)
+
+
+@kernel
 def elastic_tangent(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyped-def]
-    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K of a tile of undamped springs."""
-    sum_x = 0.0
-    sum_y = 0.0
-    sum_t = 0.0
-    energy = 0.0
-    sum_w = 0.0
-    sum_wx = 0.0
-    sum_wy = 0.0
-    kxx = 0.0
-    kxy = 0.0
-    kyy = 0.0
-    kxt = 0.0
-    kyt = 0.0
-    ktt = 0.0
-    for i in range(k.shape[0]):
-        ax = c * qx[i] - s * qy[i]
-        ay = s * qx[i] + c * qy[i]
-        rx = dx + ax - px[i]
-        ry = dy + ay - py[i]
-        r2 = rx * rx + ry * ry
-        y = _inverse_length(r2)
-        stretch = r2 * y - l0[i]
-        w = k[i] * stretch
+    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K of a tile of undamped springs.
+
+    The lengths of the next members are found while these are summed: one chain of operations from coordinates to sums
+    would be longer than a processor looks ahead.
+    """
+    sum_x = zero()
+    sum_y = zero()
+    sum_t = zero()
+    energy = zero()
+    sum_w = zero()
+    sum_wx = zero()
+    sum_wy = zero()
+    kxx = zero()
+    kxy = zero()
+    kyy = zero()
+    kxt = zero()
+    kyt = zero()
+    ktt = zero()
+    last = k.shape[0] - lanes()
+    ax, ay, rx, ry, y = _seen(px, py, qx, qy, np.int64(0), dx, dy, c, s)
+    for i in range(0, k.shape[0], lanes()):
+        following = _seen(px, py, qx, qy, min(i + lanes(), last), dx, dy, c, s)
+        stiffness = load(k, i)
+        stretch = (rx * rx + ry * ry) * y - load(l0, i)
+        w = stiffness * stretch
         energy += w * stretch
         w *= y
         t = ax * ry - ay * rx
         sum_x += w * rx
         sum_y += w * ry
         sum_t += w * t
-        g = (k[i] - w) * y * y
+        g = (stiffness - w) * (y * y)
         gx = g * rx
         gy = g * ry
         kxx += gx * rx
@@ -101,18 +118,20 @@ def elastic_tangent(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-unt
         sum_w += w
         sum_wx += w * ax
         sum_wy += w * ay
-        ktt += g * t * t - w * (ax * (rx - ax) + ay * (ry - ay))
+        ktt += g * (t * t) - w * (ax * (rx - ax) + ay * (ry - ay))
+        ax, ay, rx, ry, y = following
+    w = total(sum_w)
     return (
-        -sum_x,
-        -sum_y,
-        -sum_t,
-        0.5 * energy,
-        kxx + sum_w,
-        kxy,
-        kyy + sum_w,
-        kxt - sum_wy,
-        kyt + sum_wx,
-        ktt,
+        -total(sum_x),
+        -total(sum_y),
+        -total(sum_t),
+        0.5 * total(energy),
+        total(kxx) + w,
+        total(kxy),
+        total(kyy) + w,
+        total(kxt) - total(sum_wy),
+        total(kyt) + total(sum_wx),
+        total(ktt),
     )
 
 
@@ -248,17 +267,31 @@ def viscous_tangent(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, v
     )
 
 
-@member_kernel
-def elastic_design(px, py, qx, qy, l0, k, dx, dy, c, s, ux, uy, ut, out):  # type: ignore[no-untyped-def]
-    """Add f_i (b_i . u) of each undamped spring to out; u is a virtual change of the relative pose."""
-    for i in range(k.shape[0]):
-        ax = c * qx[i] - s * qy[i]
-        ay = s * qx[i] + c * qy[i]
-        rx = dx + ax - px[i]
-        ry = dy + ay - py[i]
-        r2 = rx * rx + ry * ry
-        y = _inverse_length(r2)
-        out[i] += k[i] * (r2 * y - l0[i]) * y * (rx * ux + ry * uy + (ax * ry - ay * rx) * ut)
+@kernel
+def elastic_design(px, py, qx, qy, l0, k, pose, u, out):  # type: ignore[no-untyped-def]
+    """Add sum_j f_i (b_i . u_j) of each undamped spring at pose (m, >= 4) j to out.
+
+    u (m, 3): virtual changes of the relative pose.
+    """
+    for i in range(0, k.shape[0], lanes()):
+        x = load(px, i)
+        y = load(py, i)
+        v = load(qx, i)
+        w = load(qy, i)
+        free = load(l0, i)
+        work = zero()
+        for j in range(pose.shape[0]):
+            c = pose[j, 2]
+            s = pose[j, 3]
+            ax = c * v - s * w
+            ay = s * v + c * w
+            rx = ax - (x - pose[j, 0])
+            ry = ay - (y - pose[j, 1])
+            r2 = rx * rx + ry * ry
+            z = inverse_root(r2, ZERO_LENGTH_SQUARED)
+            along = rx * u[j, 0] + ry * u[j, 1] + (ax * ry - ay * rx) * u[j, 2]
+            work += (r2 * z - free) * z * along
+        store(out, i, load(out, i) + load(k, i) * work)
 
 
 @member_kernel

@@ -1,0 +1,87 @@
+"""States of several nodes as rows of whole vectors: what the sweeps of the Gauss method do over and over.
+
+A row has n coordinates and zeros after them up to `row_width(n)`, so that loops over coordinates are few instructions
+without remainders.
+"""
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.native.vector import WIDE, lanes, larger, largest, load, magnitude, store, total, zero
+
+
+@kernel
+def row_width(n):  # type: ignore[no-untyped-def]
+    """Length of a row of n coordinates."""
+    return (n + WIDE - 1) // WIDE * WIDE
+
+
+@kernel
+def copy_row(source, target):  # type: ignore[no-untyped-def]
+    """target (W,) = source (n,), zeros after it."""
+    target[:] = 0.0
+    for d in range(source.shape[0]):
+        target[d] = source[d]
+
+
+@kernel
+def combine_rows(matrix, s, columns, factor, base, a, out):  # type: ignore[no-untyped-def]
+    """out[i] = base[i] + factor sum_j matrix_ij a[j] for i < s, j < columns; base (s, W), a (columns, W)."""
+    for d in range(0, out.shape[1], lanes()):
+        for i in range(s):
+            x = load(base[i], d)
+            for j in range(columns):
+                x += (factor * matrix[i, j]) * load(a[j], d)
+            store(out[i], d, x)
+
+
+@kernel
+def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):  # type: ignore[no-untyped-def]
+    """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s, j < columns; all rows."""
+    for d in range(0, out.shape[1], lanes()):
+        x0 = load(start, d)
+        x1 = load(slope, d)
+        for i in range(s):
+            x = x0 + c[i] * x1
+            for j in range(columns):
+                x += (factor * matrix[i, j]) * load(a[j], d)
+            store(out[i], d, x)
+
+
+@kernel
+def scale_rows(factor, x, s, out):  # type: ignore[no-untyped-def]
+    """out[i] = factor x[i] for i < s; factor (W,)."""
+    for d in range(0, x.shape[1], lanes()):
+        f = load(factor, d)
+        for i in range(s):
+            store(out[i], d, f * load(x[i], d))
+
+
+@kernel
+def subtract_rows(x, y, s, out):  # type: ignore[no-untyped-def]
+    """out[i] = x[i] - y[i] for i < s."""
+    for d in range(0, x.shape[1], lanes()):
+        for i in range(s):
+            store(out[i], d, load(x[i], d) - load(y[i], d))
+
+
+@kernel
+def take_rows(x, s, out):  # type: ignore[no-untyped-def]
+    """out[i] = x[i] for i < s."""
+    for d in range(0, x.shape[1], lanes()):
+        for i in range(s):
+            store(out[i], d, load(x[i], d))
+
+
+@kernel
+def largest_difference(x, y, weight, s):  # type: ignore[no-untyped-def]
+    """max over i < s and coordinates of weight |x[i] - y[i]|; NaN where one is not finite."""
+    most = zero()
+    lost = zero()
+    for d in range(0, x.shape[1], lanes()):
+        w = load(weight, d)
+        for i in range(s):
+            e = w * magnitude(load(x[i], d) - load(y[i], d))
+            most = larger(e, most)
+            lost += e - e
+    return np.nan if total(lost) != 0.0 else largest(most)
