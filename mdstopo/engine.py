@@ -275,8 +275,8 @@ class Evaluator:
         if design.shape != (self._n,):
             raise ValueError(f"alpha must have shape ({self._n},), one value a design member, not {design.shape}")
         if self._n:
-            lowest = design.min()
-            if not (lowest >= 0.0 and design.max() < np.inf):
+            lowest = np.minimum.reduce(design)
+            if not (lowest >= 0.0 and np.maximum.reduce(design) < np.inf):
                 worst = int(np.flatnonzero(~((design >= 0.0) & (design < np.inf)))[0])
                 raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
         return design

@@ -1,4 +1,4 @@
-"""The step of a problem with very many variables, one row and one volume row.
+"""The step of a problem with many variables, one row and one volume row.
 
 The interior point goes through a score of arrays of N numbers some fifteen times; a million variables then cost six
 evaluations. Here the multiplier of the volume row is the only unknown: a sample of the variables gives a narrow bracket
@@ -29,6 +29,8 @@ from mdstopo.optimizer.wide_kernels import (
 )
 
 #: variables from which on this way is taken
+MANY = 256
+#: and from which on single passes over them are compiled too
 WIDE = 10_000
 _LEAST_SAMPLE = 1024
 
@@ -44,7 +46,7 @@ class Proposal(NamedTuple):
 def is_wide(state: State, chosen: int, linear: LinearRows, settings: Settings) -> bool:
     """Whether `propose` can make the next step of a state, of which `chosen` rows compete."""
     return (
-        len(state.alpha) >= WIDE
+        len(state.alpha) >= MANY
         and chosen == 1 == len(linear)
         and not len(state.constraint_rows)
         and state.convex > 0.0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
-from mdstopo.optimizer.wide import WIDE
+from mdstopo.optimizer.wide import MANY, WIDE
 from mdstopo.scene.family import beyond_springs
 from mdstopo.session.engine import Engine, compiling, make_engine
 from mdstopo.session.starts import first_design, make_optimizer
@@ -61,7 +61,7 @@ def get_ready(
     Returns the stated first design (N,), the nearest one that keeps bounds and volume rows, and that one's motion in
     each load case. Raises CaseError where no design keeps the rows.
     """
-    for size in [3, WIDE] if case.n_design >= WIDE else [3]:
+    for size in [3, *(many for many in (MANY, WIDE) if case.n_design >= many)]:
         optimizer = make_optimizer(case, _Toy(size))
         state = optimizer.start()
         if state.running:
@@ -79,7 +79,7 @@ def motions(case: Case, engine: Engine, alpha: Floats) -> dict[str, Motion]:
 
 
 class _Toy:
-    """A problem of a few variables, two rows competing, or of very many with one: enough to meet every kernel."""
+    """A problem of a few variables, two rows competing, or of many with one: enough to meet every kernel."""
 
     def __init__(self, size: int) -> None:
         self.initial = np.full(size, 0.5)
@@ -87,7 +87,7 @@ class _Toy:
         self.upper = np.ones(size)
         self.linear = LinearRows(np.ones((1, size)), np.array([0.5 * size]), np.array([True]))
         rising = np.linspace(1.0, 3.0, size)
-        self._slopes = np.array([rising, rising[::-1]] if size < WIDE else [rising])
+        self._slopes = np.array([rising, rising[::-1]] if size < MANY else [rising])
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows and their slopes."""
@@ -102,7 +102,7 @@ def _marker(case: Case) -> Path:
     from mdstopo.native.store import cache_folder
 
     family = "general" if beyond_springs(case) else "springs"
-    family += "-wide" if case.n_design >= WIDE else ""
+    family += "".join(f"-{many}" for many in (MANY, WIDE) if case.n_design >= many)
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"
 
 

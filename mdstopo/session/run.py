@@ -152,6 +152,7 @@ class _Run:
         compiled = time.perf_counter()
         if path is not None:
             self.open(path, engine)
+        opened = time.perf_counter()
         scalarisation = self.combine(engine, begin, path)
         if scalarisation is not None:
             problem = problem_of(engine, scalarisation)
@@ -171,7 +172,7 @@ class _Run:
             status, reason = self.judge(best, status, reason)
         if path is not None:
             self.save(path, status, reason)
-        return self.outcome(engine, path, best, status, reason, ended - compiled, compiled - began)
+        return self.outcome(engine, path, best, status, reason, ended - opened, compiled - began)
 
     def combine(self, engine: Engine, begin: Floats, path: Path | None) -> Scalarisation | None:
         """U of several objectives, its utopia found first; what is found is kept at once. None for one objective."""

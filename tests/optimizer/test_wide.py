@@ -1,4 +1,4 @@
-"""The step of very many variables against the interior point, and what it promises."""
+"""The step of many variables against the interior point, and what it promises."""
 
 import numpy as np
 import pytest
@@ -11,6 +11,7 @@ from mdstopo.optimizer.safeguards import next_shift
 from mdstopo.optimizer.wide_kernels import powers
 
 N = 12_000
+SIZES = [wide.MANY, 1_020, N]
 
 
 class Many:
@@ -35,6 +36,7 @@ class Many:
 
 def states(problem, steps, monkeypatch=None, **options):
     if monkeypatch is not None:
+        monkeypatch.setattr(wide, "MANY", 10**9)
         for module in (driver, wide):
             monkeypatch.setattr(module, "WIDE", 10**9)
     optimizer = Gsao(problem, settings("default", options, max_iterations=100))
@@ -46,8 +48,9 @@ def states(problem, steps, monkeypatch=None, **options):
 
 @pytest.mark.parametrize("equal", [False, True])
 @pytest.mark.parametrize("options", [{}, {"power": -1.0}, {"power": 1.0}, {"move_limit": 0.05}, {"convex_start": 1.0}])
-def test_a_step_is_that_of_the_interior_point(equal, options, monkeypatch):
-    problem = Many(1, equal)
+@pytest.mark.parametrize("n", SIZES)
+def test_a_step_is_that_of_the_interior_point(n, equal, options, monkeypatch):
+    problem = Many(1, equal, n)
     chosen = settings("default", options)
     for state in states(problem, 5, monkeypatch, **options):
         new = wide.propose(state, 0, problem.lower, problem.upper, problem.linear, chosen)
@@ -59,9 +62,10 @@ def test_a_step_is_that_of_the_interior_point(equal, options, monkeypatch):
         assert np.abs(new.trial - state.trial).mean() < 1e-6
 
 
+@pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("equal", [False, True])
-def test_the_row_holds_to_rounding_and_the_box_is_kept(equal):
-    problem = Many(2, equal)
+def test_the_row_holds_to_rounding_and_the_box_is_kept(n, equal):
+    problem = Many(2, equal, n)
     for state in states(problem, 12):
         excess = float(problem.linear.excess(state.trial)[0])
         scale = 2.0 * float(problem.linear.b[0])
