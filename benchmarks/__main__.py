@@ -37,7 +37,11 @@ def main() -> int:
     )
     parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but peers")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
-    parser.add_argument("--pages", action="store_true", help="write the applications' tables into docs/applications")
+    parser.add_argument(
+        "--pages",
+        action="store_true",
+        help="write the applications' tables into docs/applications, their designs into cases/designs",
+    )
     parser.add_argument("--peers", metavar="DIR", help="folder of the programs to compare with")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     chosen = parser.parse_args()
@@ -52,7 +56,7 @@ def main() -> int:
     for name in sections:
         began = time.perf_counter()
         printed = []
-        for table in _tables(name, chosen.peers, chosen.peers_python):
+        for table in _tables(name, chosen.peers, chosen.peers_python, chosen.pages):
             text = table.markdown()
             printed.append(text)
             print(text, flush=True)
@@ -64,9 +68,11 @@ def main() -> int:
     return 0
 
 
-def _tables(name: str, peers: str | None, python: str) -> Iterator[Table]:
+def _tables(name: str, peers: str | None, python: str, pages: bool) -> Iterator[Table]:
     section: Callable[..., Iterator[Table]] = getattr(import_module(f"benchmarks.{name}"), name)
-    return section(peers, python) if name == "peers" else section()
+    if name == "peers":
+        return section(peers, python)
+    return section(folder=Path("cases/designs")) if name == "applications" and pages else section()
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ def applications(names: tuple[str, ...] = APPLICATIONS, folder: Path | None = No
         fine = finer(case)
         found, first = evaluate(fine, result.alpha, gradient=False), evaluate(fine, gradient=False)
         score = scorer(case)
-        drawn = sized(case, HANDS[name], lambda alpha, c=case, s=score: judged(c, alpha, s))
+        drawn = sized(case, HANDS[name], combined(case))
         hand = evaluate(fine, drawn, gradient=False)
         yield values(case, {"start": first, "hand": hand, "found": found})
         yield members(case, {"hand": drawn, "found": result.alpha})
@@ -71,24 +71,21 @@ def finer(case: Case) -> Case:
     return replace(case, solver=replace(case.solver, tolerance=case.solver.tolerance / FINER))
 
 
-def scorer(case: Case) -> Callable[[Evaluation], float]:
-    """U of an evaluation, for a case that needs no utopia for it."""
+def combined(case: Case) -> Scalarisation:
+    """U of a case that needs no utopia for it."""
     assert case.combine is not None
     assert case.combine.method == "weighted_product"
-    u = Scalarisation(case.combine.method, np.array([case.combine.weights[each.name] for each in case.objectives]))
+    return Scalarisation(case.combine.method, np.array([case.combine.weights[each.name] for each in case.objectives]))
+
+
+def scorer(case: Case) -> Callable[[Evaluation], float]:
+    """U of an evaluation."""
+    u = combined(case)
 
     def score(found: Evaluation) -> float:
         return float(u.values(np.array([[found.objectives[each.name] for each in case.objectives]]))[0])
 
     return score
-
-
-def judged(case: Case, alpha: Floats, score: Callable[[Evaluation], float]) -> tuple[float, float]:
-    """The largest violation, relative to its bound, and U; infinite where the motion cannot be computed."""
-    found = evaluate(case, alpha, gradient=False)
-    if not found.status.usable:
-        return np.inf, np.inf
-    return excess(case, found), score(found)
 
 
 def excess(case: Case, found: Evaluation) -> float:

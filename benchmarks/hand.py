@@ -1,16 +1,22 @@
 """Designs that a careful person would draw, and how they are sized: what the found designs are compared with.
 
 A hand design is a choice of members. Their sizes are one number for each of its parts, which is then made as good as
-it can be: limits are kept if they can be, and U is the least that a pattern search finds.
+it can be, by the same optimiser under the same limits.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo import Case
-from mdstopo.case.model import VolumeRow
+from mdstopo.engine import Evaluator
+from mdstopo.optimizer.driver import Gsao, run
+from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.problem import LinearRows, Sample
+from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.optimizer.structure import StructureProblem
 
 Floats = NDArray[np.float64]
 #: ends P and Q of one member, in m, global axes, at the start
@@ -18,8 +24,8 @@ Ends = tuple[tuple[float, float], tuple[float, float]]
 #: by part, whose first word is a group: the members that share one size
 Hand = Mapping[str, Sequence[Ends]]
 
-#: factors by which sizes are changed in turn, and evaluations that may be spent
-FACTORS, EVALUATIONS = (4.0, 2.0, 1.4, 1.15, 1.05), 100
+#: iterations that its sizes are given, and shares of the upper bounds that they begin with
+ITERATIONS, STARTS = 40, (0.5, 1.0)
 
 HANDS: dict[str, Hand] = {
     "tiedown": {
@@ -80,40 +86,39 @@ def places(case: Case, hand: Hand) -> list[tuple[str, list[int]]]:
     return found
 
 
-def sized(case: Case, hand: Hand, judge: Callable[[Floats], tuple[float, float]]) -> Floats:
-    """The hand design (N,) with the best sizes. judge: a design's largest violation, relative to its bound, and U."""
-    parts = places(case, hand)
-    sizes = np.array([float(case.upper[members].min()) for _, members in parts])
+class Sizes:
+    """The problem of a case with one variable for each part of a hand design; all other members are at their bound."""
 
-    def design(sizes: Floats) -> Floats:
-        alpha = np.array(case.lower)
-        for (_, members), size in zip(parts, sizes, strict=True):
-            alpha[members] = np.clip(size, case.lower[members], case.upper[members])
-        return alpha
+    def __init__(self, problem: StructureProblem, parts: list[tuple[str, list[int]]]) -> None:
+        self.problem = problem
+        self.spread = np.zeros((len(problem.initial), len(parts)))
+        for k, (_, chosen) in enumerate(parts):
+            self.spread[chosen, k] = 1.0
+        rest = problem.lower * (1.0 - self.spread.sum(axis=1))
+        self.rest = rest
+        self.lower = np.array([problem.lower[chosen].max() for _, chosen in parts])
+        self.upper = np.array([problem.upper[chosen].min() for _, chosen in parts])
+        self.initial = 0.5 * self.upper
+        rows = problem.linear
+        self.linear = LinearRows(rows.A @ self.spread, rows.b - rows.A @ rest, rows.equal)
 
-    def rank(sizes: Floats) -> tuple[float, float]:
-        alpha = design(sizes)
-        rows = [row for row in case.constraints if isinstance(row, VolumeRow)]
-        over = max((float(row.coefficients @ alpha) / row.bound - 1.0 for row in rows), default=0.0)
-        if over > 1e-9:
-            return 1e3 + over, np.inf  # not worth a simulation
-        violation, combined = judge(alpha)
-        return max(violation, 1e-6), combined
+    def design(self, sizes: Floats) -> Floats:
+        """alpha (N,)."""
+        return np.asarray(self.rest + self.spread @ sizes)
 
-    best, spent = rank(sizes), 1
-    for factor in FACTORS:
-        moved = True
-        while moved and spent < EVALUATIONS:
-            moved = False
-            for i in range(len(sizes)):
-                for change in (1.0 / factor, factor):
-                    tried = sizes.copy()
-                    tried[i] *= change
-                    if np.array_equal(design(tried), design(sizes)):
-                        continue
-                    found = rank(tried)
-                    spent += found[0] < 1e3
-                    if found < best:
-                        best, sizes, moved = found, tried, True
-                        break
-    return design(sizes)
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        """A sample of the case, seen from the sizes."""
+        sample = self.problem.evaluate(self.design(x), gradient)
+        if not len(sample.gradients):
+            return sample
+        limits = sample.constraint_gradients.reshape(len(sample.constraint_rows), -1)
+        return replace(sample, gradients=sample.gradients @ self.spread, constraint_gradients=limits @ self.spread)
+
+
+def sized(case: Case, hand: Hand, score: Scalarisation) -> Floats:
+    """The hand design (N,) with the sizes that the optimiser finds best, from the best of several equal starts."""
+    problem = Sizes(StructureProblem(Evaluator(case), score), places(case, hand))
+    chosen = settings(max_iterations=ITERATIONS)
+    ends = [run(Gsao(problem, chosen), Gsao(problem, chosen).start(share * problem.upper)) for share in STARTS]
+    best = min(ends, key=lambda state: (max(state.best_violation, 1e-6), state.best_objective))
+    return problem.design(best.best_alpha)
