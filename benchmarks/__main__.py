@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.readme import replace_block
+from benchmarks.readme import replace_block, write_pages
 from mdstopo.bench.machine import description
 from mdstopo.bench.tables import Table
 
@@ -18,9 +18,13 @@ SECTIONS = {
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
+    "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "peers": "the same beside other programs (needs --peers)",
 }
+
+#: what has no place in the README
+ELSEWHERE = ("peers", "applications")
 
 
 def main() -> int:
@@ -29,10 +33,15 @@ def main() -> int:
         prog="python -m benchmarks",
         description="Measure what the README says about accuracy and speed.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="sections:\n" + "\n".join(f"  {name:8} {what}" for name, what in SECTIONS.items()),
+        epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
     parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but peers")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
+    parser.add_argument(
+        "--pages",
+        action="store_true",
+        help="write the applications' tables into docs/applications, their designs into cases/designs",
+    )
     parser.add_argument("--peers", metavar="DIR", help="folder of the programs to compare with")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     chosen = parser.parse_args()
@@ -47,19 +56,23 @@ def main() -> int:
     for name in sections:
         began = time.perf_counter()
         printed = []
-        for table in _tables(name, chosen.peers, chosen.peers_python):
+        for table in _tables(name, chosen.peers, chosen.peers_python, chosen.pages):
             text = table.markdown()
             printed.append(text)
             print(text, flush=True)
         print(f"({name}: {time.perf_counter() - began:.0f} s)\n", flush=True)
-        if chosen.readme and name != "peers":
+        if chosen.readme and name not in ELSEWHERE:
             replace_block(Path("README.md"), name, "\n".join([*printed, machine]))
+        if chosen.pages and name == "applications":
+            write_pages(printed, machine)
     return 0
 
 
-def _tables(name: str, peers: str | None, python: str) -> Iterator[Table]:
+def _tables(name: str, peers: str | None, python: str, pages: bool) -> Iterator[Table]:
     section: Callable[..., Iterator[Table]] = getattr(import_module(f"benchmarks.{name}"), name)
-    return section(peers, python) if name == "peers" else section()
+    if name == "peers":
+        return section(peers, python)
+    return section(folder=Path("cases/designs")) if name == "applications" and pages else section()
 
 
 if __name__ == "__main__":

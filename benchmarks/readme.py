@@ -1,4 +1,4 @@
-"""Numbers in the README stand between marks, and only this module writes there."""
+"""Numbers in the README and in the pages of the applications stand between marks, and only this module writes there."""
 
 import re
 from pathlib import Path
@@ -12,3 +12,12 @@ def replace_block(path: Path, name: str, text: str) -> None:
     if not pattern.search(whole):
         raise ValueError(f"{path} has no block {begin} ... {end}")
     path.write_text(pattern.sub(lambda _: f"{begin}\n\n{text.strip()}\n\n{end}", whole, count=1), encoding="utf-8")
+
+
+def write_pages(tables: list[str], machine: str) -> None:
+    """Put the tables of `applications` into the pages: a group that ends with the table of its summary for each."""
+    from benchmarks.applications import APPLICATIONS, TABLES
+
+    for i, name in enumerate(APPLICATIONS):
+        own = tables[i * TABLES : (i + 1) * TABLES]
+        replace_block(Path(f"docs/applications/{name}.md"), name, "\n".join([*own, machine]))

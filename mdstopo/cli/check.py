@@ -69,7 +69,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
             output.say(f"load case {name}: {freedom} degrees of freedom")
         document["degrees_of_freedom"] = max(freedoms.values())
         found = frequencies(case, engine)
-        _say_frequencies(output, found)
+        _say_frequencies(output, case, found)
         output.say("left out, because nothing asks for it")
         for sentence in engine.skipped or ("nothing",):
             output.say(f"  {sentence}")
@@ -123,7 +123,9 @@ def _say_members(output: Output, case: "Case") -> None:
     output.table(rows)
 
 
-def _say_frequencies(output: Output, found: list[dict[str, Any]]) -> None:
+def _say_frequencies(output: Output, case: "Case", found: list[dict[str, Any]]) -> None:
+    # on which side of the criterion a case stands is a question of stored energy alone
+    energetic = {objective.load_case for objective in case.objectives if objective.response.kind == "energy"}
     for entry in found:
         output.say(
             f"natural frequencies at the start, load case {entry['load_case']}, "
@@ -140,8 +142,8 @@ def _say_frequencies(output: Output, found: list[dict[str, Any]]) -> None:
                 ]
             )
         output.table(rows)
-        if entry["criterion"] is not None:
-            verdict = "> 4: stiffer is better" if entry["criterion"] > 4.0 else "<= 4"
+        if entry["criterion"] is not None and entry["load_case"] in energetic:
+            verdict = "> 4: more stiffness lowers the energy" if entry["criterion"] > 4.0 else "<= 4"
             output.say(f"  omega(initial) omega(lower bounds) t1^2 = {number(entry['criterion'], 4)} {verdict}")
             if entry["criterion"] <= 4.0:
                 for sentence in _SOFT_BRANCH:

@@ -155,8 +155,9 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
         if not isinstance(row, VolumeRow):
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             found = f"{number(excess + row.bound, 9)}, {word} {number(row.bound, 9)}"
-            lines.append((f"{row.over_time} {words(row.response)}", found))
-        if isinstance(row, VolumeRow):
+            where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
+            lines.append((f"{row.over_time} {words(row.response)}{where}", found))
+        else:
             used = float(row.coefficients @ outcome.alpha)
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))

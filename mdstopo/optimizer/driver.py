@@ -17,9 +17,12 @@ from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.optimizer.projection import project
 from mdstopo.optimizer.safeguards import (
+    CUT_SHRINK,
     PRICE_CEILING,
     PRICE_GROWTH,
     better,
+    cuts_from,
+    cuts_of,
     failure,
     first_price,
     merit,
@@ -27,6 +30,8 @@ from mdstopo.optimizer.safeguards import (
     next_convex,
     next_shift,
     next_trust,
+    no_cuts,
+    outdated,
     scaled_violation,
     verdict,
 )
@@ -80,6 +85,9 @@ class Gsao:
             constraint_rows=sample.constraint_rows,
             constraint_gradients=sample.constraint_gradients,
             violation=violation,
+            cuts=no_cuts(n)[0],
+            cut_gradients=no_cuts(n)[1],
+            forgotten=float("inf"),
             trial=alpha,
             predicted=0.0,
             kkt=float("nan"),
@@ -152,6 +160,7 @@ class Gsao:
         state.failed = 0
         violation = scaled_violation(sample)
         accepted = not self.trusted or ratio >= settings.number("accept_ratio")
+        trust, convex = state.trust, state.convex
         state.convex = next_convex(state.convex, ratio, actual < state.predicted, settings)
         state.trust = next_trust(state.trust, ratio, settings) if self.trusted else 1.0
         if better(sample.objective, violation, state, settings.tolerance):
@@ -161,6 +170,7 @@ class Gsao:
                 violation,
             )
         if accepted:
+            state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
             if len(state.alpha) >= WIDE:
                 state.steps, state.shift = adapt(state, settings)
             else:
@@ -171,6 +181,13 @@ class Gsao:
             state.rows, state.gradients = sample.rows, sample.gradients
             state.constraint_rows = sample.constraint_rows
             state.constraint_gradients = sample.constraint_gradients
+        elif len(state.alpha) < WIDE and settings.number("peaks") > 1:
+            state.cuts, state.cut_gradients, told = cuts_of(state, sample)
+            if told:
+                state.trust, state.convex = CUT_SHRINK * trust, convex
+        if small and outdated(state):
+            state.cuts, state.cut_gradients = no_cuts(len(state.alpha))
+            state.forgotten, state.small = state.objective, 0
         return accepted
 
     def _retreat(self, state: State, wrong: str) -> None:
@@ -230,7 +247,10 @@ class Gsao:
 
     def _approximate(self, state: State, chosen: Indices) -> Approximation:
         settings = self.settings
-        slopes = np.concatenate([state.gradients[chosen], state.constraint_gradients.reshape(-1, len(state.alpha))])
+        n = len(state.alpha)
+        slopes = np.concatenate(
+            [state.gradients[chosen], state.cut_gradients.reshape(-1, n), state.constraint_gradients.reshape(-1, n)]
+        )
         distance = state.shift * self.range
         below = distance
         if settings.flag("zero_shift"):
@@ -241,9 +261,9 @@ class Gsao:
             state.alpha,
             below,
             distance,
-            np.concatenate([state.rows[chosen], state.constraint_rows]),
+            np.concatenate([state.rows[chosen], state.cuts, state.constraint_rows]),
             slopes,
-            len(chosen),
+            len(chosen) + len(state.cuts),
             settings.number("power"),
             settings.flag("sign_rule"),
             state.convex * steepest / self.range,

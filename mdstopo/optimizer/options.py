@@ -62,7 +62,7 @@ OPTIONS: dict[str, Option] = {
         "factor on that weight when it alone held a step back (decrease 1.5 times the predicted)",
     ),
     # The rows.
-    "peaks": Option(int, 1, 4, 4, "how many competing peaks may become rows of the bound formulation"),
+    "peaks": Option(int, 1, 6, 6, "how many competing peaks may become rows of the bound formulation"),
     "peak_window": Option(
         float,
         0.0,

@@ -25,6 +25,12 @@ PRICE_GROWTH = 10.0
 CHARGE = 2.0
 CHARGE_FALL = 0.5
 PRICE_CEILING = 1e4
+# Rows of a rejected trial so near to its highest become cuts where the trust box is at most so wide, in ranges; further
+# off a line says little of a function that is curved. They are kept while they are so near to the highest row of the
+# iterate and the box is at most so wide; so many in all. Where one tells what stood in the way, the box shrinks less.
+CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.1, 0.15, 0.4, 24, 0.8
+# Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
+FRESH = 1e-5
 
 
 def failure(sample: Sample) -> str:
@@ -44,11 +50,54 @@ def failure(sample: Sample) -> str:
 
 
 def scaled_violation(sample: Sample) -> float:
-    """The largest constraint violation, in the unit of alpha: c over the largest entry of its gradient."""
+    """The largest constraint violation: c itself, or in the unit of alpha, c over the largest entry of its gradient,
+    whichever is larger."""
     if not len(sample.constraint_rows):
         return 0.0
     steepest = np.abs(sample.constraint_gradients).max(axis=1)
-    return float(np.max(np.maximum(sample.constraint_rows, 0.0) / np.where(steepest > 0.0, steepest, 1.0)))
+    unit = np.where(steepest > 0.0, np.minimum(steepest, 1.0), 1.0)
+    return float(np.max(np.maximum(sample.constraint_rows, 0.0) / unit))
+
+
+def cuts_of(state: State, sample: Sample) -> tuple[Floats, Floats, bool]:
+    """The cuts (K,) and their gradients (K, N) after `sample`, that of the state's trial, was rejected; and whether the
+    newest tell what stood in the way.
+
+    That were the highest rows there. Often they are none of the rows at the iterate: a peak that only rises on the way,
+    or one of more than are looked at. Linearised they tell the next subproblem, as the null steps of bundle methods do
+    (C. Lemarechal, 1975). No cut may say more of the iterate than its own value; of a function that is not convex it
+    would, and then the box has to shrink.
+    """
+    if state.trust > CUT_TRUST:
+        return *no_cuts(len(state.alpha)), False
+    highest = float(sample.rows.max())
+    near = np.flatnonzero(sample.rows >= highest - CUT_WINDOW * abs(highest))
+    slopes = sample.gradients[near]
+    seen = sample.rows[near] + np.einsum("ri,i->r", slopes, state.alpha - state.trial)
+    told = highest > state.objective and bool(seen[int(np.argmax(sample.rows[near]))] <= state.objective)
+    values = np.concatenate([state.cuts, np.minimum(seen, state.objective)])
+    gradients = np.concatenate([state.cut_gradients.reshape(-1, len(state.alpha)), slopes])
+    return values[-MOST_CUTS:], gradients[-MOST_CUTS:], told
+
+
+def cuts_from(state: State, trial: Floats, objective: float) -> tuple[Floats, Floats]:
+    """The cuts (K,) that are near enough to matter, and their gradients (K, N), seen from an accepted trial."""
+    if not len(state.cuts) or state.trust > KEPT_TRUST:
+        return no_cuts(len(trial))
+    seen = state.cuts + np.einsum("ri,i->r", state.cut_gradients, trial - state.alpha)
+    near = seen >= objective - KEPT_WINDOW * abs(objective)
+    return np.minimum(seen[near], objective), state.cut_gradients[near]
+
+
+def no_cuts(n: int) -> tuple[Floats, Floats]:
+    """None, of n variables."""
+    return np.zeros(0), np.zeros((0, n))
+
+
+def outdated(state: State) -> bool:
+    """Whether cuts should be dropped before a run ends for want of decrease: seen from far off they may forbid what is
+    possible. Not twice at the same place: there they are needed."""
+    return len(state.cuts) > 0 and state.objective < state.forgotten - FRESH * abs(state.objective)
 
 
 def merit(objective: float, constraint_rows: Floats, price: Floats) -> float:
@@ -129,7 +178,8 @@ def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, s
     if state.small >= 2 and state.violation <= settings.tolerance:
         share = settings.number("decrease_tolerance")
         return RunStatus.CONVERGED, (
-            f"actual and predicted decrease were both below {share:.2g} of the objective twice running"
+            f"actual and predicted decrease were both below {share:.2g} of the objective twice running, "
+            f"at a projected KKT residual of {state.kkt:.2g}"
         )
     if move <= settings.number("change_tolerance"):
         if move == 0.0:

@@ -23,7 +23,7 @@ import numpy as np
 from mdstopo.optimizer.problem import Floats
 
 #: rows that one U has at most, and peaks of one objective that are combined
-ROWS, PEAKS = 16, 4
+ROWS, PEAKS = 36, 6
 
 #: values (P,) of an objective's peaks, highest first, and their gradients (P, N); no rows where none were asked for
 Part = tuple[Floats, Floats]

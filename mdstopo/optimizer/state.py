@@ -110,7 +110,9 @@ class State:
     """What the optimiser knows after an iteration.
 
     The iterate and what was found there: `alpha` (N,), `objective`, `rows` (R,), `gradients` (R, N),
-    `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (largest c, or 0).
+    `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (largest c, or 0). What rejected trials have
+    shown: `cuts` (K,), rows that were the highest there, linearised and seen from the iterate, and `cut_gradients`
+    (K, N); `forgotten`, the objective at which they were last dropped.
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
     the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
     shifts, `steps` (2, N) the last two accepted steps, `trust` the half width of the trust box in ranges,
@@ -126,6 +128,9 @@ class State:
     constraint_rows: Floats
     constraint_gradients: Floats
     violation: float
+    cuts: Floats
+    cut_gradients: Floats
+    forgotten: float
     trial: Floats
     predicted: float
     kkt: float

@@ -19,7 +19,7 @@ from mdstopo.status import Status
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
 #: peaks of one constraint that are rows of their own
-COMPETITORS = 4
+COMPETITORS = 6
 
 
 class StructureProblem:

@@ -16,6 +16,8 @@ FAINT = 0.02
 WIDEST, NARROWEST = 1.6, 0.15
 #: members of one group that are drawn, the strongest first
 MOST = 20_000
+#: how many times larger than the design a scene may be before its far ends (of contacts, say) are left out of the view
+FAR, MARGIN = 2.0, 0.12
 
 
 def draw(module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = ()) -> Any:
@@ -35,10 +37,12 @@ def draw(module: Any, source: Source, load_case: str | None = None, times: tuple
         axis.set_xlabel("x, m")
         axis.set_ylabel("y, m")
         axis.margins(0.08)
+        _look_at_design(axis, source, q)
         if t is not None:
             axis.set_title(f"t = {t:g} s", loc="left")
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper left", ncols=3)
+    title = "width of a line: alpha" if case.n_design else None
+    figure.legend(handles, labels, loc="outside upper left", ncols=3, title=title, alignment="left")
     return figure
 
 
@@ -67,7 +71,7 @@ def _members(axis: Any, source: Source, q: Floats) -> None:
     slices = case.group_slices
     for k, group in enumerate(case.members):
         ends = ends_at(case, group, q)
-        colour = COLOURS[k % 2]
+        colour = COLOURS[k % len(COLOURS)]
         style = "-"
         if group.design:
             values = source.alpha[slices[group.name]]
@@ -81,4 +85,19 @@ def _members(axis: Any, source: Source, q: Floats) -> None:
             LineCollection(list(ends[order]), colors=colour, linewidths=widths, alpha=0.8, linestyles=style),
             autolim=True,
         )
-        axis.plot([], [], style, color=colour, label=f"{group.name}, width by alpha" if group.design else group.name)
+        axis.plot([], [], style, color=colour, label=group.name)
+
+
+def _look_at_design(axis: Any, source: Source, q: Floats) -> None:
+    """Leave out of view what lies far outside of the design: contacts keep their direction by an end far off."""
+    case = source.case
+    if not case.design_groups:
+        return
+    places = [q.reshape(-1, 3)[:, :2], *(ends_at(case, group, q).reshape(-1, 2) for group in case.design_groups)]
+    low, high = np.concatenate(places).min(axis=0), np.concatenate(places).max(axis=0)
+    width = float((high - low).max())
+    everything = [ends_at(case, group, q).reshape(-1, 2) for group in case.members]
+    if width > 0.0 and float(np.ptp(np.concatenate(everything), axis=0).max()) > FAR * width:
+        axis.set_aspect("equal", adjustable="box")
+        axis.set_xlim(low[0] - MARGIN * width, high[0] + MARGIN * width)
+        axis.set_ylim(low[1] - MARGIN * width, high[1] + MARGIN * width)

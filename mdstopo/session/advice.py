@@ -5,23 +5,26 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, VolumeRow
+from mdstopo.case.model import GROUND, Case, Objective, ResponseRow, VolumeRow
 from mdstopo.store.contents import Motion
 
 Floats = NDArray[np.float64]
 
 _USED = 0.9  # share of a volume limit below which it is far from active
 _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
+_MOTIONS = ("displacement", "angle")  # responses whose limit, or whose minimum, restrains
 
 
 def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
     """Warnings about the final design `alpha`.
 
     before, after: the motion by load case with the starting and the final design. Both warnings are signs of
-    the soft branch: stored energy also falls when members that restrain the bodies are taken away.
+    the soft branch: stored energy, accelerations and forces also fall when members that restrain the bodies are taken
+    away. Where a displacement or an angle is bounded or minimised, that cannot be, and nothing is said.
     """
     found = []
-    for row in case.constraints:
+    soft = any(not is_held(case, objective.load_case) for objective in _minimised(case))
+    for row in case.constraints if soft else ():
         if isinstance(row, VolumeRow) and row.sense == "limit" and row.bound > 0.0:
             share = float(row.coefficients @ alpha) / row.bound
             if share < _USED:
@@ -31,7 +34,7 @@ def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mappi
                     "spend the volume (`equals`), or bound a displacement"
                 )
     for name, motion in after.items():
-        if not (motion.status.ok and before[name].status.ok):
+        if is_held(case, name) or not (motion.status.ok and before[name].status.ok):
             continue
         earlier, later = relative_motion(case, before[name]), relative_motion(case, motion)
         if later > _LARGER * earlier:
@@ -41,6 +44,19 @@ def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mappi
                 "if that matters, bound a displacement"
             )
     return tuple(found)
+
+
+def is_held(case: Case, load_case: str) -> bool:
+    """Whether a displacement or an angle is bounded from above, or minimised, in this load case."""
+    looked: list[Objective | ResponseRow] = [*_minimised(case)]
+    looked += [row for row in case.constraints if isinstance(row, ResponseRow) and row.sense in ("limit", "equals")]
+    return any(each.load_case == load_case and each.response.kind in _MOTIONS for each in looked)
+
+
+def _minimised(case: Case) -> list[Objective]:
+    """The objectives that are made small and count."""
+    weights = case.combine.weights if case.combine is not None else {}
+    return [each for each in case.objectives if each.sense == "minimize" and weights.get(each.name, 1.0) > 0.0]
 
 
 def relative_motion(case: Case, motion: Motion) -> float:

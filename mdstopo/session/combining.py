@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.front.plan import NoEndError, Planner, Request
-from mdstopo.front.tasks import Found, StoppedError, case_key, solve
+from mdstopo.front.tasks import Found, StoppedError, Task, case_key, solve
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.structure import sign_of
+from mdstopo.session.callbacks import ignore
 from mdstopo.session.engine import Engine
 from mdstopo.session.errors import NoUtopiaError
 from mdstopo.store.contents import Datasets
@@ -48,12 +49,18 @@ class Combining:
         return sum(self.solved[key].evaluations for key in self.used)
 
     def scalarisation(
-        self, engine: Engine, first: Floats, keep: Callable[[], None], stop: Callable[[], bool]
+        self,
+        engine: Engine,
+        first: Floats,
+        keep: Callable[[], None],
+        stop: Callable[[], bool],
+        notify: Callable[[str], None] = ignore,
     ) -> Scalarisation | None:
         """U of the case; None for one objective.
 
-        first (N,): the design that the individual optima begin with. keep is called after each of them. Raises
-        StoppedError where `stop` says so, and NoUtopiaError where an objective alone cannot be optimised.
+        first (N,): the design that the individual optima begin with. keep is called after each of them, and notify is
+        given a sentence on it. Raises StoppedError where `stop` says so, and NoUtopiaError where an objective alone
+        cannot be optimised.
         """
         case, combine = self.case, self.case.combine
         if combine is None or len(case.objectives) < 2:
@@ -86,6 +93,7 @@ class Combining:
                         if stop():
                             raise StoppedError
                         self.solved[key] = solve(engine, case, task, key, stop)
+                        notify(_sentence(case, task, self.solved[key]))
                         keep()
                     self.used.add(key)
                     found.append(self.solved[key])
@@ -114,3 +122,10 @@ class Combining:
                 "combine/best_found": signs * np.nanmin(found, axis=0),
             }
         return part
+
+
+def _sentence(case: Case, task: Task, found: Found) -> str:
+    """How an objective alone fared."""
+    place = -1 - task.point
+    name, ended = case.objectives[place].name, str(found.status).replace("_", " ")
+    return f"{name} alone: {found.objectives[place]:.6g} after {found.evaluations} evaluations, {ended}"

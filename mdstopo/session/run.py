@@ -183,7 +183,7 @@ class _Run:
                 saver.offer()
 
         try:
-            return self.combining.scalarisation(engine, begin, keep, self.stop_requested)
+            return self.combining.scalarisation(engine, begin, keep, self.stop_requested, self.notify)
         except StoppedError:
             if path is not None:
                 self.save(path, RunStatus.INTERRUPTED, "stopped on request; the individual optima so far are saved")

@@ -84,7 +84,7 @@ def test_every_row_has_its_own_gradient(method):
         assert (plus - minus) / (2 * h) == pytest.approx(gradients[:, d], rel=1e-6, abs=1e-7)
     limits, slopes = one.limits(parts_at(peaks, x, one.active))
     if method == "nc":
-        assert len(limits) == 8  # a fixed number, so that runs can be stored
+        assert len(limits) == 12  # a fixed number, so that runs can be stored
         for d in range(N):
             step = np.eye(N)[d] * h
             plus, minus = (one.limits(parts_at(peaks, x + s * step, one.active))[0] for s in (1, -1))

@@ -30,7 +30,7 @@ def test_single_settings_override_the_preset():
     ("name", "value", "words"),
     [
         ("moov_limit", 0.1, "did you mean 'move_limit'"),
-        ("peaks", 0, "between 1 and 4"),
+        ("peaks", 0, "between 1 and 6"),
         ("peaks", 2.5, "whole number"),
         ("power", 1.5, "between -5 and 1"),
         ("power", True, "must be a number"),

@@ -1,0 +1,152 @@
+"""The four applications: what `mdstopo run` finds, whether it holds, and what a careful hand would have done."""
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.forces import whole_forces
+from benchmarks.hand import HANDS, sized
+from benchmarks.scenes import CASES
+from mdstopo import Case, Evaluation, evaluate, load_case, optimize
+from mdstopo.bench.tables import Table, significant, verdict
+from mdstopo.case.model import Objective, ResponseRow, VolumeRow
+from mdstopo.case.units import words
+from mdstopo.optimizer.scalarisation import Scalarisation
+
+Floats = NDArray[np.float64]
+
+APPLICATIONS = ("restraint", "tiedown", "mooring", "lander")
+#: what the constraints are held to, relative to their bounds, how much finer they are computed, seconds allowed
+HELD, FINER, SECONDS = 1e-6, 100.0, 120.0
+#: size from which a member is listed; tables of each application
+PRESENT, TABLES = 0.02, 4
+
+
+def applications(names: tuple[str, ...] = APPLICATIONS, folder: Path | None = None) -> Iterator[Table]:
+    """Four tables for each application. folder: where the designs found are written as text."""
+    for name in names:
+        case = load_case(CASES / f"{name}.yaml")
+        began = time.process_time()
+        result = optimize(case)
+        seconds = time.process_time() - began
+        if folder is not None:
+            np.savetxt(folder / f"{name}.txt", result.alpha, fmt="%.17g")
+        fine = finer(case)
+        found, first = evaluate(fine, result.alpha, gradient=False), evaluate(fine, gradient=False)
+        score = scorer(case)
+        drawn = sized(case, HANDS[name], combined(case))
+        hand = evaluate(fine, drawn, gradient=False)
+        yield values(case, {"start": first, "hand": hand, "found": found})
+        yield members(case, {"hand": drawn, "found": result.alpha})
+        yield Table(
+            f"{case.title}: the run",
+            ("", "found", "hand", "start", "bar", "met"),
+            [
+                ["variables, evaluations", f"{case.n_design}, {result.evaluations}", "", "", "", ""],
+                ["ended", str(result.status).replace("_", " "), "", "", "", ""],
+                ["seconds", significant(seconds), "", "", f"under {SECONDS:g}", verdict(seconds < SECONDS)],
+                [
+                    "largest excess over a bound", *(f"{excess(case, each):.1e}" for each in (found, hand, first)),
+                    f"at most {HELD:g}", verdict(excess(case, found) <= HELD),
+                ],
+                [
+                    "combined objective", *(significant(score(each), 4) for each in (found, hand, first)),
+                    "below hand's", verdict(score(found) < score(hand)),
+                ],
+            ],
+            (
+                "Seconds are of one processor, kernels compiled. Excesses are relative to the bounds and computed with "
+                "a hundredth of the case's tolerance, 0 where all limits hold.",
+            ),
+        )  # fmt: skip
+        yield carried(case, result.alpha)
+
+
+def finer(case: Case) -> Case:
+    """The case, computed to a hundredth of its tolerance."""
+    return replace(case, solver=replace(case.solver, tolerance=case.solver.tolerance / FINER))
+
+
+def combined(case: Case) -> Scalarisation:
+    """U of a case that needs no utopia for it."""
+    assert case.combine is not None
+    assert case.combine.method == "weighted_product"
+    return Scalarisation(case.combine.method, np.array([case.combine.weights[each.name] for each in case.objectives]))
+
+
+def scorer(case: Case) -> Callable[[Evaluation], float]:
+    """U of an evaluation."""
+    u = combined(case)
+
+    def score(found: Evaluation) -> float:
+        return float(u.values(np.array([[found.objectives[each.name] for each in case.objectives]]))[0])
+
+    return score
+
+
+def excess(case: Case, found: Evaluation) -> float:
+    """The largest excess over a bound, relative to it; 0 where all constraints hold."""
+    return max(
+        0.0,
+        *(
+            {"limit": value, "at_least": -value, "equals": abs(value)}[row.sense] / (abs(row.bound) or 1.0)
+            for row, value in zip(case.constraints, found.constraints.tolist(), strict=True)
+        ),
+    )
+
+
+def values(case: Case, designs: dict[str, Evaluation]) -> Table:
+    """Objectives and constraints of designs, side by side."""
+    rows = []
+    for objective in case.objectives:
+        label = f"{objective.name}: {described(objective)}"
+        rows.append([label, "", *(significant(found.objectives[objective.name], 4) for found in designs.values())])
+    for i, row in enumerate(case.constraints):
+        sense = {"limit": "at most", "at_least": "at least", "equals": "exactly"}[row.sense]
+        label = f"volume of {', '.join(row.groups)}" if isinstance(row, VolumeRow) else described(row)
+        cells = [significant(found.constraints[i] + row.bound, 4) for found in designs.values()]
+        rows.append([label, f"{sense} {row.bound:g}", *cells])
+    return Table(f"{case.title}: what is reached", ("", "bound", *designs), rows)
+
+
+def described(looked: Objective | ResponseRow) -> str:
+    """What is looked at, in words."""
+    return f"{looked.over_time} {words(looked.response)}, {looked.load_case}"
+
+
+def members(case: Case, designs: dict[str, Floats]) -> Table:
+    """The members that any of the designs has."""
+    rows, at = [], 0
+    for group in case.design_groups:
+        for k in range(len(group)):
+            sizes = [float(alpha[at + k]) for alpha in designs.values()]
+            if max(sizes) >= PRESENT:
+                p, q = group.from_world[group.from_index[k]], group.to_world[group.to_index[k]]
+                ends = [f"({x:g}, {y:g})" for x, y in np.round((p, q), 3).tolist()]
+                rows.append([group.name, *ends, *(f"{size:.3f}" if size >= PRESENT else "" for size in sizes)])
+        at += len(group)
+    return Table(f"{case.title}: members of size {PRESENT} and more", ("group", "from, m", "to, m", *designs), rows)
+
+
+def carried(case: Case, alpha: Floats) -> Table:
+    """What present members carry: the largest force of each group, and of the most strained one if it were whole."""
+    rows = []
+    for group in case.design_groups:
+        own = alpha[case.group_slices[group.name]]
+        there = own >= PRESENT
+        if there.any():
+            for load_case in case.load_cases:
+                whole = whole_forces(case, alpha, group, load_case.name)[there]
+                largest = float((whole * own[there]).max())
+                rows.append([group.name, load_case.name, significant(largest), significant(float(whole.max()))])
+    return Table(
+        f"{case.title}: forces in N",
+        ("group", "load case", "largest", "of a whole member"),
+        rows,
+        ("Written out a second time (`benchmarks/forces.py`). The last column is what the most strained member would "
+         "carry at size 1: what its strength has to be compared with.",),
+    )  # fmt: skip

@@ -1,0 +1,58 @@
+"""What single members carry in a motion, from their laws written out once more: an engineer's check of a design."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo import Case, simulate
+from mdstopo.case.model import GROUND, ActuatorLaw, GapLaw, SpringLaw
+from mdstopo.case.parts import MemberGroup
+
+Floats = NDArray[np.float64]
+
+#: places in time
+PLACES = 4000
+
+
+def whole_forces(case: Case, alpha: Floats, group: MemberGroup, load_case: str) -> Floats:
+    """The largest |f| (M,) in N that each member of a group would carry in this motion if it were whole.
+
+    Raises ValueError for a law that is not written out here.
+    """
+    motion = simulate(case, alpha, load_case)
+    times = np.linspace(motion.t[0], motion.t[-1], PLACES)
+    states = motion.at(times)
+    p, vp = _points(case, group.body_from, group.from_local[group.from_index], states.q, states.v)
+    q, vq = _points(case, group.body_to, group.to_local[group.to_index], states.q, states.v)
+    r, length = q - p, np.linalg.norm(q - p, axis=2)
+    x, rate = length - group.length, ((vq - vp) * r).sum(axis=2) / length
+    total = np.zeros_like(x)
+    for law in group.laws:
+        until = np.inf if law.active_until is None else law.active_until
+        acts = (times >= (-np.inf if law.active_from is None else law.active_from)) & (times < until)
+        total += np.where(acts[:, None], _force(law, x, rate), 0.0)
+    return np.asarray(np.abs(total).max(axis=0))
+
+
+def _points(case: Case, body: str, local: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Places and velocities (T, M, 2) of points on a body."""
+    if body == GROUND:
+        return np.broadcast_to(local, (len(q), *local.shape)), np.zeros((len(q), *local.shape))
+    k = 3 * [each.name for each in case.bodies].index(body)
+    c, s = np.cos(q[:, k + 2])[:, None], np.sin(q[:, k + 2])[:, None]
+    arm = np.stack([c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]], axis=2)
+    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=2) * v[:, None, k + 2 : k + 3]
+    return q[:, None, k : k + 2] + arm, v[:, None, k : k + 2] + turned
+
+
+def _force(law: object, x: Floats, rate: Floats) -> Floats:
+    if isinstance(law, SpringLaw):
+        return law.stiffness * x + law.damping * rate + law.preload
+    if isinstance(law, ActuatorLaw):
+        force = law.proportional * (x - law.target) + law.derivative * rate
+        return force if law.limit is None else np.clip(force, -law.limit, law.limit)
+    if isinstance(law, GapLaw):
+        sign = 1.0 if law.side == "tension" else -1.0
+        force = law.stiffness * (sign * x - law.gap) + law.damping * sign * rate
+        force = np.maximum(force, 0.0) if law.clip else force
+        return np.where(sign * x >= law.gap, force, 0.0)
+    raise ValueError(f"no force is written out for {type(law).__name__}")

@@ -1,0 +1,103 @@
+"""The applications are whole problems, their designs hold, and a short run makes headway."""
+
+import numpy as np
+import pytest
+
+from benchmarks.applications import APPLICATIONS, HELD, excess, finer
+from benchmarks.forces import whole_forces
+from benchmarks.hand import HANDS, places
+from benchmarks.motions import DATA, texts
+from benchmarks.scenes import CASES
+from mdstopo import Case, evaluate, load_case, optimize
+from mdstopo.case.model import ResponseRow, VolumeRow
+from mdstopo.scene.refusals import refusals
+from mdstopo.store.design import read_design
+
+
+def case_of(name: str, **overrides: object) -> Case:
+    return load_case(CASES / f"{name}.yaml", overrides=overrides)
+
+
+@pytest.mark.parametrize("name", APPLICATIONS)
+def test_each_has_several_kinds_of_members_that_cost_and_two_objectives_at_least(name: str) -> None:
+    case = case_of(name)
+    assert refusals(case) == []
+    assert len(case.objectives) >= 2
+    assert case.combine is not None
+    assert len(case.load_cases) >= 2
+    assert len({(law.type, getattr(law, "side", "")) for group in case.design_groups for law in group.laws}) >= 2
+    paid = {group for row in case.constraints if isinstance(row, VolumeRow) for group in row.groups}
+    assert paid == {group.name for group in case.design_groups}
+    assert any(not isinstance(row, VolumeRow) for row in case.constraints)
+
+
+@pytest.mark.parametrize("name", APPLICATIONS)
+def test_a_hand_design_is_made_of_candidates(name: str) -> None:
+    case = case_of(name)
+    found = places(case, HANDS[name])
+    assert {part.split()[0] for part, _ in found} <= {group.name for group in case.design_groups}
+    chosen = [member for _, members in found for member in members]
+    assert len(set(chosen)) == len(chosen) > 3
+
+
+def test_a_hand_design_with_a_member_that_is_none_is_refused() -> None:
+    with pytest.raises(ValueError, match="no member of chains joins"):
+        places(case_of("tiedown"), {"chains": [((0.0, 0.0), (1.0, 1.0))]})
+
+
+def test_tables_of_time_are_what_their_formulas_give() -> None:
+    made = dict(texts())
+    assert made
+    for name, text in made.items():
+        assert (DATA / name).read_text() == text, name
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", APPLICATIONS)
+def test_the_stored_design_keeps_its_limits_when_computed_a_hundred_times_finer(name: str) -> None:
+    case = case_of(name)
+    design = read_design(CASES / "designs" / f"{name}.txt", case.n_design)
+    fine, start = evaluate(finer(case), design, gradient=False), evaluate(case, gradient=False)
+    assert fine.status.ok
+    assert excess(case, fine) <= HELD
+    assert excess(case, start) > 0.01
+    coarse = evaluate(case, design, gradient=False)
+    for objective, value in fine.objectives.items():
+        assert value == pytest.approx(coarse.objectives[objective], rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", APPLICATIONS)
+def test_a_short_run_from_the_stated_start_makes_headway(name: str) -> None:
+    case = case_of(name, **{"optimizer.max_iterations": 5, "combine.weights": weights(name)})
+    result = optimize(case)
+    before, after = evaluate(case, gradient=False), evaluate(case, result.alpha, gradient=False)
+    assert np.all(result.alpha >= case.lower)
+    assert excess(case, after) < 0.5 * excess(case, before)
+
+
+def weights(name: str) -> dict[str, float]:
+    """The first objective alone: no others have to be optimised first."""
+    objectives = case_of(name).objectives
+    return {objective.name: float(i == 0) for i, objective in enumerate(objectives)}
+
+
+@pytest.mark.slow
+def test_forces_that_are_written_out_again_agree_with_the_response() -> None:
+    case = case_of("lander")
+    design = read_design(CASES / "designs" / "lander.txt", case.n_design)
+    looked = {row.response.group: i for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
+    found = evaluate(case, design, gradient=False)
+    for group in case.design_groups:
+        if group.name in looked:
+            i = looked[group.name]
+            own = whole_forces(case, design, group, "level") * design[case.group_slices[group.name]]
+            assert own.max() == pytest.approx(found.constraints[i] + case.constraints[i].bound, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_a_law_that_is_not_written_out_is_refused() -> None:
+    case = load_case(CASES / "mooring.yaml")
+    group = next(each for each in case.members if each.name == "water_along")
+    with pytest.raises(ValueError, match="InerterLaw"):
+        whole_forces(case, case.initial, group, "swell")
