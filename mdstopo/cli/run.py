@@ -38,7 +38,9 @@ _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is 
 @set_option
 @alpha_option
 @click.option("--starts", type=click.IntRange(1), metavar="N", help="How many starts (default: the case's).")
-@click.option("--workers", type=click.IntRange(1), metavar="N", help="How many processes (default 1).")
+@click.option(
+    "--workers", type=click.IntRange(1), metavar="N", help="Processes for starts, or a sample's points (default 1)."
+)
 @output_options
 def command(
     case_path: Path,

@@ -8,6 +8,7 @@ import pytest
 from mdstopo.cli.gradient_numbers import differences
 from mdstopo.evaluators import evaluator_of
 from mdstopo.robust.ensemble import Ensemble
+from mdstopo.status import Status
 from tests.robust.scenes import SCENARIOS, read, uncertain
 
 MEASURES = {
@@ -108,6 +109,17 @@ def test_error_estimates_are_those_of_the_points_weighted():
     exact = evaluator_of(tight(case)).evaluate(alpha)
     error = abs(found.objectives["G"] - exact.objectives["G"])
     assert error <= found.errors["G"].value <= 1e-4 * found.objectives["G"]
+
+
+def test_where_there_is_no_slope_there_is_still_a_value():
+    case = read(uncertain(MEASURES["mean_deviation"]), design={"power": 0.5})
+    engine, alpha = evaluator_of(case), np.full(40, 0.2)
+    alpha[3] = 0.0
+    found = engine.evaluate(alpha)
+    assert found.status is Status.NO_GRADIENT
+    assert found.message.startswith("alpha = 0 in group belts, whose power 0.5 is below 1, at point 0")
+    assert found.objectives == engine.evaluate(alpha, gradient=False).objectives
+    assert not found.gradients
 
 
 def test_a_point_that_cannot_be_computed_fails_the_evaluation_by_name():

@@ -163,6 +163,38 @@ def test_a_point_of_the_fresh_sample_that_cannot_be_computed_is_told(tmp_path):
     assert np.isfinite(result.conclusion.of("G").check.value)
 
 
+def test_a_worker_that_dies_is_reported_and_what_was_reached_is_kept(tmp_path):
+    import os
+    import signal
+
+    from mdstopo.session.errors import WorkerError
+
+    case, seen = read(uncertain(DEVIATION)), []
+
+    def kill(progress):
+        seen.append(progress)
+        if len(seen) == 3:
+            (child,) = (
+                int(pid) for pid in os.listdir("/proc") if pid.isdigit() and _is_point_worker(int(pid), os.getpid())
+            )
+            os.kill(child, signal.SIGKILL)
+
+    with pytest.raises(WorkerError, match=r"a worker process \(pid \d+\) ended unexpectedly"):
+        mdstopo.optimize(case, path=tmp_path / "run.h5", workers=2, on_iteration=kill)
+    assert arrays(tmp_path / "run.h5")["iterations/objectives"].shape[0] == 3
+    resumed = mdstopo.optimize(case, path=tmp_path / "run.h5", resume=True)
+    assert np.array_equal(resumed.alpha, mdstopo.optimize(case).alpha)
+
+
+def _is_point_worker(pid, parent):
+    """Whether a process is this one's helper for points of a sample."""
+    try:
+        with open(f"/proc/{pid}/stat") as stat, open(f"/proc/{pid}/cmdline") as line:
+            return int(stat.read().rsplit(")", 1)[1].split()[1]) == parent and "mdstopo.robust.worker" in line.read()
+    except OSError:
+        return False
+
+
 def test_scenarios_alone_are_exact_and_not_checked():
     result = mdstopo.optimize(read(uncertain({"measure": "worst"}, parameters=None, scenarios=SCENARIOS, sample=None)))
     assert result.conclusion.points == 0
@@ -207,6 +239,12 @@ def test_the_command_tells_nominal_and_robust_values(tmp_path, capsys, monkeypat
     assert _dispatch(["show", "results/case.h5"]) == 0
     shown = capsys.readouterr().out
     assert "mean and 2 deviations" in shown
+    assert _dispatch(["export", "results/case.h5", "--csv"]) == 0
+    capsys.readouterr()
+    for name, count in (("sample", 8), ("fresh-sample", 60)):
+        rows = (tmp_path / "results" / "case.csv" / f"{name}.csv").read_text().splitlines()
+        assert rows[0].startswith("point,scenario,bodies.torso.mass,members.belts.law.stiffness,loads[0]")
+        assert len(rows) == count + 1
     assert _dispatch(["run", "case.yaml", "--json", "--quiet"]) == 0
     told = json.loads(capsys.readouterr().out)["uncertainty"]["G"]
     assert told["interval"][0] <= told["value"] <= told["interval"][1] or not told["agrees"]
