@@ -5,7 +5,7 @@ y (S,) are the values at the points of a sample, worse where larger, with probab
     mean              sum p y
     mean_deviation    m + k s,   m = sum p y,   s^2 = sum p (y - m)^2
     worst             max y
-    quantile          the smallest y that the share `level` of all does not exceed (an order statistic)
+    quantile          the smallest y at or below which at least the share `level` of p lies (an order statistic)
 
 Each y is itself the highest of the peaks that compete at its point, so a measure has kinks where peaks tie, and worst
 and quantile also where points do. What competes becomes rows, whose maximum the optimiser lowers (bound formulation):
