@@ -137,7 +137,7 @@ UNCERTAINTY = Record(
     (
         Key("parameters", ByKey("key paths to distributions", _DISTRIBUTION), "numbers that vary, by key path"),
         Key("scenarios", Named(_SCENARIO, "scenario", 1), "what varies together, by name"),
-        Key("sample", Number(minimum=2, maximum=10**5, whole=True), "points for each scenario", default=32),
+        Key("sample", Number(minimum=2, maximum=10**5, whole=True), "points for each scenario", default=64),
         Key("seed", Number(minimum=0, maximum=2**53, whole=True), "of both samples", default=0),
         Key(
             "validation",

@@ -24,6 +24,7 @@ class Robust:
     name: of the objective, or `constraints[i]`. measure: in words. nominal: the value of the case as it is written.
     value: the measure over the design's sample. check: the measure over the fresh sample, None without one. worse:
     share of that sample which is worse than `value`. kept: share of it that keeps the constraint; None for objectives.
+    sign: 1 where larger is worse, else -1.
     """
 
     name: str
@@ -33,6 +34,14 @@ class Robust:
     check: Estimate | None
     worse: float | None
     kept: float | None
+    sign: float = 1.0
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the value is better than the whole interval: then the design fits its own sample."""
+        if self.check is None or self.agrees:
+            return False
+        return (self.value < self.check.low) == (self.sign > 0.0)
 
     @property
     def agrees(self) -> bool | None:
@@ -92,6 +101,7 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, crew: Crew 
                 float(found.constraints[i]) + row.bound, here, values if enough else None, sample,
             )
         )  # fmt: skip
+    warnings += tuple(_fitted(each) for each in results if each.is_fitted)
     part = _part(case, sample, objectives, responses, results)
     if fresh is not None:
         part |= _check_part(case, fresh, trials, results)
@@ -117,7 +127,7 @@ def _robust(
     """One result; values (S,) at the points of the sample, fresh (V,) at those of the other, None where not enough."""
     sign = sign_of(of) if isinstance(of, Objective) else (-1.0 if of.sense == "at_least" else 1.0)
     if fresh is None or measure.name == "nominal":
-        return Robust(name, measure.words, nominal, value, None, None, None)
+        return Robust(name, measure.words, nominal, value, None, None, None, sign)
     level = replace(measure, level=_level_of_worst(sign * values, sample)) if measure.name == "worst" else measure
     found = estimate(level, sign * fresh)
     low, high = (found.low, found.high) if sign > 0.0 else (-found.high, -found.low)
@@ -125,7 +135,15 @@ def _robust(
     if isinstance(of, ResponseRow) and of.sense != "equals":
         kept = float(np.mean(sign * fresh <= sign * of.bound))
     worse = float(np.mean(sign * fresh > sign * value))
-    return Robust(name, measure.words, nominal, value, Estimate(sign * found.value, low, high), worse, kept)
+    return Robust(name, measure.words, nominal, value, Estimate(sign * found.value, low, high), worse, kept, sign)
+
+
+def _fitted(found: Robust) -> str:
+    assert found.check is not None
+    return (
+        f"{found.name} is {found.value:.6g} over its own sample, better than the interval {found.check.low:.6g} to "
+        f"{found.check.high:.6g} of the fresh one: the design fits its sample; take a larger uncertainty.sample"
+    )
 
 
 def _level_of_worst(y: FloatArray, sample: Sample) -> float:

@@ -23,7 +23,7 @@ def refused(section, overrides=None, **changes):
 def test_defaults_and_nominal_values():
     case = read({"parameters": PARAMETERS})
     found = case.uncertainty
-    assert (found.sample, found.seed, found.validation) == (32, 0, 256)
+    assert (found.sample, found.seed, found.validation) == (64, 0, 256)
     assert found.objectives["G"] == Measure("mean")
     assert [(number.key, number.nominal) for number in found.numbers] == [
         ("bodies.torso.mass", 60.0),
