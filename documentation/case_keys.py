@@ -7,6 +7,7 @@ from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Text
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.rows import FILE, FileName, Rows, Signals
 from mdstopo.case.schema import FORMAT
+from mdstopo.case.schema_uncertainty import Anything, ByKey
 
 #: where the page tells of tables of time and of rows from files
 ROWS = "rows"
@@ -58,7 +59,7 @@ def _below(kind: Kind, path: str, depth: int, seen: set[int]) -> Iterator[Place]
 
 def _parts(kind: Kind) -> list[Kind]:
     """The kinds that a list, a mapping from names or a choice is made of."""
-    if isinstance(kind, (Vector, ListOf, Named, ByName)):
+    if isinstance(kind, (Vector, ListOf, Named, ByName, ByKey)):
         return [kind.item]
     if isinstance(kind, ByShape):
         return [part for part in (kind.scalar, kind.sequence, kind.mapping) if part is not None]
@@ -153,6 +154,8 @@ def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
         return f"mapping from names to {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByName):
         return f"mapping from {_plural(kind.kind)} to {_value(kind.item, anchors, path)}"
+    if isinstance(kind, ByKey):
+        return f"mapping from {kind.what}: {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByShape):
         if isinstance(kind.sequence, ListOf) and kind.sequence.item is kind.mapping:
             return f"{_value(kind.mapping, anchors, path)}, or a list of such"
@@ -188,7 +191,9 @@ def _simple(kind: Kind) -> str:
         return f"{constant}, or {table}" if kind.constant else table
     if isinstance(kind, Version):
         return f"`{kind.number}`"
-    texts: dict[type, str] = {Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file"}
+    texts: dict[type, str] = {
+        Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file", Anything: "any value",
+    }  # fmt: skip
     return texts[type(kind)]
 
 

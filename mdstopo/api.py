@@ -21,6 +21,7 @@ from mdstopo.case.reader import load_case
 from mdstopo.engine import Evaluator
 from mdstopo.error_estimate import ErrorEstimate
 from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.evaluators import evaluator_of
 from mdstopo.integrators.trajectory import States, Trajectory
 from mdstopo.session.outcome import Outcome as Result
 from mdstopo.session.outcome import Progress
@@ -55,7 +56,7 @@ def _evaluator(case: Case) -> Evaluator:
     key = id(case)
     found = _compiled.get(key)
     if found is None:
-        found = _compiled[key] = Evaluator(case)
+        found = _compiled[key] = evaluator_of(case)
         while len(_compiled) > _KEPT or (len(_compiled) > 1 and sum(each.held for each in _compiled.values()) > _HELD):
             _compiled.popitem(last=False)
     else:

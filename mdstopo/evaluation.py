@@ -36,7 +36,8 @@ class Evaluation:
     s (NaN for mean and integral); peaks: all that compete, highest first; constraints (n_con,): h_j - h_0j in the
     case's order; constraint_gradients (n_con, N); work: counts of what was done; status: what is not `usable`
     leaves values NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all
-    that compete. errors: estimates of the errors of objectives and gradients, where they were asked for.
+    that compete. all_compete: whether all peaks are rows whatever the reduction over time, because they are those of a
+    measure over a sample. errors: estimates of the errors of objectives and gradients, where they were asked for.
     """
 
     objectives: Mapping[str, float]
@@ -49,4 +50,5 @@ class Evaluation:
     status: Status
     message: str = ""
     constraint_peaks: Mapping[int, tuple[Peak, ...]] = field(default_factory=dict)
+    all_compete: bool = False
     errors: "Mapping[str, ErrorEstimate]" = field(default_factory=dict)

@@ -54,6 +54,7 @@ from mdstopo.case.parts import (
     RevoluteJoint,
     Triple,
 )
+from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
 
 __all__ = [
@@ -96,6 +97,7 @@ __all__ = [
     "Table",
     "TableLaw",
     "Triple",
+    "Uncertainty",
     "VectorSignal",
     "VolumeRow",
 ]
@@ -147,7 +149,7 @@ class Case(Value):
 
     text, sha256: the YAML as read and its hash; overrides: keys set from outside, key path -> value in YAML;
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
-    the user should know.
+    the user should know. uncertainty: None where all is certain; the other fields are the nominal case.
     """
 
     title: str
@@ -170,6 +172,7 @@ class Case(Value):
     solver: SolverSettings
     marks: Marks
     warnings: tuple[Mistake, ...] = ()
+    uncertainty: Uncertainty | None = None
 
     @property
     def design_groups(self) -> tuple[MemberGroup, ...]:

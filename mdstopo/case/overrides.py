@@ -28,8 +28,8 @@ def apply_overrides(
         origin = f"--set {name}"
         try:
             node = _value(value, report, origin)
-            root = _replaced(root, _steps(name), node, "", origin)
-        except _WrongPathError as error:
+            root = _replaced(root, steps_of(name), node, "", origin)
+        except WrongPathError as error:
             report(Mistake(error.path, error.message, 1, 1, origin))
         except YamlSyntaxError as error:
             report(error.mistake)
@@ -38,14 +38,17 @@ def apply_overrides(
     return root, texts
 
 
-class _WrongPathError(Exception):
+class WrongPathError(Exception):
+    """A key path that leads nowhere."""
+
     def __init__(self, path: str, message: str) -> None:
         self.path = path
         self.message = message
         super().__init__(message)
 
 
-def _steps(key: str) -> list[str | int]:
+def steps_of(key: str) -> list[str | int]:
+    """A key path as names and places in lists. Raises WrongPathError where it is none."""
     steps: list[str | int] = []
     position = 0
     while position < len(key):
@@ -56,7 +59,7 @@ def _steps(key: str) -> list[str | int]:
         position = match.end()
     if not steps or position < len(key) or len(steps) > 20:
         message = f"{shown(key)} is no key path, such as solver.step or constraints[0].equals"
-        raise _WrongPathError("", message)
+        raise WrongPathError("", message)
     return steps
 
 
@@ -65,7 +68,7 @@ def _value(value: Any, report: Callable[[Mistake], None], origin: str) -> Node:
         try:
             value.encode("utf-8")
         except UnicodeEncodeError:
-            raise _WrongPathError("", "the value is not text in UTF-8") from None
+            raise WrongPathError("", "the value is not text in UTF-8") from None
         node = parse(value, report, origin)
         if node is None:
             node = Node(SCALAR, 1, 1, origin)
@@ -130,7 +133,7 @@ def _replaced(node: Node, steps: list[str | int], value: Node, path: str, origin
             count = count_text(len(node.items))
             allowed = f"an index below {count}" if node.items else "nothing"
             message = f"this is a list of {count}; found {shown(str(step))}, allowed is {allowed}"
-            raise _WrongPathError(path, message)
+            raise WrongPathError(path, message)
         twin = node.at(node.line, node.column)
         twin.items = list(node.items)
         twin.items[index] = _replaced(node.items[index], rest, value, f"{path}[{index}]", origin)
@@ -148,4 +151,4 @@ def _replaced(node: Node, steps: list[str | int], value: Node, path: str, origin
         twin.entries[step] = (key, _replaced(old, rest, value, inside(path, step), origin))
         return twin
     what = "a mapping" if node.kind == MAPPING else "a single value"
-    raise _WrongPathError(path, f"this is {what}; {shown(str(step))} cannot be set in it")
+    raise WrongPathError(path, f"this is {what}; {shown(str(step))} cannot be set in it")

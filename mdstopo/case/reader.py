@@ -71,21 +71,29 @@ def read_case(
     path: str | os.PathLike[str] | None = None,
     overrides: Mapping[str, Any] | None = None,
     sha256: str | None = None,
+    without: tuple[str, ...] = (),
 ) -> Case:
     """The case in `text`; raises CaseError as `load_case`.
 
     path: where the text comes from; included files are relative to it, else to the current folder.
-    sha256: of the file's bytes, where they are not the text in UTF-8.
+    sha256: of the file's bytes, where they are not the text in UTF-8. without: sections that are not read.
     """
     place = None if path is None else Path(path)
     file = "<text>" if path is None else str(path)
     reading = Reading(Path() if place is None else place.parent)
     root = _parsed(text, reading, file)
     root, texts = apply_overrides(root, overrides or {}, reading.mistakes.append)
+    if without:
+        whole, root = root, root.at(root.line, root.column)
+        root.entries = {key: entry for key, entry in whole.entries.items() if key not in without}
     reading.mark("", root)
     top = FORMAT.read(root, "", reading)
     assert isinstance(top, Fields)
     parts = _build(top, reading)
+    if top["uncertainty"] is not None:
+        from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
+
+        parts["uncertainty"] = build_uncertainty(top, parts["constraints"], root, reading)
     if reading.mistakes:
         raise CaseError(reading.mistakes, file)
     return Case(

@@ -27,6 +27,7 @@ from mdstopo.case.schema_scene import (
     POINTS,
     POSITIVE,
 )
+from mdstopo.case.schema_uncertainty import UNCERTAINTY
 from mdstopo.optimizer.options import OPTIONS
 from mdstopo.optimizer.presets import PRESETS
 
@@ -310,6 +311,7 @@ FORMAT = Record(
         Key("objectives", Named(OBJECTIVE, "objective"), "what is to be improved, by name"),
         Key("combine", COMBINE, "how objectives become one; needed where there is more than one"),
         Key("constraints", ListOf(CONSTRAINT, what="constraints"), "bounds on volumes and responses", default=()),
+        Key("uncertainty", UNCERTAINTY, "what is not known for certain, and what becomes of objectives then"),
         Key("optimizer", OPTIMIZER, "how the design is improved", otherwise="that of each key"),
         Key("solver", SOLVER, "how motions and gradients are computed", otherwise="that of each key"),
     ),

@@ -7,6 +7,7 @@ import click
 
 from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
 from mdstopo.cli.output import Output, number
+from mdstopo.cli.uncertain import say_sample
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
@@ -60,10 +61,11 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "refused": [mistake.located(str(case_path)) for mistake in refused],
     }
     if not refused:
+        document["uncertainty"] = say_sample(output, case)
         announce_compilation(output, case)
-        from mdstopo.engine import Evaluator
+        from mdstopo.evaluators import evaluator_of
 
-        engine = Evaluator(case, beside=False)
+        engine = evaluator_of(case, beside=False)
         freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}
         for name, freedom in freedoms.items():
             output.say(f"load case {name}: {freedom} degrees of freedom")

@@ -96,11 +96,11 @@ def command(
     line = shlex.join(["mdstopo", *sys.argv[1:]])
     with output_file(path, case, "gradient", overwrite=overwrite, notify=output.notice, command=line) as file:
         announce_compilation(output, case)
-        from mdstopo.engine import Evaluator
+        from mdstopo.evaluators import evaluator_of
         from mdstopo.status import RunStatus
         from mdstopo.store.contents import sensitivity_part
 
-        engine = Evaluator(case)
+        engine = evaluator_of(case)
         check_design(engine, alpha, alpha_path)
         datasets: dict[str, Any] = {"design/alpha": alpha}
         results, failure = _all_methods(engine, alpha, methods, estimating)
@@ -186,13 +186,13 @@ def _difference(
     import numpy as np
 
     from mdstopo.cli.gradient_numbers import chosen_members, differences
-    from mdstopo.engine import Evaluator
+    from mdstopo.evaluators import evaluator_of
 
     members = chosen_members(case.n_design, count, case.optimizer.seed)
     tight = replace(case, solver=replace(case.solver, tolerance=min(case.solver.tolerance, _TIGHT)))
     # fixed steps are differenced as they are: the tolerance would choose others, and too many
     fixed = case.solver.integrator == "generalized_alpha"
-    exact = Evaluator(case if fixed else tight)
+    exact = evaluator_of(case if fixed else tight)
 
     def objectives(x: "NDArray[np.float64]") -> "Mapping[str, float]":
         found = exact.evaluate(x, gradient=False)

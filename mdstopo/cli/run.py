@@ -22,6 +22,7 @@ from mdstopo.cli.options import (
 )
 from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.progress import display
+from mdstopo.cli.uncertain import document_of, lines_of
 
 if TYPE_CHECKING:
     from mdstopo.session.outcome import Outcome
@@ -37,7 +38,9 @@ _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is 
 @set_option
 @alpha_option
 @click.option("--starts", type=click.IntRange(1), metavar="N", help="How many starts (default: the case's).")
-@click.option("--workers", type=click.IntRange(1), metavar="N", help="How many processes work on them (default 1).")
+@click.option(
+    "--workers", type=click.IntRange(1), metavar="N", help="Processes for starts, or a sample's points (default 1)."
+)
 @output_options
 def command(
     case_path: Path,
@@ -119,7 +122,9 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     rows = []
     for name, value in outcome.objectives.items():
         rows.append([name, f"{number(outcome.initial_objectives[name], 9)} -> {number(value, 9)}"])
-        rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in outcome.peaks.get(name, ())]
+        peaks = outcome.peaks.get(name, ()) if case.uncertainty is None else ()
+        rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in peaks]
+        rows += lines_of(outcome.conclusion, name)
     if outcome.combined is not None:
         rows.append(["combined", f"{number(outcome.combined, 9)} ({case.combine.method if case.combine else ''})"])
     for title, scale in (("utopia", outcome.utopia), ("maxima", outcome.maxima)):
@@ -151,12 +156,13 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     from mdstopo.case.units import words
 
     case, lines = outcome.case, []
-    for row, excess in zip(case.constraints, outcome.constraints.tolist(), strict=True):
+    for i, (row, excess) in enumerate(zip(case.constraints, outcome.constraints.tolist(), strict=True)):
         if not isinstance(row, VolumeRow):
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             found = f"{number(excess + row.bound, 9)}, {word} {number(row.bound, 9)}"
             where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
             lines.append((f"{row.over_time} {words(row.response)}{where}", found))
+            lines += [(title, sentence) for title, sentence in lines_of(outcome.conclusion, f"constraints[{i}]")]
         else:
             used = float(row.coefficients @ outcome.alpha)
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
@@ -193,6 +199,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "integrator_reason": outcome.integrator_reason,
         "seconds": outcome.seconds,
         "compile_seconds": outcome.compile_seconds,
+        "uncertainty": document_of(outcome.conclusion),
         "warnings": outcome.warnings,
         "path": str(path),
         "resume": again if outcome.status == "interrupted" else None,

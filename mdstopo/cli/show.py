@@ -8,6 +8,7 @@ import click
 
 from mdstopo.cli.options import output_options, result_argument
 from mdstopo.cli.output import Output, duration, number
+from mdstopo.cli.uncertain import say_result
 
 if TYPE_CHECKING:
     from mdstopo.store.reader import ResultView
@@ -30,6 +31,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     if view.kind == "run" and "iterations/combined" in view.arrays:
         _say_iterations(output, view)
         _say_starts(output, view)
+        say_result(output, view)
     if view.kind == "pareto":
         _say_front(output, view)
     if view.kind == "sweep":

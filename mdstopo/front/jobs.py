@@ -63,6 +63,10 @@ def ready_engine(setting: Setting) -> Engine:
     if found is None:
         compile_apart(setting.case, lambda _: None)  # on a machine where nothing has been compiled yet
         found = make_engine(setting.case)
+        if setting.case.uncertainty is not None:
+            from mdstopo.robust.helpers import compile_kinds
+
+            compile_kinds(found, lambda _: None)
         get_ready(setting.case, found, problem_of(found, even(setting.case)), None)
         _engines[setting.case_key] = found
         if len(_engines) > _KEPT:

@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.engine import Evaluator
-from mdstopo.evaluation import Evaluation, Peak
+from mdstopo.evaluation import Evaluation
 from mdstopo.optimizer.problem import Floats, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals
@@ -18,7 +18,7 @@ from mdstopo.status import Status
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
-#: peaks of one constraint that are rows of their own
+#: peaks of one constraint that are rows of their own, where all is certain
 COMPETITORS = 6
 
 
@@ -38,7 +38,10 @@ class StructureProblem:
             raise ValueError("several objectives need a scalarisation")
         self.scalarisation = scalarisation
         #: rows that may compete, where the optimiser's settings shall not say it
-        self.competitors: int | None = None if scalarisation is None else ROWS
+        one = scalarisation is None and case.uncertainty is None
+        self.competitors: int | None = None if one else ROWS
+        #: rows of each side of a constraint
+        self._rivals = COMPETITORS if case.uncertainty is None else ROWS
         active = [0] if scalarisation is None else scalarisation.active
         self._count = len(case.objectives)
         self._places = active
@@ -62,7 +65,7 @@ class StructureProblem:
             info["constraints"] = evaluation.constraints
         if not evaluation.status.usable:
             return Sample(np.inf, status=evaluation.status, message=evaluation.message, info=info)
-        parts = [self._part(o, s, evaluation.peaks[o.name]) for o, s in zip(self._objectives, self._signs, strict=True)]
+        parts = [self._part(o, s, evaluation) for o, s in zip(self._objectives, self._signs, strict=True)]
         limits, slopes = self._limits(evaluation)
         if self.scalarisation is None:
             rows, gradients = parts[0]
@@ -81,8 +84,9 @@ class StructureProblem:
             return Sample(float(rows[0]), rows, constraint_rows=limits, info=info)
         return Sample(float(rows[0]), rows, gradients, limits, slopes, info=info)
 
-    def _part(self, objective: Objective, sign: float, peaks: tuple[Peak, ...]) -> Part:
-        chosen = peaks if _compete(objective, sign) else peaks[:1]
+    def _part(self, objective: Objective, sign: float, evaluation: Evaluation) -> Part:
+        peaks = evaluation.peaks[objective.name]
+        chosen = peaks if evaluation.all_compete or competes(objective, sign) else peaks[:1]
         values = sign * np.array([peak.value for peak in chosen])
         slopes = [sign * peak.gradient for peak in chosen if peak.gradient is not None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
@@ -90,7 +94,7 @@ class StructureProblem:
     def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats]:
         """Rows and gradients of the constraints on responses, feasible where <= 0, relative to their bounds.
 
-        Every competing peak is a row (bound formulation); a constraint always has COMPETITORS rows, the last repeated.
+        Every competing peak is a row (bound formulation); a constraint always has as many rows, the last repeated.
         """
         rows: list[float] = []
         slopes: list[Floats] = []
@@ -98,8 +102,8 @@ class StructureProblem:
             peaks = evaluation.constraint_peaks[i]
             scale = abs(row.bound) if row.bound != 0.0 else 1.0
             for sign in SIGNS[row.sense]:
-                compete = _compete(row, sign)
-                for r in range(COMPETITORS):
+                compete = evaluation.all_compete or competes(row, sign)
+                for r in range(self._rivals):
                     peak = peaks[min(r, len(peaks) - 1) if compete else 0]
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
@@ -112,7 +116,7 @@ def sign_of(objective: Objective) -> float:
     return -1.0 if objective.sense == "maximize" else 1.0
 
 
-def _compete(looked: Objective | ResponseRow, sign: float) -> bool:
+def competes(looked: Objective | ResponseRow, sign: float) -> bool:
     """Whether all peaks of what is looked at bound sign times its value from above."""
     if looked.response.kind == "member_force" and looked.over_time == "final":
         return sign > 0.0  # members compete at the end, too

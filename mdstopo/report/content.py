@@ -36,7 +36,7 @@ def content(source: Source) -> dict[str, Any]:
         "versions": dict(view.provenance),
         "settings": {key: value for key, value in view.settings.items() if not key.startswith("set ")},
         "objectives": [
-            {"name": name, "unit": unit_of_value(objectives[name]), "what": words(objectives[name].response),
+            {"name": name, "unit": unit_of_value(objectives[name]), "what": _what(case, name),
              "load_case": objectives[name].load_case, "over_time": objectives[name].over_time}
             for name in names
         ],
@@ -59,6 +59,12 @@ def content(source: Source) -> dict[str, Any]:
             "status": list(view.lines("pareto/status")),
         }
     return page
+
+
+def _what(case: Case, name: str) -> str:
+    """What an objective looks at, and its measure in an uncertain case; what is shown over time is the nominal case."""
+    what = words(_objective(case, name).response)
+    return what if case.uncertainty is None else f"{what}, {case.uncertainty.objectives[name].words}"
 
 
 def _bodies(case: Case) -> list[dict[str, Any]]:

@@ -73,6 +73,6 @@ def compilation_due(case: Case) -> bool:
 
 def make_engine(case: Case) -> Engine:
     """The real one; imported here, because it brings the compiler with it."""
-    from mdstopo.engine import Evaluator
+    from mdstopo.evaluators import evaluator_of
 
-    return Evaluator(case)
+    return evaluator_of(case)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.optimizer.state import State
 from mdstopo.status import RunStatus
+
+if TYPE_CHECKING:
+    from mdstopo.robust.conclusion import Conclusion
 
 Floats = NDArray[np.float64]
 
@@ -61,7 +65,8 @@ class Outcome:
     it is made with, else None. history: columns by the names of the file's `iterations/...`, K + 1 rows. states: each
     start's last state, None where it has not begun; best_start: whose result this is. evaluations,
     iterations: of all starts. seconds: wall time of the iterations in this process; compile_seconds: of
-    getting ready, loading or compiling kernels.
+    getting ready, loading or compiling kernels. conclusion: nominal and robust values and the fresh sample's, of an
+    uncertain case.
     """
 
     case: Case
@@ -86,3 +91,4 @@ class Outcome:
     compile_seconds: float
     integrator: str
     integrator_reason: str
+    conclusion: "Conclusion | None" = None

@@ -2,8 +2,10 @@
 
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +40,9 @@ from mdstopo.store.errors import DifferentCaseError, WriteError
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.reader import ResultView
+
+if TYPE_CHECKING:
+    from mdstopo.robust.conclusion import Conclusion
 
 Floats = NDArray[np.float64]
 Notify = Callable[[str], None]
@@ -100,9 +105,10 @@ def run_session(
     tell = notify or ignore
     run = _Run(case, initial, on_iteration or ignore, stop_requested or never, tell, command)
     if path is None:
-        return run.go(engine, None, None, workers or 1)
+        with run.helpers:
+            return run.go(engine, None, None, workers or 1)
     place = prepare_place(Path(path))
-    with Lock(place):
+    with Lock(place), run.helpers:
         remove_leftovers(place)
         if resume:
             previous = admit_resume(place, case, tell)
@@ -137,6 +143,9 @@ class _Run:
         self.constraints: Floats | None = None
         self.combining = Combining(case)
         self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
+        self.conclusion: Conclusion | None = None
+        #: what is to be closed in the end
+        self.helpers = ExitStack()
 
     def go(self, make: MakeEngine, path: Path | None, previous: ResultView | None, workers: int) -> Outcome:
         """The whole run."""
@@ -146,6 +155,11 @@ class _Run:
         if make is make_engine:
             compile_apart(self.case, self.notify)
         engine = make(self.case)
+        if self.case.uncertainty is not None:
+            from mdstopo.robust.helpers import compile_kinds, employ
+
+            compile_kinds(engine, self.notify)
+            workers = employ(engine, self.case, workers, self.helpers)
         problem = problem_of(engine, even(self.case))
         stated, begin, self.before = get_ready(self.case, engine, problem, self.initial)
         self.compare(stated, begin)
@@ -298,6 +312,12 @@ class _Run:
                 self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
         self.warnings += advise(self.case, state.best_alpha, self.before, after)
         self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients)
+        if self.case.uncertainty is not None and evaluation.status.usable:
+            from mdstopo.robust.helpers import concluded
+
+            self.conclusion = concluded(engine, state.best_alpha)
+            self.finals |= self.conclusion.part
+            self.warnings += self.conclusion.warnings
 
     def judge(self, best: int, status: RunStatus, reason: str) -> tuple[RunStatus, str]:
         """The status, where no design keeps the constraints: then the optimiser has converged to nothing of use."""
@@ -391,6 +411,7 @@ class _Run:
             compile_seconds=compile_seconds,
             integrator=engine.integrator,
             integrator_reason=engine.integrator_reason,
+            conclusion=self.conclusion,
         )
 
 

@@ -48,6 +48,8 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, str]]:
         if isinstance(kind, str) and not any(f.name == "type" for f in fields(value)):
             yield _join(path, "type"), kind
         ignored = _IGNORED.get(type(value), set())
+        if isinstance(value, Case) and value.uncertainty is None:
+            ignored = ignored | {"uncertainty"}  # as before there was such a section
         for f in fields(value):
             if f.name not in ignored and hasattr(value, f.name):
                 yield from _leaves(_key(path, f.name, value), getattr(value, f.name))

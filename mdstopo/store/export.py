@@ -18,7 +18,7 @@ _AXES = ("x", "y", "psi")
 
 
 def tables(view: ResultView, case: Case) -> dict[str, Table]:
-    """Header and rows by name: members, iterations, front, sweep, each load case's trajectory."""
+    """Header and rows by name: members, iterations, front, sweep, samples, each load case's trajectory."""
     found: dict[str, Table] = {"members": _members(view)}
     names = view.lines("objectives")
     iterations = view.under("iterations")
@@ -37,6 +37,9 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
         named = {path.removeprefix("sweep/values/"): value for path, value in values.items()}
         sweep = {key: value for key, value in sweep.items() if key != "alpha" and value.ndim <= 2}
         found["sweep"] = _columns("run", named | sweep, {"objectives": names}, "objectives")
+    for name, group in (("sample", "uncertainty"), ("fresh-sample", "uncertainty/validation")):
+        if f"{group}/objectives" in view.arrays:
+            found[name] = _points(view, group)
     for load_case in case.load_cases:
         motion = view.under(f"trajectories/{load_case.name}")
         if "q" in motion:
@@ -65,6 +68,17 @@ def _members(view: ResultView) -> Table:
             whole[places] = values
             header.append(name)
             columns.append(whole.tolist())
+    return header, [list(row) for row in zip(*columns, strict=True)]
+
+
+def _points(view: ResultView, group: str) -> Table:
+    """The points of a sample of an uncertain case, and the values there."""
+    names, objectives = view.lines("uncertainty/keys"), view.lines("objectives")
+    values, found = view.array(f"{group}/sample"), view.array(f"{group}/objectives")
+    limits = view.array(f"{group}/constraints")
+    header = ["point", "scenario", *names, *objectives, *(f"constraints {i}" for i in range(limits.shape[1]))]
+    columns: list[Any] = [range(len(found)), view.lines(f"{group}/scenario")]
+    columns += [*values.T.tolist(), *found.T.tolist(), *limits.T.tolist()]
     return header, [list(row) for row in zip(*columns, strict=True)]
 
 

@@ -22,6 +22,10 @@ joints: [{name: pin, type: revolute, bodies: [ground, arm], at: [0, 0]}]
 motions: [{body: arm, angle: {acceleration: {file: turn.csv}}}]
 """
 
+UNCERTAIN = """\
+uncertainty: {parameters: {bodies.cargo.mass: {normal: {deviation: 5}}}, sample: 4, validation: 30}
+"""
+
 
 def named() -> dict[str, str]:
     """The paths in the tables and in the sentence on scales, each with the pattern that it stands for."""
@@ -44,12 +48,14 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     folder = tmp_path_factory.mktemp("results")
     (boat,) = [block for block in blocks(PAGE) if block.title == "boat.yaml"]
     (folder / boat.title).write_text(boat.text, encoding="utf-8")
+    (folder / "windy.yaml").write_text(boat.text + UNCERTAIN, encoding="utf-8")
     (folder / "jointed.yaml").write_text(JOINTED, encoding="utf-8")
     (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
     for command in (
         "simulate jointed.yaml",
         "simulate boat.yaml",
         "run boat.yaml",
+        "run windy.yaml",
         "run boat.yaml --alpha results/boat.simulate.h5 --out results/again.h5",
         "gradient boat.yaml --history --differences --members 2",
         "pareto boat.yaml --points 2 --starts 1",

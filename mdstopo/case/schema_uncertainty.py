@@ -1,0 +1,158 @@
+"""Format 1 of the case file: the section `uncertainty`. See `mdstopo.case.schema`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mdstopo.case.kinds import Kind, Number, Schema, explained
+from mdstopo.case.nodes import MAPPING, SEQUENCE, Node
+from mdstopo.case.reading import BAD, Reading, found
+from mdstopo.case.records import ByName, Key, Named, Record
+from mdstopo.case.rows import Rows
+from mdstopo.case.schema_scene import NOT_NEGATIVE, NUMBER, POSITIVE
+from mdstopo.case.value import Value, frozen
+from mdstopo.case.words import inside
+
+
+@frozen
+class Anything(Value):
+    """Any value: what it may be is decided where it is put."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """Python's numbers, texts, truth values, None, lists and dicts of them."""
+        if node.kind == MAPPING:
+            return {name: self.read(value, inside(path, name), reading) for name, (_, value) in node.entries.items()}
+        if node.kind == SEQUENCE:
+            return [self.read(item, f"{path}[{index}]", reading) for index, item in enumerate(node.items)]
+        return node.scalar()
+
+    def schema(self) -> Schema:
+        """No limits."""
+        return {}
+
+
+@frozen
+class ByKey(Value):
+    """A mapping from keys that are no names: paths of keys of the case, or places in a list. what: both in words."""
+
+    what: str
+    item: Kind
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """dict (values may be BAD) or BAD."""
+        if node.kind != MAPPING:
+            reading.mistake(path, f"found {found(node)}, allowed is a mapping from {self.what}", node)
+            return BAD
+        values = {}
+        for text, (key, value) in node.entries.items():
+            here = inside(path, text)
+            reading.mark(here, value, key)
+            values[text] = self.item.read(value, here, reading)
+        return values
+
+    def schema(self) -> Schema:
+        """object of values."""
+        return {"type": "object", "additionalProperties": self.item.schema()}
+
+
+_DISTRIBUTIONS = {
+    "normal": (
+        Record(
+            "a normal distribution",
+            (
+                Key("mean", NUMBER, "mean", unit="the number's unit", otherwise="the number in the case"),
+                Key("deviation", POSITIVE, "standard deviation", required=True, unit="the number's unit"),
+                Key("from", NUMBER, "smaller values are left out", unit="the number's unit", otherwise="no limit"),
+                Key("to", NUMBER, "larger values are left out", unit="the number's unit", otherwise="no limit"),
+            ),
+            doc="The normal distribution; with `from` or `to` what is left of it between them.",
+        ),
+        "normal, perhaps truncated",
+    ),
+    "lognormal": (
+        Record(
+            "a lognormal distribution",
+            (
+                Key("mean", POSITIVE, "mean", unit="the number's unit", otherwise="the number in the case"),
+                Key("deviation", POSITIVE, "standard deviation", required=True, unit="the number's unit"),
+            ),
+            doc="A positive number whose logarithm is normal. Mean and deviation are the number's own.",
+        ),
+        "lognormal: positive, skewed",
+    ),
+    "uniform": (
+        Record(
+            "a uniform distribution",
+            (
+                Key("from", NUMBER, "the least value", required=True, unit="the number's unit"),
+                Key("to", NUMBER, "the largest value", required=True, unit="the number's unit"),
+            ),
+            doc="All values between two are equally likely.",
+        ),
+        "uniform between two values",
+    ),
+}
+_DISTRIBUTION = Record(
+    "a distribution",
+    (
+        *(Key(name, record, doc) for name, (record, doc) in _DISTRIBUTIONS.items()),
+        Key("discrete", Rows(("value", "probability"), "free"), "a few values, each with its probability, of sum 1"),
+    ),
+    one_of=(("normal", "lognormal", "uniform", "discrete"),),
+    doc="How a number varies. Numbers vary independently of each other; what varies together is a scenario.",
+)
+_SCENARIO = Record(
+    "a scenario",
+    (
+        Key(
+            "probability",
+            Number(above=0, maximum=1),
+            "how likely it is; stated in all scenarios or in none, of sum 1",
+            otherwise="the same for all",
+        ),
+        Key("set", ByKey("keys of the case to values", Anything()), "keys of the case, and their values here"),
+    ),
+    doc="Values that occur together. Every scenario meets the whole sample of the numbers.",
+)
+_MEASURES = explained(
+    {
+        "mean": "the mean of all values",
+        "mean_deviation": "the mean and `factor` standard deviations towards the worse",
+        "worst": "the worst of all values",
+        "quantile": "what the share `level` of all values reaches or betters",
+        "nominal": "the value of the case as it is written, without anything uncertain",
+    }
+)
+_MEASURE = Record(
+    "a measure",
+    (
+        Key("measure", _MEASURES, "what becomes of the values at all points of the sample", required=True),
+        Key("factor", NOT_NEGATIVE, "k of mean_deviation", otherwise="1"),
+        Key("level", Number(above=0, maximum=1), "of quantile; 1 is the worst", otherwise="0.9"),
+    ),
+    doc="One number of many. Worse is larger where an objective is minimised or a limit is kept, else smaller.",
+)
+UNCERTAINTY = Record(
+    "uncertainty",
+    (
+        Key("parameters", ByKey("key paths to distributions", _DISTRIBUTION), "numbers that vary, by key path"),
+        Key("scenarios", Named(_SCENARIO, "scenario", 1), "what varies together, by name"),
+        Key("sample", Number(minimum=2, maximum=10**5, whole=True), "points for each scenario", default=64),
+        Key("seed", Number(minimum=0, maximum=2**53, whole=True), "of both samples", default=0),
+        Key(
+            "validation",
+            Number(minimum=0, maximum=10**6, whole=True),
+            "points of the fresh random sample that the final design is tried on; 0, or at least 30",
+            default=256,
+        ),
+        Key("objectives", ByName("objective", _MEASURE, "measure"), "what objectives become", otherwise="mean"),
+        Key(
+            "constraints",
+            ByKey("places of constraints, from 0, to measures", _MEASURE),
+            "what bounded responses become, by place in `constraints`",
+            otherwise="worst; mean with `equals`",
+        ),
+    ),
+    any_of=("parameters", "scenarios"),
+    doc="What is not known for certain, and how it is taken into account.",
+)

@@ -1,0 +1,305 @@
+"""The section `uncertainty`: keys that lead to numbers, distributions that make sense, measures that fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.model import ResponseRow, VolumeRow
+from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.overrides import WrongPathError, as_yaml, steps_of
+from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
+from mdstopo.case.scalars import to_float
+from mdstopo.case.uncertain import (
+    Discrete,
+    Distribution,
+    Lognormal,
+    Measure,
+    Normal,
+    Scenario,
+    UncertainNumber,
+    Uncertainty,
+    Uniform,
+)
+from mdstopo.case.words import did_you_mean, inside, listed, number_text, shown
+
+#: by how much stated probabilities may miss the sum 1: thirds are written 0.333
+ROUNDED = 0.01
+#: points that an interval of confidence needs at least
+LEAST_VALIDATION = 30
+
+_MEANS = {
+    "format": "is the format's version",
+    "title": "is a name",
+    "design": "says what is designed",
+    "combine": "says how objectives are weighted",
+    "optimizer": "says how the design is improved",
+    "solver": "says how motions are computed",
+    "uncertainty": "says what is uncertain",
+}
+_FILTERS = {"min_length": "which members there are", "max_length": "which members there are", "cost": "volumes"}
+
+
+def build_uncertainty(
+    top: Fields, constraints: Sequence[VolumeRow | ResponseRow], root: Node, reading: Reading
+) -> Uncertainty | None:
+    """The section; None where it could not be read. root: the whole case."""
+    fields = top["uncertainty"]
+    if not isinstance(fields, Fields):
+        return None
+    numbers = _numbers(fields, root, reading)
+    scenarios = _scenarios(fields, root, {each.key for each in numbers}, reading)
+    objectives = _objectives(fields, top, reading)
+    rows = _constraints(fields, top, constraints, reading)
+    if fields["validation"] is not BAD and 0 < fields["validation"] < LEAST_VALIDATION:
+        message = f"found {fields['validation']}, allowed is 0 or at least {LEAST_VALIDATION}"
+        reading.mistake(inside(fields.path, "validation"), message)
+    if not fields["parameters"] and fields["parameters"] is not BAD:
+        for key in ("sample", "validation", "seed"):
+            if key in fields.stated:
+                message = "ignored: without `parameters` the scenarios are all there is"
+                reading.warning(inside(fields.path, key), message)
+    if not is_good(fields):
+        return None
+    return Uncertainty(
+        numbers=tuple(numbers),
+        scenarios=tuple(scenarios),
+        sample=fields["sample"],
+        seed=fields["seed"],
+        validation=fields["validation"],
+        objectives=FrozenDict(objectives),
+        constraints=FrozenDict(rows),
+    )
+
+
+# Numbers.
+
+
+def _numbers(fields: Fields, root: Node, reading: Reading) -> list[UncertainNumber]:
+    """What varies by itself; mistakes are noted."""
+    path = inside(fields.path, "parameters")
+    if fields["parameters"] == {}:
+        reading.mistake(path, "found {}, needed is at least one key of the case with its distribution")
+    built: dict[str, UncertainNumber] = {}
+    for stated, keys in _items(fields["parameters"]):
+        here = inside(path, stated)
+        try:
+            key, node = _led_to(stated, root)
+        except WrongPathError as error:
+            reading.mistake(here, error.message)
+            continue
+        nominal = _number(node)
+        if not math.isfinite(nominal):
+            reading.mistake(here, f"found {found(node)} at {key}; a distribution belongs to one number")
+        elif key in built:
+            reading.mistake(here, f"{key} has a distribution already")
+        elif keys is not BAD and keys.good():
+            distribution = _distribution(keys, nominal, reading)
+            if distribution is not None:
+                built[key] = UncertainNumber(key, nominal, distribution)
+    return list(built.values())
+
+
+def _items(stated: Any) -> list[tuple[str, Any]]:
+    return list(stated.items()) if isinstance(stated, dict) else []
+
+
+def _number(node: Node) -> float:
+    """The finite number at a node, else NaN."""
+    value = node.scalar() if node.kind == SCALAR else None
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    number = to_float(value)
+    return number if math.isfinite(number) else math.nan
+
+
+def _led_to(stated: str, root: Node) -> tuple[str, Node]:
+    """The key path as messages write it, and what stands there. Raises WrongPathError with the reason."""
+    steps = steps_of(stated)
+    node, path = root, ""
+    for step in steps:
+        before = path or "the case"
+        if node.kind == MAPPING:
+            name = str(step)
+            entry = node.entries.get(name)
+            if entry is None:
+                hint = did_you_mean(name, node.entries)
+                message = f"{before} states no {shown(name)}{hint or ';'} it states {listed(node.entries) or 'nothing'}"
+                raise WrongPathError(path, message)
+            node, path = entry[1], inside(path, name)
+        elif node.kind == SEQUENCE:
+            index = int(step) if isinstance(step, int) or (step.isascii() and step.isdigit()) else -1
+            if not 0 <= index < len(node.items):
+                message = f"{before} is a list of {len(node.items)}; {shown(str(step))} is none of its places"
+                raise WrongPathError(path, message)
+            node, path = node.items[index], f"{path}[{index}]"
+        else:
+            raise WrongPathError(path, f"{before} is a single value; {shown(str(step))} is not in it")
+    _refuse_fixed(path, [str(step) for step in steps], root)
+    return path, node
+
+
+def _refuse_fixed(path: str, steps: list[str], root: Node) -> None:
+    """Numbers that say what the problem is, not what the scene is like."""
+    section = steps[0]
+    why = f"`{section}` {_MEANS[section]}" if section in _MEANS else ""
+    if section == "members" and len(steps) > 2 and steps[2] in _FILTERS:
+        why = f"`{steps[2]}` decides {_FILTERS[steps[2]]}"
+    elif section == "points" and "count" in steps:
+        why = "`count` decides which members there are"
+    elif section == "constraints" and len(steps) > 1 and _stands([*steps[:2], "volume"], root):
+        why = "a volume is as certain as the design"
+    if why:
+        raise WrongPathError(path, f"{path} cannot be uncertain: {why}")
+
+
+def _distribution(keys: Fields, nominal: float, reading: Reading) -> Distribution | None:
+    (kind,) = keys.stated & {"normal", "lognormal", "uniform", "discrete"}
+    stated, path = keys[kind], inside(keys.path, kind)
+    if kind == "discrete":
+        values, shares = stated[:, 0].tolist(), stated[:, 1].tolist()
+        if min(shares) < 0.0 or abs(math.fsum(shares) - 1.0) > ROUNDED:
+            total = number_text(math.fsum(shares))
+            reading.mistake(path, f"found probabilities of sum {total}, allowed are such >= 0 of sum 1")
+            return None
+        return Discrete(tuple(values), _scaled(shares))
+    if kind == "uniform":
+        return Uniform(stated["from"], stated["to"]) if _rises(stated["from"], stated["to"], path, reading) else None
+    mean = nominal if stated["mean"] is None else stated["mean"]
+    if kind == "lognormal":
+        if mean <= 0.0:
+            reading.mistake(path, f"found the mean {number_text(mean)}, allowed is a number > 0")
+            return None
+        return Lognormal(mean, stated["deviation"])
+    low, high = stated["from"], stated["to"]
+    if low is not None and high is not None and not _rises(low, high, path, reading):
+        return None
+    made = Normal(mean, stated["deviation"], low, high)
+    reach = 6.0 * made.deviation
+    if (low is not None and low > mean + reach) or (high is not None and high < mean - reach):
+        reading.mistake(path, "next to nothing of the distribution is between `from` and `to`")
+        return None
+    return made
+
+
+def _rises(low: float, high: float, path: str, reading: Reading) -> bool:
+    if low < high:
+        return True
+    reading.mistake(inside(path, "to"), f"found {number_text(high)}, allowed is a number above {number_text(low)}")
+    return False
+
+
+def _scaled(shares: Sequence[float]) -> tuple[float, ...]:
+    total = math.fsum(shares)
+    return tuple(share / total for share in shares)
+
+
+# Scenarios.
+
+
+def _scenarios(fields: Fields, root: Node, numbers: set[str], reading: Reading) -> list[Scenario]:
+    path = inside(fields.path, "scenarios")
+    stated = {name: keys for name, keys in _items(fields["scenarios"]) if isinstance(keys, Fields)}
+    given = [name for name, keys in stated.items() if keys["probability"] is not None]
+    shares = [1.0] * len(stated)
+    if given and len(given) < len(stated):
+        lacking = listed(name for name in stated if name not in given)
+        reading.mistake(path, f"the probability of {lacking} is missing; all scenarios have one, or none")
+    elif given and all(stated[name]["probability"] is not BAD for name in given):
+        shares = [keys["probability"] for keys in stated.values()]
+        if abs(math.fsum(shares) - 1.0) > ROUNDED:
+            total = number_text(math.fsum(shares))
+            reading.mistake(path, f"found probabilities of sum {total}, allowed are such of sum 1")
+    built = []
+    for (name, keys), share in zip(stated.items(), _scaled(shares) if shares else (), strict=True):
+        where = inside(keys.path, "set")
+        values = {}
+        for key, value in _items(keys["set"]):
+            here = inside(where, key)
+            try:
+                settled = _settled(key, root)
+            except WrongPathError as error:
+                reading.mistake(here, error.message)
+                continue
+            if settled in numbers:
+                reading.mistake(here, f"{settled} has a distribution; it varies by itself or by scenario, not both")
+            values[settled] = as_yaml(value)
+        built.append(Scenario(name, share, FrozenDict(values)))
+    return built
+
+
+def _settled(key: str, root: Node) -> str:
+    """A key path of a scenario as messages write it; what the case does not state may be set all the same."""
+    try:
+        return _led_to(key, root)[0]
+    except WrongPathError:
+        steps = [str(step) for step in steps_of(key)]
+        if _stands(steps, root):
+            raise
+        _refuse_fixed(key, steps, root)
+        return ".".join(steps)
+
+
+def _stands(steps: Sequence[str], root: Node) -> bool:
+    """Whether something stands at a key path."""
+    node = root
+    for step in steps:
+        if node.kind == MAPPING and step in node.entries:
+            node = node.entries[step][1]
+        elif node.kind == SEQUENCE and step.isdigit() and int(step) < len(node.items):
+            node = node.items[int(step)]
+        else:
+            return False
+    return True
+
+
+# Measures.
+
+
+def _measure(keys: Any, default: Measure, reading: Reading) -> Measure:
+    if not isinstance(keys, Fields) or not keys.good():
+        return default
+    name = keys["measure"]
+    for key, owner in (("factor", "mean_deviation"), ("level", "quantile")):
+        if key in keys.stated and name != owner:
+            reading.mistake(inside(keys.path, key), f"{key} belongs to {owner}, not to {name}")
+    factor = 1.0 if keys["factor"] is None else keys["factor"]
+    level = 0.9 if keys["level"] is None else keys["level"]
+    return Measure(name, factor if name == "mean_deviation" else 0.0, level if name == "quantile" else 1.0)
+
+
+def _objectives(fields: Fields, top: Fields, reading: Reading) -> dict[str, Measure]:
+    stated = dict(_items(fields["objectives"]))
+    named = top["objectives"] if isinstance(top["objectives"], dict) else {}
+    return {name: _measure(stated.get(name), Measure("mean"), reading) for name in named}
+
+
+def _constraints(
+    fields: Fields, top: Fields, constraints: Sequence[VolumeRow | ResponseRow], reading: Reading
+) -> dict[int, Measure]:
+    path = inside(fields.path, "constraints")
+    stated: dict[int, Any] = {}
+    count = len(top["constraints"]) if isinstance(top["constraints"], (list, tuple)) else 0
+    for text, keys in _items(fields["constraints"]):
+        here = inside(path, text)
+        place = int(text) if text.isascii() and text.isdigit() else -1
+        if not 0 <= place < count:
+            allowed = f"a place below {count}" if count else "none: there are no constraints"
+            reading.mistake(here, f"found {shown(text)}, allowed is {allowed}")
+            continue
+        stated[place] = keys
+        if len(constraints) != count or keys is BAD:
+            continue
+        row = constraints[place]
+        if isinstance(row, VolumeRow):
+            reading.mistake(here, f"constraints[{place}] bounds a volume, which is as certain as the design")
+        elif row.sense == "equals" and keys["measure"] not in (BAD, "mean", "nominal"):
+            message = f"found {keys['measure']}, allowed is mean or nominal: not every value can equal a bound"
+            reading.mistake(inside(here, "measure"), message)
+    return {
+        place: _measure(stated.get(place), Measure("mean" if row.sense == "equals" else "worst"), reading)
+        for place, row in enumerate(constraints)
+        if isinstance(row, ResponseRow)
+    }

@@ -1,0 +1,17 @@
+"""Which evaluator a case needs."""
+
+from mdstopo.case.model import Case
+from mdstopo.engine import Evaluator
+
+
+def evaluator_of(case: Case, beside: bool = True) -> Evaluator:
+    """The case compiled, with its whole sample where something in it is uncertain.
+
+    beside: as of `Evaluator`. Raises CaseError where the case asks for what the engine cannot do, or is none at a point
+    of its sample.
+    """
+    if case.uncertainty is None:
+        return Evaluator(case, beside)
+    from mdstopo.robust.ensemble import Ensemble
+
+    return Ensemble(case, beside)

@@ -1,0 +1,5 @@
+"""Designs for what is not known for certain: a fixed sample of the case, evaluated as one.
+
+`sample` makes the points, `points` the case at one of them, `measures` one number of many, `ensemble` evaluates,
+`crew` does so in several processes, `conclusion` says at the end what became of it.
+"""

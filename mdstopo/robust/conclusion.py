@@ -1,0 +1,204 @@
+"""What became of an uncertain case: nominal and robust values of the final design, and what a fresh sample says."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.uncertain import Measure
+from mdstopo.evaluation import Evaluation, FloatArray
+from mdstopo.optimizer.structure import sign_of
+from mdstopo.robust.crew import Crew
+from mdstopo.robust.ensemble import NOMINAL, Ensemble
+from mdstopo.robust.intervals import Estimate, estimate
+from mdstopo.robust.sample import Sample, check_sample
+from mdstopo.robust.trial import Trial, tried
+from mdstopo.store.contents import Datasets
+
+
+@dataclass(frozen=True)
+class Robust:
+    """One objective, or one bounded response, of the final design.
+
+    name: of the objective, or `constraints[i]`. measure: in words. nominal: the value of the case as it is written.
+    value: the measure over the design's sample. check: the measure over the fresh sample, None without one. worse:
+    share of that sample which is worse than `value`. kept: share of it that keeps the constraint; None for objectives.
+    sign: 1 where larger is worse, else -1.
+    """
+
+    name: str
+    measure: str
+    nominal: float
+    value: float
+    check: Estimate | None
+    worse: float | None
+    kept: float | None
+    sign: float = 1.0
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether the value is better than the whole interval: then the design fits its own sample."""
+        if self.check is None or self.agrees:
+            return False
+        return (self.value < self.check.low) == (self.sign > 0.0)
+
+    @property
+    def agrees(self) -> bool | None:
+        """Whether the value is within the interval of the fresh sample's; None without one."""
+        return None if self.check is None else self.check.holds(self.value)
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """By objective, then by bounded response; points of the fresh sample, and of those that could not be computed."""
+
+    results: tuple[Robust, ...]
+    points: int
+    lost: int
+    part: Datasets
+    warnings: tuple[str, ...]
+
+    def of(self, name: str) -> Robust | None:
+        """That of an objective or a constraint; None where there is none."""
+        return next((each for each in self.results if each.name == name), None)
+
+
+def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, crew: Crew | None) -> Conclusion:
+    """Try the final design alpha (N,), which `found` evaluated, on the nominal case, every point and a fresh sample."""
+    case, sample = engine.case, engine.sample
+    places = range(len(sample))
+    parts = engine.all_parts(alpha)
+    rows = {i: row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
+    objectives = np.array([[parts[i].peaks[each.name][0].value for each in case.objectives] for i in places])
+    responses = _responses(case, found, [{j: parts[i].limits[j][0].value for j in rows} for i in places])
+    nominal = engine.points[NOMINAL].evaluate(alpha, gradient=False)
+    fresh = check_sample(engine.uncertainty)
+    trials = [] if fresh is None else _trials(case, fresh, alpha, crew)
+    usable = [trial for trial in trials if not trial.reason]
+    lost = len(trials) - len(usable)
+    warnings: tuple[str, ...] = ()
+    if lost:
+        reason = next(trial.reason for trial in trials if trial.reason)
+        warnings = (f"{lost} of {len(trials)} points of the fresh sample cannot be computed: {reason}",)
+    enough = len(usable) > 1
+    results = []
+    for j, objective in enumerate(case.objectives):
+        measure = engine.uncertainty.objectives[objective.name]
+        values = np.array([trial.objectives[j] for trial in usable])
+        results.append(
+            _robust(
+                objective.name, objective, measure, nominal.objectives[objective.name],
+                found.objectives[objective.name], objectives[:, j], values if enough else None, sample,
+            )
+        )  # fmt: skip
+    for i, row in rows.items():
+        values = np.array([trial.responses[i] for trial in usable]) + row.bound
+        measure, here = engine.uncertainty.constraints[i], responses[:, i] + row.bound
+        results.append(
+            _robust(
+                f"constraints[{i}]", row, measure, float(nominal.constraints[i]) + row.bound,
+                float(found.constraints[i]) + row.bound, here, values if enough else None, sample,
+            )
+        )  # fmt: skip
+    warnings += tuple(_fitted(each) for each in results if each.is_fitted)
+    part = _part(case, sample, objectives, responses, results)
+    if fresh is not None:
+        part |= _check_part(case, fresh, trials, results)
+    return Conclusion(tuple(results), len(trials), lost, part, warnings)
+
+
+def _trials(case: Case, fresh: Sample, alpha: FloatArray, crew: Crew | None) -> list[Trial]:
+    if crew is not None:
+        return crew.trials(case, fresh, alpha)
+    return [tried(case, fresh, i, alpha) for i in range(len(fresh))]
+
+
+def _robust(
+    name: str,
+    of: Objective | ResponseRow,
+    measure: Measure,
+    nominal: float,
+    value: float,
+    values: FloatArray,
+    fresh: FloatArray | None,
+    sample: Sample,
+) -> Robust:
+    """One result; values (S,) at the points of the sample, fresh (V,) at those of the other, None where not enough."""
+    sign = sign_of(of) if isinstance(of, Objective) else (-1.0 if of.sense == "at_least" else 1.0)
+    if fresh is None or measure.name == "nominal":
+        return Robust(name, measure.words, nominal, value, None, None, None, sign)
+    level = replace(measure, level=_level_of_worst(sign * values, sample)) if measure.name == "worst" else measure
+    found = estimate(level, sign * fresh)
+    low, high = (found.low, found.high) if sign > 0.0 else (-found.high, -found.low)
+    kept = None
+    if isinstance(of, ResponseRow) and of.sense != "equals":
+        kept = float(np.mean(sign * fresh <= sign * of.bound))
+    worse = float(np.mean(sign * fresh > sign * value))
+    return Robust(name, measure.words, nominal, value, Estimate(sign * found.value, low, high), worse, kept, sign)
+
+
+def _fitted(found: Robust) -> str:
+    assert found.check is not None
+    return (
+        f"{found.name} is {found.value:.6g} over its own sample, better than the interval {found.check.low:.6g} to "
+        f"{found.check.high:.6g} of the fresh one: the design fits its sample; take a larger uncertainty.sample"
+    )
+
+
+def _level_of_worst(y: FloatArray, sample: Sample) -> float:
+    """The level of the quantile that the worst of the sample is: of its points, or of those of its scenario."""
+    scenario = sample.scenario == sample.scenario[int(np.argmax(y))]
+    return 1.0 - float(sample.probability[scenario].sum()) / (int(scenario.sum()) + 1)
+
+
+def _responses(case: Case, found: Evaluation, limits: Sequence[Mapping[int, float]]) -> FloatArray:
+    """(S, n_con): values less bounds at each point; volume rows are the same everywhere."""
+    responses = np.tile(found.constraints, (len(limits), 1))
+    for i, each in enumerate(limits):
+        for j, value in each.items():
+            responses[i, j] = value - case.constraints[j].bound
+    return responses
+
+
+def _part(
+    case: Case,
+    sample: Sample,
+    objectives: FloatArray,
+    responses: FloatArray,
+    results: Sequence[Robust],
+) -> Datasets:
+    assert case.uncertainty is not None
+    return {
+        "uncertainty/keys": [number.key for number in case.uncertainty.numbers],
+        "uncertainty/sample": sample.values,
+        "uncertainty/probability": sample.probability,
+        "uncertainty/scenario": _scenarios(case, sample),
+        "uncertainty/objectives": objectives,
+        "uncertainty/constraints": responses,
+        "uncertainty/measures": [each.measure for each in results],
+        "uncertainty/results": [each.name for each in results],
+        "uncertainty/nominal": np.array([each.nominal for each in results]),
+        "uncertainty/robust": np.array([each.value for each in results]),
+    }
+
+
+def _check_part(case: Case, fresh: Sample, trials: Sequence[Trial], results: Sequence[Robust]) -> Datasets:
+    nothing = float("nan")
+    checks = [each.check or Estimate(nothing, nothing, nothing) for each in results]
+    return {
+        "uncertainty/validation/sample": fresh.values,
+        "uncertainty/validation/scenario": _scenarios(case, fresh),
+        "uncertainty/validation/objectives": np.array([trial.objectives for trial in trials]),
+        "uncertainty/validation/constraints": np.array([trial.responses for trial in trials]),
+        "uncertainty/validation/measured": np.array([each.value for each in checks]),
+        "uncertainty/validation/interval": np.array([[each.low, each.high] for each in checks]),
+        "uncertainty/validation/worse": np.array([nothing if r.worse is None else r.worse for r in results]),
+        "uncertainty/validation/kept": np.array([nothing if r.kept is None else r.kept for r in results]),
+    }
+
+
+def _scenarios(case: Case, sample: Sample) -> list[str]:
+    assert case.uncertainty is not None
+    names = [scenario.name for scenario in case.uncertainty.scenarios]
+    return [names[place] if place >= 0 else "" for place in sample.scenario.tolist()]

@@ -1,0 +1,223 @@
+"""Many variants of a case evaluated as one: an `Evaluator` whose objectives are measures over a sample.
+
+Motions, frequencies and what else belongs to one scene are those of the nominal case.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.uncertain import Measure
+from mdstopo.engine import Evaluator
+from mdstopo.error_estimate import ErrorEstimate
+from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.integrators.steps import WORK_NAMES
+from mdstopo.optimizer.structure import competes, sign_of
+from mdstopo.robust.measures import rows, slopes
+from mdstopo.robust.points import case_at, name_of, nominal_case
+from mdstopo.robust.sample import Sample, design_sample
+from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.robust.crew import Crew
+
+#: the nominal case's place among the points
+NOMINAL = -1
+
+
+@dataclass(frozen=True)
+class Part:
+    """What one point gives: what competes, by objective and by constraint's place; how it ended; the work done."""
+
+    peaks: Mapping[str, tuple[Peak, ...]]
+    limits: Mapping[int, tuple[Peak, ...]]
+    status: Status
+    message: str
+    work: Mapping[str, int]
+
+
+class Ensemble(Evaluator):
+    """An uncertain case, ready to be evaluated again and again.
+
+    points: evaluators of those points of the sample that this process computes, and of the nominal case, by place.
+    Raises CaseError where the case at a point is none, with the point and its values.
+    """
+
+    def __init__(
+        self, case: Case, beside: bool = True, points: dict[int, Evaluator] | None = None, crew: "Crew | None" = None
+    ) -> None:
+        assert case.uncertainty is not None
+        super().__init__(case, beside)
+        self.uncertainty = case.uncertainty
+        self.sample: Sample = design_sample(case.uncertainty)
+        self.crew = crew
+        self._bounds_here = [row.bound for row in case.constraints]
+        measures = [self.uncertainty.objectives[name] for name in self._names]
+        measures += [self.uncertainty.constraints[i] for i in self._limits]
+        self._nominal_too = any(measure.name == "nominal" for measure in measures)
+        self._wanted = range(len(self.sample)) if any(m.name != "nominal" for m in measures) else range(0)
+        if points is None:
+            points = {i: Evaluator(case_at(case, self.sample, i), beside=False) for i in range(len(self.sample))}
+            points[NOMINAL] = Evaluator(nominal_case(case), beside=False)
+        self.points = points
+
+    # -- what a run asks
+
+    def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
+        """The measures of all objectives and constraints at a design alpha (N,), and on demand their gradients.
+
+        A point that cannot be computed fails the evaluation; the message names it and its values.
+        """
+        design = self.design(alpha)
+        wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
+        parts = self._parts(wanted, design, gradient, sensitivity)
+        status, message = self._verdict_of(parts)
+        counts = {name: sum(part.work[name] for part in parts.values()) for name in WORK_NAMES}
+        self._work += np.array([counts[name] for name in WORK_NAMES], dtype=np.int64)
+        looked: dict[str, tuple[Peak, ...]] = {}
+        if status.usable or status is Status.NO_GRADIENT:
+            looked = self._looked(parts)
+        found = self._evaluation(design, looked, gradient and status.usable, counts, status, message)
+        return replace(found, all_compete=True)
+
+    def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
+        """What `evaluate` found, and estimates of its errors: those of the points, weighted as the measure does.
+
+        A gradient's error leaves out that the weights of a deviation change with the values.
+        """
+        design = self.design(alpha)
+        values: dict[str, list[float]] = {name: [] for name in self._names}
+        errors: dict[str, list[ErrorEstimate]] = {name: [] for name in self._names}
+        nominal: Mapping[str, ErrorEstimate] = {}
+        for i, point in sorted(self.points.items()):
+            each = point.with_errors(design, point.evaluate(design, bool(found.gradients), sensitivity), sensitivity)
+            if not each.errors:
+                return replace(found, errors={})
+            if i == NOMINAL:
+                nominal = each.errors
+                continue
+            for name in self._names:
+                values[name].append(each.objectives[name])
+                errors[name].append(each.errors[name])
+        return replace(found, errors={n: self._error(n, values[n], errors[n], nominal[n]) for n in self._names})
+
+    def _error(
+        self, name: str, values: Sequence[float], errors: Sequence[ErrorEstimate], nominal: ErrorEstimate
+    ) -> ErrorEstimate:
+        measure = self.uncertainty.objectives[name]
+        if measure.name == "nominal":
+            return nominal
+        sign = next(sign_of(each) for each in self.case.objectives if each.name == name)
+        weights = np.abs(slopes(measure, sign * np.array(values), self.sample.probability))
+        return ErrorEstimate(
+            float(weights @ np.array([each.value for each in errors])),
+            float(weights @ np.array([each.gradient for each in errors])),
+        )
+
+    def otherwise(self, **solver: Any) -> "Ensemble":
+        """As of `Evaluator`; every point has the settings."""
+        key = tuple(sorted(solver.items()))
+        if key not in self._others:
+            case = replace(self.case, solver=replace(self.case.solver, **solver))
+            points = {i: point.otherwise(**solver) for i, point in self.points.items()}
+            self._others[key] = Ensemble(case, self._compiles_beside, points)
+        found = self._others[key]
+        assert isinstance(found, Ensemble)
+        return found
+
+    def looking_at(self, objectives: Sequence[str]) -> "Ensemble":
+        """As of `Evaluator`."""
+        names = tuple(objectives)
+        if names == self._names:
+            return self
+        if names not in self._narrower:
+            chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
+            points = {i: point.looking_at(names) for i, point in self.points.items()}
+            self._narrower[names] = Ensemble(replace(self.case, objectives=chosen), False, points, self.crew)
+        found = self._narrower[names]
+        assert isinstance(found, Ensemble)
+        return found
+
+    @property
+    def held(self) -> int:
+        """Bytes of the steps that are held between calls."""
+        return super().held + sum(point.held for point in self.points.values())
+
+    # -- points
+
+    def employ(self, crew: "Crew | None") -> None:
+        """Have other processes compute most of the points from now on; None: this one alone."""
+        self.crew = crew
+        self._narrower.clear()
+
+    def all_parts(self, alpha: FloatArray) -> dict[int, Part]:
+        """What every point of the sample gives for a design alpha (N,), without gradients."""
+        return self._parts(range(len(self.sample)), self.design(alpha), False, None)
+
+    @property
+    def kinds(self) -> list[Case]:
+        """Cases at points that need other kernels than the nominal one, one of each kind."""
+        found = {bool(point.beyond): point.case for point in self.points.values()}
+        return [case for beyond, case in found.items() if beyond != bool(self.beyond)]
+
+    def part(self, i: int, design: FloatArray, gradient: bool, sensitivity: str | None) -> Part:
+        """What point i gives; NOMINAL: the nominal case."""
+        point = self.points[i]
+        found = point.evaluate(design, gradient, sensitivity)
+        limits = dict(found.constraint_peaks)
+        for place in limits:  # where the bound itself is uncertain, what counts is the distance to it
+            shift = point.case.constraints[place].bound - self._bounds_here[place]
+            if shift != 0.0:
+                limits[place] = tuple(replace(peak, value=peak.value - shift) for peak in limits[place])
+        return Part(found.peaks, limits, found.status, found.message, found.work)
+
+    def _parts(
+        self, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None
+    ) -> dict[int, Part]:
+        if self.crew is None:
+            return {i: self.part(i, design, gradient, sensitivity) for i in wanted}
+        return self.crew.parts(self, wanted, design, gradient, sensitivity)
+
+    def _verdict_of(self, parts: Mapping[int, Part]) -> tuple[Status, str]:
+        """How the points ended as one: as the first that is not usable, else the first whose gradient is one-sided."""
+        wrong = [i for i in sorted(parts) if not parts[i].status.usable]
+        wrong += [i for i in sorted(parts) if not parts[i].status.ok]
+        if not wrong:
+            return Status.OK, next((part.message for part in parts.values() if part.message), "")
+        (i, *_), first = wrong, parts[wrong[0]]
+        where = "in the nominal case" if i == NOMINAL else name_of(self.case, self.sample, i)
+        return first.status, f"{first.message}, {where}" if first.message else where
+
+    def _looked(self, parts: Mapping[int, Part]) -> dict[str, tuple[Peak, ...]]:
+        """The rows of each measure."""
+        looked = {}
+        for objective in self.case.objectives:
+            found = {i: part.peaks[objective.name] for i, part in parts.items()}
+            measure = self.uncertainty.objectives[objective.name]
+            looked[objective.name] = self._measured(objective, measure, found, sign_of(objective))
+        for place in self._limits:
+            row = self.case.constraints[place]
+            assert isinstance(row, ResponseRow)
+            found = {i: part.limits[place] for i, part in parts.items()}
+            measure = self.uncertainty.constraints[place]
+            sign = -1.0 if row.sense == "at_least" else 1.0
+            made = self._measured(row, measure, found, sign)
+            # an equality has one row for each of its sides, so that no others may stand in for it
+            looked[f"constraints[{place}]"] = made[:1] if row.sense == "equals" else made
+        return looked
+
+    def _measured(
+        self, of: Objective | ResponseRow, measure: Measure, found: Mapping[int, tuple[Peak, ...]], sign: float
+    ) -> tuple[Peak, ...]:
+        # what bounds a value from the good side is no row: the value itself stands for it
+        own = {i: peaks if competes(of, sign) else peaks[:1] for i, peaks in found.items()}
+        if measure.name == "nominal":
+            return own[NOMINAL]
+        return rows(measure, [own[i] for i in self._wanted], self.sample.probability, sign)
+
+    @property
+    def _limits(self) -> list[int]:
+        return [i for i, row in enumerate(self.case.constraints) if isinstance(row, ResponseRow)]

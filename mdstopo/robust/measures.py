@@ -1,0 +1,132 @@
+"""One number of many values, its slopes, and the rows by which an optimiser sees it.
+
+y (S,) are the values at the points of a sample, worse where larger, with probabilities p of sum 1:
+
+    mean              sum p y
+    mean_deviation    m + k s,   m = sum p y,   s^2 = sum p (y - m)^2
+    worst             max y
+    quantile          the smallest y at or below which at least the share `level` of p lies (an order statistic)
+
+Each y is itself the highest of the peaks that compete at its point, so a measure has kinks where peaks tie, and worst
+and quantile also where points do. What competes becomes rows, whose maximum the optimiser lowers (bound formulation):
+
+- `worst`: the peaks of all points.
+- `quantile`: the peaks of all points that do not exceed it. The k-th smallest of y is the least, over sets of k
+  points, of the set's maximum; so that maximum, over the points that are lowest now, is never below the quantile and
+  equals it now. What lowers it lowers the quantile.
+- `mean` and `mean_deviation`: the measure with other choices of one peak a point. Of the choices, which are as many as
+  products of peaks, those are taken that trade one family of peaks against another: at every point the earliest, the
+  latest, the second highest; then a change of one point's peak alone, those of the smallest loss first. The mean rises
+  with every y, so none of these rows exceeds it. The mean with deviations falls where a value far on the good side
+  rises; rows that exceed it for that reason are left out.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.uncertain import Measure
+from mdstopo.evaluation import FloatArray, Peak
+
+#: rows of one measure, at most; of those of a mean, at most
+ROWS, MEANS = 16, 8
+#: how far below the highest a row may lie, relative to it, as the engine's competing peaks
+WINDOW = 0.15
+#: what rounding leaves of sums of probabilities; of a deviation that is none, relative to the largest value
+_ROUNDING, _NONE = 1e-9, 1e-14
+
+
+def statistic(measure: Measure, y: FloatArray, p: FloatArray) -> float:
+    """The measure of values y (S,), worse where larger."""
+    if measure.name == "worst":
+        return float(y.max())
+    if measure.name == "quantile":
+        return float(y[_ranked(measure.level, y, p)[-1]])
+    mean = float((p * y).sum())
+    return mean + measure.factor * _deviation(y, p, mean) if measure.name == "mean_deviation" else mean
+
+
+def slopes(measure: Measure, y: FloatArray, p: FloatArray) -> FloatArray:
+    """d measure / d y, (S,)."""
+    if measure.name in ("worst", "quantile"):
+        level = 1.0 if measure.name == "worst" else measure.level
+        found = np.zeros(len(y))
+        found[_ranked(level, y, p)[-1] if level < 1.0 else int(np.argmax(y))] = 1.0
+        return found
+    if measure.name == "mean_deviation":
+        mean = float((p * y).sum())
+        deviation = _deviation(y, p, mean)
+        if deviation > 0.0:
+            return np.asarray(p * (1.0 + measure.factor * (y - mean) / deviation))
+    return p.copy()
+
+
+def rows(measure: Measure, parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> tuple[Peak, ...]:
+    """The rows of a measure, the worst first, which is the measure itself.
+
+    parts: at each point what competes there, worst first. sign: 1 where larger values are worse, else -1. A row's time
+    is NaN where it is of several points.
+    """
+    y = sign * np.array([part[0].value for part in parts])
+    if measure.name in ("worst", "quantile"):
+        level = 1.0 if measure.name == "worst" else measure.level
+        lowest = np.sort(_ranked(level, y, p)) if level < 1.0 else np.arange(len(y))
+        found = [peak for s in lowest.tolist() for peak in parts[s]]
+        found.sort(key=lambda peak: -sign * peak.value)
+        least = sign * found[0].value - WINDOW * abs(found[0].value)
+        return tuple(peak for peak in found[:ROWS] if sign * peak.value >= least)
+    made = [_row(measure, parts, choice, p, sign) for choice in _choices(parts, p, sign)]
+    least = sign * made[0].value - WINDOW * abs(made[0].value)
+    most = sign * made[0].value
+    others = [row for row in made[1:] if least <= sign * row.value <= most]
+    return (made[0], *sorted(others, key=lambda row: -sign * row.value))
+
+
+def _row(
+    measure: Measure, parts: Sequence[Sequence[Peak]], choice: tuple[int, ...], p: FloatArray, sign: float
+) -> Peak:
+    """The measure with one choice of peaks, and its gradient."""
+    chosen = [part[j] for part, j in zip(parts, choice, strict=True)]
+    y = sign * np.array([peak.value for peak in chosen])
+    gradient: FloatArray | None = None
+    for slope, peak in zip(slopes(measure, y, p).tolist(), chosen, strict=True):
+        if peak.gradient is None:
+            gradient = None
+            break
+        gradient = slope * peak.gradient if gradient is None else gradient + slope * peak.gradient
+    if gradient is not None:
+        gradient.flags.writeable = False
+    return Peak(float("nan"), sign * statistic(measure, y, p), gradient)
+
+
+def _choices(parts: Sequence[Sequence[Peak]], p: FloatArray, sign: float) -> list[tuple[int, ...]]:
+    """Which peak of each point, for each row; the highest everywhere first."""
+    highest = (0,) * len(parts)
+    found = {highest: None}
+    if any(len(part) > 1 for part in parts):
+        found[tuple(min(range(len(part)), key=lambda j: part[j].time) for part in parts)] = None
+        found[tuple(max(range(len(part)), key=lambda j: part[j].time) for part in parts)] = None
+        found[tuple(min(1, len(part) - 1) for part in parts)] = None
+        losses = [
+            (float(p[s]) * sign * (part[0].value - part[j].value), s, j)
+            for s, part in enumerate(parts)
+            for j in range(1, len(part))
+        ]
+        for _, s, j in sorted(losses)[: MEANS - len(found)]:
+            found[(*highest[:s], j, *highest[s + 1 :])] = None
+    return list(found)
+
+
+def _deviation(y: FloatArray, p: FloatArray, mean: float) -> float:
+    """The standard deviation; exactly 0 where values differ by rounding alone, so that it has no slope."""
+    deviation = float(np.sqrt((p * (y - mean) ** 2).sum()))
+    return deviation if deviation > _NONE * float(np.abs(y).max()) else 0.0
+
+
+def _ranked(level: float, y: FloatArray, p: FloatArray) -> NDArray[np.intp]:
+    """The points that make up the share `level` from the good end, in order; the last is the quantile's."""
+    order = np.argsort(y, kind="stable")
+    reached = np.cumsum(p[order]) >= level - _ROUNDING
+    count = int(np.argmax(reached)) + 1 if reached.any() else len(y)
+    return order[:count]

@@ -1,0 +1,87 @@
+"""The case at a point of a sample: its text read once more, with the point's values."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.model import Case, Uncertainty
+from mdstopo.case.reader import read_case
+from mdstopo.robust.sample import Sample
+from mdstopo.scene.refusals import refusals
+
+#: numbers of a point that are told in a message
+_TOLD = 4
+
+
+def nominal_case(case: Case) -> Case:
+    """The case as it is written, without anything uncertain."""
+    return replace(case, uncertainty=None)
+
+
+def case_at(case: Case, sample: Sample, i: int) -> Case:
+    """The case at point i. Raises CaseError, at the section's place, where it would be no case, or another problem."""
+    overrides: dict[str, Any] = {**case.overrides, **settings(_uncertainty(case), sample, i)}
+    try:
+        made = read_case(case.text, path=case.path, overrides=overrides, without=("uncertainty",))
+    except CaseError as error:
+        raise _refused(case, sample, i, error.mistakes) from None
+    _same_members(case, made, sample, i)
+    names = {objective.name for objective in case.objectives}
+    made = replace(
+        made,
+        objectives=tuple(objective for objective in made.objectives if objective.name in names),
+        solver=case.solver,
+        optimizer=case.optimizer,
+        warnings=(),
+    )
+    refused = refusals(made)
+    if refused:
+        raise _refused(case, sample, i, refused)
+    return made
+
+
+def settings(uncertainty: Uncertainty, sample: Sample, i: int) -> dict[str, Any]:
+    """Keys and values at point i: the scenario's, then the numbers'."""
+    place = int(sample.scenario[i])
+    stated: dict[str, Any] = dict(uncertainty.scenarios[place].values) if place >= 0 else {}
+    numbers = zip(uncertainty.numbers, sample.values[i].tolist(), strict=True)
+    return stated | {number.key: value for number, value in numbers}
+
+
+def name_of(case: Case, sample: Sample, i: int) -> str:
+    """Point i in words, with its values."""
+    uncertainty = _uncertainty(case)
+    place = int(sample.scenario[i])
+    parts = [f"scenario {uncertainty.scenarios[place].name}"] if place >= 0 else []
+    pairs = list(zip(uncertainty.numbers, sample.values[i].tolist(), strict=True))
+    parts += [f"{number.key} = {value:.6g}" for number, value in pairs[:_TOLD]]
+    parts += ["..."] if len(pairs) > _TOLD else []
+    return f"at point {i} of the sample ({', '.join(parts)})"
+
+
+def _uncertainty(case: Case) -> Uncertainty:
+    assert case.uncertainty is not None
+    return case.uncertainty
+
+
+def _same_members(case: Case, made: Case, sample: Sample, i: int) -> None:
+    for stated, found in zip(case.members, made.members, strict=False):
+        if len(stated) != len(found) or stated.name != found.name:
+            words = f"the group {stated.name} has {len(found)} members, not {len(stated)}: a design would not fit both"
+            raise _refused(case, sample, i, [Mistake("", words, 1, 1)])
+    if len(case.members) != len(made.members) or len(case.objectives) > len(made.objectives):
+        raise _refused(case, sample, i, [Mistake("", "groups or objectives are missing or new", 1, 1)])
+
+
+def _refused(case: Case, sample: Sample, i: int, mistakes: Sequence[Mistake]) -> CaseError:
+    """The mistakes that only a point has, at the place of what makes it."""
+    place = int(sample.scenario[i])
+    path = "uncertainty.parameters"
+    if not sample.values.shape[1]:
+        path = f"uncertainty.scenarios.{_uncertainty(case).scenarios[place].name}"
+    found = []
+    for mistake in mistakes:
+        key = f"{mistake.path_key}: " if mistake.path_key else ""
+        found.append(case.marks.mistake(path, f"{name_of(case, sample, i)}: {key}{mistake.message}"))
+    return CaseError(found, str(case.path or case.name))

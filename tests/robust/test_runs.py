@@ -1,0 +1,304 @@
+"""Runs of uncertain cases: the same to the bit on any number of processes and resumed; what is told at the end."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.reader import read_case
+from mdstopo.case.uncertain import Measure
+from mdstopo.cli import _dispatch
+from mdstopo.evaluators import evaluator_of
+from mdstopo.robust.conclusion import conclude
+from mdstopo.robust.intervals import estimate
+from mdstopo.robust.measures import statistic
+from mdstopo.robust.sample import lattice
+from tests.robust.scenes import PARAMETERS, SCENARIOS, read, scene, text, uncertain
+
+DEVIATION = {"measure": "mean_deviation", "factor": 2}
+
+
+def arrays(path):
+    """Every array and text of a result file but times."""
+    found = {}
+
+    def visit(name, node):
+        if isinstance(node, h5py.Dataset) and "seconds" not in name:
+            found[name] = node[()]
+
+    with h5py.File(path) as file:
+        file.visititems(visit)
+    return found
+
+
+def assert_same(one, other):
+    assert one.keys() == other.keys()
+    for name, value in one.items():
+        floats = getattr(value, "dtype", np.dtype(object)).kind == "f"
+        assert np.array_equal(value, other[name], equal_nan=floats), name
+
+
+def test_no_number_of_processes_changes_a_bit(tmp_path):
+    case = read(uncertain(DEVIATION, scenarios=SCENARIOS, sample=4))
+    for workers in (1, 2, 3):
+        mdstopo.optimize(case, path=tmp_path / f"{workers}.h5", workers=workers)
+    one = arrays(tmp_path / "1.h5")
+    assert one["iterations/objectives"].shape[0] > 3
+    for workers in (2, 3):
+        assert_same(one, arrays(tmp_path / f"{workers}.h5"))
+
+
+def test_several_starts_on_several_processes_are_the_same(tmp_path):
+    case = read(uncertain(DEVIATION), optimizer={"starts": 2, "max_iterations": 5})
+    for workers in (1, 2):
+        mdstopo.optimize(case, path=tmp_path / f"{workers}.h5", workers=workers)
+    assert_same(arrays(tmp_path / "1.h5"), arrays(tmp_path / "2.h5"))
+
+
+def test_a_run_that_is_stopped_goes_on_to_the_same_end(tmp_path):
+    case = read(uncertain(DEVIATION))
+    mdstopo.optimize(case, path=tmp_path / "whole.h5")
+    asked = []
+
+    def stop():
+        asked.append(1)
+        return len(asked) > 3
+
+    assert mdstopo.optimize(case, path=tmp_path / "parts.h5", stop_requested=stop).status == "interrupted"
+    mdstopo.optimize(case, path=tmp_path / "parts.h5", resume=True, workers=2)
+    assert_same(arrays(tmp_path / "whole.h5"), arrays(tmp_path / "parts.h5"))
+
+
+def test_a_run_is_not_resumed_with_another_sample(tmp_path):
+    from mdstopo.store.errors import DifferentCaseError
+
+    path, asked = tmp_path / "run.h5", []
+    mdstopo.optimize(read(uncertain(DEVIATION)), path=path, stop_requested=lambda: bool(asked) or asked.append(1))
+    with pytest.raises(DifferentCaseError, match=r"it differs in uncertainty\.seed"):
+        mdstopo.optimize(read(uncertain(DEVIATION, seed=1)), path=path, resume=True)
+
+
+def test_the_file_holds_the_sample_and_what_became_of_it(tmp_path):
+    case = read(uncertain(DEVIATION))
+    result = mdstopo.optimize(case, path=tmp_path / "run.h5")
+    found = arrays(tmp_path / "run.h5")
+    values = found["uncertainty/objectives"][:, 0]
+    assert result.objectives["G"] == pytest.approx(values.mean() + 2.0 * values.std(), rel=1e-14)
+    assert found["uncertainty/robust"][0] == result.objectives["G"]
+    fresh = found["uncertainty/validation/objectives"][:, 0]
+    assert fresh.shape == (60,)
+    assert found["uncertainty/validation/measured"][0] == pytest.approx(fresh.mean() + 2.0 * fresh.std(ddof=1))
+    low, high = found["uncertainty/validation/interval"][0]
+    assert low < found["uncertainty/validation/measured"][0] < high
+    assert found["uncertainty/validation/worse"][0] == np.mean(fresh > result.objectives["G"])
+    # each point is the case with these values set
+    keys = [key.decode() for key in found["uncertainty/keys"]]
+    for i in (0, 5):
+        point = dict(zip(keys, found["uncertainty/sample"][i].tolist(), strict=True))
+        alone = read_case(json.dumps(scene()), overrides=point)
+        assert mdstopo.evaluate(alone, result.alpha, gradient=False).objectives["G"] == values[i]
+    assert result.conclusion.of("G").nominal == found["uncertainty/nominal"][0]
+    plain = mdstopo.evaluate(read_case(json.dumps(scene())), result.alpha, gradient=False)
+    assert found["uncertainty/nominal"][0] == plain.objectives["G"]
+
+
+def test_a_robust_design_is_the_better_one_where_it_counts():
+    robust = mdstopo.optimize(read(uncertain({"measure": "worst"}, sample=16)))
+    nominal = mdstopo.optimize(read_case(json.dumps(scene())))
+    engine = evaluator_of(robust.case)
+    assert robust.status == "converged"
+    assert robust.objectives["G"] < engine.evaluate(nominal.alpha, gradient=False).objectives["G"]
+
+
+@pytest.fixture(scope="module")
+def tries():
+    """An ensemble, and the values of designs that were not fitted to it at the points of its sample and a fresh one."""
+    engine = evaluator_of(read(uncertain(DEVIATION, sample=64, validation=256)))
+    found = []
+    for seed in range(3):
+        alpha = np.random.default_rng(seed).uniform(0.05, 0.6, engine.case.n_design)
+        part = conclude(engine, alpha, engine.evaluate(alpha, gradient=False), None).part
+        names = ("uncertainty/objectives", "uncertainty/validation/objectives")
+        found.append([np.asarray(part[name])[:, 0] for name in names])
+    return engine, found
+
+
+@pytest.mark.parametrize(
+    "measure",
+    [Measure("mean"), Measure("mean_deviation", factor=2.0), Measure("quantile", level=0.9), Measure("worst")],
+    ids=lambda each: each.name,
+)
+def test_the_fresh_sample_agrees_within_its_interval_at_designs_that_were_not_fitted(measure, tries):
+    engine, found = tries
+    p = engine.sample.probability
+    level = Measure("worst", level=64 / 65) if measure.name == "worst" else measure
+    for own, fresh in found:
+        check = estimate(level, fresh)
+        assert check.low < check.value < check.high
+        assert check.holds(statistic(measure, own, p))
+        # an interval that held anything would be no check
+        assert not check.holds(1.3 * statistic(measure, own, p))
+
+
+def test_what_is_told_is_the_estimate(tries):
+    engine, found = tries
+    alpha = np.random.default_rng(0).uniform(0.05, 0.6, engine.case.n_design)
+    told = conclude(engine, alpha, engine.evaluate(alpha, gradient=False), None).of("G")
+    assert told.check == estimate(Measure("mean_deviation", factor=2.0), found[0][1])
+    assert told.agrees
+    assert told.measure == "mean and 2 deviations"
+
+
+def test_a_point_of_the_fresh_sample_that_cannot_be_computed_is_told(tmp_path):
+    # one mass in fifty is negative: none of 4, some of 200
+    values = {"bodies.torso.mass": {"discrete": [[60, 0.5], [70, 0.48], [-1, 0.02]]}}
+    result = mdstopo.optimize(read(uncertain(DEVIATION, parameters=values, sample=4, validation=200)))
+    (warning,) = [each for each in result.warnings if "fresh sample" in each]
+    assert "of 200 points of the fresh sample cannot be computed: at point" in warning
+    assert "bodies.torso.mass: found -" in warning
+    assert result.conclusion.lost > 0
+    assert np.isfinite(result.conclusion.of("G").check.value)
+
+
+def test_a_design_that_fits_its_own_sample_is_told():
+    # four points happen to miss the motion that is rare and bad
+    seed = next(seed for seed in range(50) if lattice(4, 1, seed).max() < 0.9)
+    values = {"loads[0].angular_acceleration": {"discrete": [[20, 0.9], [30, 0.1]]}}
+    result = mdstopo.optimize(read(uncertain({"measure": "mean"}, parameters=values, sample=4, seed=seed)))
+    found = result.conclusion.of("G")
+    assert found.value < found.check.low
+    (warning,) = [each for each in result.warnings if "fits its sample" in each]
+    assert warning.startswith("G is ")
+    assert "take a larger uncertainty.sample" in warning
+
+
+@pytest.mark.parametrize(
+    "measure",
+    ["{measure: mean}", "{measure: mean_deviation, factor: 2}", "{measure: quantile, level: 0.9}", "{measure: worst}"],
+)
+def test_the_optimised_value_of_the_example_agrees_with_a_fresh_sample(measure):
+    cases = Path(__file__).parents[2] / "cases"
+    start = mdstopo.optimize(mdstopo.load_case(cases / "fig6.yaml")).alpha
+    case = mdstopo.load_case(cases / "fig6-uncertain.yaml", {"uncertainty.objectives.G": measure})
+    result = mdstopo.optimize(case, initial=start)
+    found = result.conclusion.of("G")
+    assert result.status == "converged"
+    assert found.agrees
+    assert result.objectives["G"] < result.initial_objectives["G"]
+    assert found.check.high - found.check.low < 0.25 * found.value  # an interval that says something
+
+
+def test_a_worker_that_dies_is_reported_and_what_was_reached_is_kept(tmp_path):
+    import os
+    import signal
+
+    from mdstopo.session.errors import WorkerError
+
+    case, seen = read(uncertain(DEVIATION)), []
+
+    def kill(progress):
+        seen.append(progress)
+        if len(seen) == 3:
+            (child,) = (
+                int(pid) for pid in os.listdir("/proc") if pid.isdigit() and _is_point_worker(int(pid), os.getpid())
+            )
+            os.kill(child, signal.SIGKILL)
+
+    with pytest.raises(WorkerError, match=r"a worker process \(pid \d+\) ended unexpectedly"):
+        mdstopo.optimize(case, path=tmp_path / "run.h5", workers=2, on_iteration=kill)
+    assert arrays(tmp_path / "run.h5")["iterations/objectives"].shape[0] == 3
+    resumed = mdstopo.optimize(case, path=tmp_path / "run.h5", resume=True)
+    assert np.array_equal(resumed.alpha, mdstopo.optimize(case).alpha)
+
+
+def _is_point_worker(pid, parent):
+    """Whether a process is this one's helper for points of a sample."""
+    try:
+        with open(f"/proc/{pid}/stat") as stat, open(f"/proc/{pid}/cmdline") as line:
+            return int(stat.read().rsplit(")", 1)[1].split()[1]) == parent and "mdstopo.robust.worker" in line.read()
+    except OSError:
+        return False
+
+
+def test_scenarios_alone_are_exact_and_not_checked():
+    result = mdstopo.optimize(read(uncertain({"measure": "worst"}, parameters=None, scenarios=SCENARIOS, sample=None)))
+    assert result.conclusion.points == 0
+    assert result.conclusion.of("G").check is None
+    engine = evaluator_of(result.case)
+    each = [engine.points[i].evaluate(result.alpha, gradient=False).objectives["G"] for i in (0, 1)]
+    assert result.objectives["G"] == max(each)
+
+
+def test_fronts_of_uncertain_objectives(tmp_path):
+    from mdstopo.front.session import Ask, run_front
+
+    changes = {
+        "objectives": {
+            "G": {"response": "energy"},
+            "H": {"response": "energy", "over_time": "mean", "sense": "maximize"},
+        },
+        "combine": {"weights": {"G": 1, "H": 1}},
+        "optimizer": {"max_iterations": 8},
+    }
+    section = uncertain(objectives={"G": {"measure": "worst"}, "H": {"measure": "nominal"}}, sample=4)
+    case = read(section, **changes)
+    directions = np.array([[1.0, 0.0], [0.5, 0.5], [0.0, 1.0]])
+    one = run_front(case, Ask(directions), workers=1)
+    two = run_front(case, Ask(directions), workers=2, worth=0.0)
+    assert np.array_equal(one.part["objectives"], two.part["objectives"])
+    alpha = one.part["alpha"][1]
+    found = evaluator_of(case).evaluate(alpha, gradient=False)
+    assert one.part["objectives"][1].tolist() == [found.objectives["G"], found.objectives["H"]]
+
+
+def test_the_command_tells_nominal_and_robust_values(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.yaml").write_text(text(uncertain(DEVIATION)))
+    assert _dispatch(["run", "case.yaml", "--workers", "2"]) == 0
+    said = capsys.readouterr()
+    lines = [line.split() for line in said.out.splitlines()]
+    assert ["measure", "mean", "and", "2", "deviations"] in lines
+    assert any(line[:1] == ["nominal"] for line in lines)
+    assert any(line[:2] == ["fresh", "sample"] and line[-2:] == ["60", "points"] for line in lines)
+    assert "not used" not in said.err
+    assert _dispatch(["show", "results/case.h5"]) == 0
+    shown = capsys.readouterr().out
+    assert "mean and 2 deviations" in shown
+    assert _dispatch(["export", "results/case.h5", "--csv"]) == 0
+    capsys.readouterr()
+    for name, count in (("sample", 8), ("fresh-sample", 60)):
+        rows = (tmp_path / "results" / "case.csv" / f"{name}.csv").read_text().splitlines()
+        assert rows[0].startswith("point,scenario,bodies.torso.mass,members.belts.law.stiffness,loads[0]")
+        assert len(rows) == count + 1
+    assert _dispatch(["run", "case.yaml", "--json", "--quiet"]) == 0
+    told = json.loads(capsys.readouterr().out)["uncertainty"]["G"]
+    assert told["interval"][0] <= told["value"] <= told["interval"][1] or not told["agrees"]
+    assert _dispatch(["check", "case.yaml"]) == 0
+    checked = capsys.readouterr().out
+    assert "8 points" in checked
+    assert "bodies.torso.mass" in checked
+
+
+def test_a_certain_case_imports_nothing_of_this(tmp_path):
+    (tmp_path / "case.yaml").write_text(json.dumps(scene()))
+    code = (
+        "import sys, mdstopo; mdstopo.optimize(mdstopo.load_case('case.yaml')); "
+        "print([name for name in sys.modules if name.startswith('mdstopo.robust') or name in "
+        "('mdstopo.case.uncertainty', 'statistics')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.stdout.strip() == "[]", done.stderr
+
+
+def test_gradient_compares_methods_and_differences(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "case.yaml").write_text(text(uncertain({"measure": "quantile", "level": 0.7}, parameters=PARAMETERS)))
+    assert _dispatch(["gradient", "case.yaml", "--differences", "--members", "3", "--error-estimate", "--json"]) == 0
+    methods = json.loads(capsys.readouterr().out)["methods"]
+    assert methods["adjoint"]["differences"]["G"] < 1e-6
+    assert methods["direct"]["disagreement"]["G"] < 1e-9
