@@ -149,6 +149,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
 
     from mdstopo.case.model import VolumeRow
     from mdstopo.case.units import words
+    from mdstopo.cli.show import values_text
 
     case, lines = outcome.case, []
     for row, excess in zip(case.constraints, outcome.constraints.tolist(), strict=True):
@@ -157,14 +158,17 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
             found = f"{number(excess + row.bound, 9)}, {word} {number(row.bound, 9)}"
             lines.append((f"{row.over_time} {words(row.response)}", found))
         if isinstance(row, VolumeRow):
-            used = float(row.coefficients @ outcome.alpha)
+            used = row.spent(np.concatenate([outcome.alpha, *outcome.variables.values()]))
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower
     share = np.divide(outcome.alpha - case.lower, width, out=np.zeros(case.n_design), where=width > 0.0)
     grey = int(np.count_nonzero((share > _GREY[0]) & (share < _GREY[1])))
     full = int(np.count_nonzero(share >= _GREY[1]))
-    lines.append(("members", f"{full} present, {grey} grey, {case.n_design - full - grey} absent of {case.n_design}"))
+    if case.n_design:
+        gone = case.n_design - full - grey
+        lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}"))
+    lines += [(each.name, f"{values_text(outcome.variables[each.name])} {each.unit}") for each in case.variables]
     return lines
 
 
@@ -185,6 +189,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         ],
         "best_start": outcome.best_start,
         "constraints": outcome.constraints,
+        "variables": outcome.variables,
         "combined": outcome.combined,
         "utopia": outcome.utopia,
         "maxima": outcome.maxima,

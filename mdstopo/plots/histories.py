@@ -23,7 +23,7 @@ def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
         span = case.load_case(name)
         times[name] = np.linspace(span.start, span.end, SAMPLES)
         try:
-            series |= response_history(source.engine, source.alpha, name, times[name])
+            series |= response_history(source.engine, source.design, name, times[name])
         except ValueError as error:
             raise StoreError(str(error)) from error
     figure, axes = new_figure(module, len(chosen))

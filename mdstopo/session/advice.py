@@ -14,8 +14,8 @@ _USED = 0.9  # share of a volume limit below which it is far from active
 _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
 
 
-def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
-    """Warnings about the final design `alpha`.
+def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
+    """Warnings about the final design, alpha with the values of variables (N + P,).
 
     before, after: the motion by load case with the starting and the final design. Both warnings are signs of
     the soft branch: stored energy also falls when members that restrain the bodies are taken away.
@@ -23,7 +23,7 @@ def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mappi
     found = []
     for row in case.constraints:
         if isinstance(row, VolumeRow) and row.sense == "limit" and row.bound > 0.0:
-            share = float(row.coefficients @ alpha) / row.bound
+            share = row.spent(design) / row.bound
             if share < _USED:
                 found.append(
                     f"only {share:.1%} of the volume limit {row.bound:g} of {', '.join(row.groups)} is used: "

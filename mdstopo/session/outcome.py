@@ -1,7 +1,7 @@
 """What a run tells while it goes and when it ends."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -61,7 +61,7 @@ class Outcome:
     it is made with, else None. history: columns by the names of the file's `iterations/...`, K + 1 rows. states: each
     start's last state, None where it has not begun; best_start: whose result this is. evaluations,
     iterations: of all starts. seconds: wall time of the iterations in this process; compile_seconds: of
-    getting ready, loading or compiling kernels.
+    getting ready, loading or compiling kernels. variables: the best design's values, by name, in the parameters' units.
     """
 
     case: Case
@@ -86,3 +86,4 @@ class Outcome:
     compile_seconds: float
     integrator: str
     integrator_reason: str
+    variables: Mapping[str, Floats] = field(default_factory=dict)
