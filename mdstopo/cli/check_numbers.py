@@ -84,7 +84,7 @@ def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
     for load_case in case.load_cases:
         duration = load_case.end - load_case.start
         initial, lower = (
-            _elastic(engine.natural_frequencies(alpha, load_case.name)) for alpha in (case.start, case.lower)
+            _elastic(engine.natural_frequencies(alpha, load_case.name)) for alpha in (case.start, _bounds(case)[0])
         )
         both = min(len(initial), len(lower)) > 0
         found.append(

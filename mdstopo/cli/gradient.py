@@ -269,7 +269,7 @@ def _say(
                     method,
                     name,
                     number(result["objectives"][name], 9),
-                    number(float(abs(gradient).max()), 9),
+                    number(float(abs(gradient).max(initial=0.0)), 9),
                     number(result["disagreement"][name], 3),
                     number(result["differences"][name], 3) if "differences" in result else "",
                     duration(result["seconds"]),

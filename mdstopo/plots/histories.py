@@ -39,7 +39,8 @@ def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
 
 def draw_sensitivities(module: Any, source: Source, members: int = 8) -> Any:
     """dg(t)/dalpha of the first members, as `mdstopo gradient --history` stored it."""
-    found = {path: a for path, a in source.view.under("sensitivities").items() if "/history/" in path}
+    stored = source.view.under("sensitivities").items()
+    found = {path: a for path, a in stored if "/history/" in path and "variables" not in path.split("/")[:-1]}
     lines = {path: array for path, array in found.items() if not path.endswith("/t")}
     if not lines:
         raise StoreError(f"{source.view.path}: has no sensitivities over time; `mdstopo gradient --history` makes them")

@@ -26,7 +26,7 @@ format: 1
 time: {end: 0.1}
 bodies: {cart: {mass: 1, inertia: 1, position: [1, 0], velocity: [1, 0]}}
 members:
-  spring: {from: {body: ground, at: [0, 0]}, to: {body: cart, at: [1, 0]}, law: {type: spring, stiffness: 9, damping: 1}}
+  spring: {from: {body: ground, at: [0, 0]}, to: {body: cart, at: [1, 0]}, law: {type: spring, stiffness: 9}}
 design: {variables: {k: {group: spring, parameter: stiffness, lower: 1, upper: 20}}}
 objectives:
   E: {response: energy, over_time: mean}

@@ -171,7 +171,8 @@ combine: {method: weighted_sum, weights: {L: 1, R: 1}, normalize: false}""",
     text = text.replace("rights: {from: right, to: belt", "rights: {from: right, to: tleb")
     text = text.replace("  belt: {", "  tleb: {body: load, grid: {list: [[0.2, 1], [-0.2, 1]]}}\n  belt: {")
     text = text.replace("  more: {from: left, to: belt, law: {type: spring, stiffness: 500}, cost: 2}\n", "")
-    text = text.replace("{lefts: 0.01, rights: 0.02, more: 0.001}", "0.01").replace("max_iterations: 8", "max_iterations: 60")
+    text = text.replace("{lefts: 0.01, rights: 0.02, more: 0.001}", "0.01")
+    text = text.replace("max_iterations: 8", "max_iterations: 60")
     free = mdstopo.optimize(read_case(text.replace(", SHARING", "")))
     mirrored = mdstopo.optimize(read_case(text.replace("SHARING", "mirrored: [[lefts, rights]]")))
     assert mirrored.objectives["L"] == pytest.approx(mirrored.objectives["R"], rel=1e-7)
@@ -187,7 +188,7 @@ combine: {method: weighted_sum, weights: {L: 1, R: 1}, normalize: false}""",
         ("mirrored: [lefts, rights]", "design.mirrored[0]", "allowed is a list of member groups"),
         ("mirrored: [[lefts, few]]", "design.mirrored[0]", "lefts has 6, few has 1; member k of one goes with"),
         ("shared: [rigid]", "design.shared[0]", "'rigid' has `design: false`"),
-        ("upper: {rights: 0.3}, mirrored: [[lefts, rights]]", "design.mirrored[0]", "their bounds have nothing in common"),
+        ("upper: {rights: 0.3}, mirrored: [[lefts, rights]]", "design.mirrored[0]", "bounds have nothing in common"),
     ],
 )
 def test_what_cannot_be_shared_is_refused_at_its_place(sharing, place, words):
