@@ -133,7 +133,10 @@ def test_the_derivative_by_a_parameter_is_that_of_what_is_computed(name, jointed
 
 @pytest.mark.parametrize("name", [name for name in LAWS if name not in SWITCHING])
 def test_so_it_is_with_the_fixed_steps_of_generalized_alpha(name):
-    check(case_of(*LAWS[name], integrator="generalized_alpha", step=0.01), 1e-7)
+    law, parameters = LAWS[name]
+    if name == "pulse":  # the ends of steps follow it, so that its time and rate are as the other times
+        parameters = {"peak": parameters["peak"]}
+    check(case_of(law, parameters, integrator="generalized_alpha", step=0.01), 1e-7)
 
 
 @pytest.mark.parametrize("jointed", [False, True], ids=["free", "jointed"])
@@ -159,7 +162,7 @@ def test_direct_and_adjoint_agree(name, solver):
 
 
 def test_by_times_and_through_events_generalized_alpha_is_right_to_its_own_order():
-    for law, parameters in (LAWS["gap"], (TIMED["spring"], TIMES)):
+    for law, parameters in (LAWS["gap"], LAWS["pulse"], (TIMED["spring"], TIMES)):
         exact = mdstopo.evaluate(case_of(law, parameters, tolerance=1e-11)).variable_gradients["M"]
         errors = []
         for step in (0.004, 0.001):
