@@ -9,7 +9,7 @@ A case is compiled at its first use and kept, so that `evaluate` in a loop costs
 """
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -64,15 +64,37 @@ def _evaluator(case: Case) -> Evaluator:
     return found
 
 
-def _design(case: Case, alpha: ArrayLike | None) -> FloatArray:
-    return case.initial if alpha is None else np.asarray(alpha, dtype=np.float64)
+def _design(case: Case, alpha: ArrayLike | None, variables: Mapping[str, ArrayLike] | None) -> FloatArray:
+    """alpha (N,) with the values of variables (P,) behind it."""
+    given = case.initial if alpha is None else np.asarray(alpha, dtype=np.float64)
+    if not variables and not case.variables:
+        return given
+    parts = case.space.parts
+    unknown = [name for name in variables or {} if name not in parts]
+    if unknown:
+        there = f"there are {', '.join(parts)}" if parts else "the case has none"
+        raise ValueError(f"no design variable {unknown[0]!r}; {there}")
+    design = np.array(case.whole(given))
+    for name, values in (variables or {}).items():
+        own, count = np.asarray(values, dtype=np.float64), parts[name].stop - parts[name].start
+        if own.shape not in ((), (count,)):
+            raise ValueError(f"{name} has {count} values, not {own.shape}")
+        design[parts[name]] = own
+    return design
 
 
-def simulate(case: Case, alpha: ArrayLike | None = None, load_case: str | None = None) -> Trajectory:
+def simulate(
+    case: Case,
+    alpha: ArrayLike | None = None,
+    load_case: str | None = None,
+    *,
+    variables: Mapping[str, ArrayLike] | None = None,
+) -> Trajectory:
     """Compute the motion of one design in one load case.
 
     alpha (N,): default the case's initial design. load_case: may be left out where there is only one; otherwise a
-    ValueError lists them. A motion that cannot go on ends early, and says so in `Trajectory.status`.
+    ValueError lists them. variables: values of the case's design variables by name, as of `evaluate`.
+    A motion that cannot go on ends early, and says so in `Trajectory.status`.
     Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha.
     """
     names = [each.name for each in case.load_cases]
@@ -82,13 +104,14 @@ def simulate(case: Case, alpha: ArrayLike | None = None, load_case: str | None =
         load_case = names[0]
     elif load_case not in names:
         raise ValueError(f"no load case {load_case!r}; there are: {', '.join(names)}")
-    return _evaluator(case).trajectory(_design(case, alpha), load_case)
+    return _evaluator(case).trajectory(_design(case, alpha, variables), load_case)
 
 
 def evaluate(
     case: Case,
     alpha: ArrayLike | None = None,
     *,
+    variables: Mapping[str, ArrayLike] | None = None,
     method: str = "auto",
     gradient: bool = True,
     error_estimate: bool = False,
@@ -96,13 +119,15 @@ def evaluate(
     """Compute objectives and constraints of one design, and their gradients with respect to alpha.
 
     alpha (N,): default the case's initial design; any finite alpha >= 0 is evaluated, bounds and rows do not matter.
+    variables: values of the case's design variables by name, in the parameters' own units, a number or one for each
+    member; default their initial ones. What they do to objectives is in `Evaluation.variable_gradients`.
     method: adjoint, direct, iterative or constant_load; auto takes the case's `solver.sensitivity`. error_estimate:
     compute it once more, much finer, and say in `Evaluation.errors` how far off the objectives and gradients are.
     Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha or method.
     """
     if method not in METHODS:
         raise ValueError(f"no sensitivity method {method!r}; there are: {', '.join(METHODS)}")
-    evaluator, design = _evaluator(case), _design(case, alpha)
+    evaluator, design = _evaluator(case), _design(case, alpha, variables)
     chosen = None if method == "auto" else method
     found = evaluator.evaluate(design, gradient, chosen)
     return evaluator.with_errors(design, found, chosen) if error_estimate else found
@@ -117,13 +142,15 @@ def optimize(
     starts: int | None = None,
     workers: int | None = None,
     initial: ArrayLike | None = None,
+    variables: Mapping[str, ArrayLike] | None = None,
     on_iteration: Callable[[Progress], None] | None = None,
     stop_requested: Callable[[], bool] | None = None,
 ) -> Result:
     """Optimise a case, and keep a result file up to date where `path` is given.
 
     starts, workers: how many starts (default: the case's) on how many processes (default 1); no result depends on
-    the latter. initial (N,): the design to begin with. on_iteration, stop_requested: called after each iteration.
+    the latter. initial (N,): the design to begin with; variables: values to begin with, as of `evaluate`.
+    on_iteration, stop_requested: called after each iteration.
     resume: go on where the unfinished run in the file stopped; overwrite: replace it.
     Raises CaseError where the case is no optimisation that the engine can do, StoreError for an unusable file.
     """
@@ -136,7 +163,7 @@ def optimize(
         overwrite=overwrite,
         starts=starts,
         workers=workers,
-        initial=None if initial is None else np.asarray(initial, dtype=np.float64),
+        initial=None if initial is None and variables is None else _design(case, initial, variables),
         on_iteration=on_iteration,
         stop_requested=stop_requested,
     )

@@ -22,7 +22,7 @@ from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.culprit import Culprits
 from mdstopo.scene.family import beyond_springs
-from mdstopo.scene.refusals import refusals
+from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
 from mdstopo.sensitivity.reductions import REDUCTIONS
 from mdstopo.status import Status
 from mdstopo.warm import Beside
@@ -69,10 +69,12 @@ class Evaluator:
         self._culprits: dict[str, Culprits] = {}
         self._coarse: dict[str, str] = {}
         self._n = case.n_design
-        self._rows = np.zeros((len(case.constraints), self._n))
+        self._space = case.space
+        self._rows = np.zeros((len(case.constraints), self._space.length))
         for i, row in enumerate(case.constraints):
             if isinstance(row, VolumeRow):
-                self._rows[i] = row.coefficients
+                self._rows[i, : self._n] = row.coefficients
+                self._rows[i, self._n :] = row.prices if len(row.prices) else 0.0
         self._rows.flags.writeable = False
         self._bounds = np.array([row.bound for row in case.constraints], dtype=np.float64)
         # what is looked at in each load case: objectives, then constraints on a response
@@ -118,10 +120,16 @@ class Evaluator:
     def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
         """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
 
+        Behind alpha there may be the values (P,) of the case's variables; else these have their initial ones.
         sensitivity: one of the four methods; default the case's.
         """
         design = self.design(alpha)
         method = sensitivity or self.sensitivity
+        if gradient and self.case.variables and method not in BY_PARAMETERS:
+            raise CaseError(
+                [self.case.marks.mistake("design.variables", no_parameters(method))],
+                str(self.case.path or self.case.name),
+            )
         if self._is_for_generalized_alpha(method):
             return self.otherwise(sensitivity="iterative").evaluate(design, gradient, method)
         edge = self._without_slope(design) if gradient else ""
@@ -270,14 +278,23 @@ class Evaluator:
     # -- how
 
     def design(self, alpha: FloatArray) -> FloatArray:
-        """alpha as (N,) float64; ValueError where it is not finite or negative, or of another length."""
-        design = np.ascontiguousarray(alpha, dtype=np.float64)
-        if design.shape != (self._n,):
+        """alpha as (N,) float64, with the values of variables (P,) behind it; ValueError where it is no design.
+
+        That is where it is not finite, alpha is negative, or it has another length. Values that are left out are the
+        initial ones.
+        """
+        design = self.case.whole(np.ascontiguousarray(alpha, dtype=np.float64))
+        length = self._space.length
+        if design.shape != (length,):
             raise ValueError(f"alpha must have shape ({self._n},), one value a design member, not {design.shape}")
+        for name, part in self._space.parts.items():
+            if not np.all(np.isfinite(design[part])):
+                raise ValueError(f"values of variables must be finite; those of {name} are {design[part]}")
         if self._n:
-            lowest = np.minimum.reduce(design)
-            if not (lowest >= 0.0 and np.maximum.reduce(design) < np.inf):
-                worst = int(np.flatnonzero(~((design >= 0.0) & (design < np.inf)))[0])
+            own = design[: self._n]
+            lowest = np.minimum.reduce(own)
+            if not (lowest >= 0.0 and np.maximum.reduce(own) < np.inf):
+                worst = int(np.flatnonzero(~((own >= 0.0) & (own < np.inf)))[0])
                 raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
         return design
 
@@ -305,7 +322,7 @@ class Evaluator:
             if self.integrator == "generalized_alpha" and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
 
-                driver.settings[2] = default_step(driver, self.case.initial)
+                driver.settings[2] = default_step(driver, self.case.start)
             self._drivers[name] = driver
         return self._drivers[name]
 
@@ -364,10 +381,13 @@ class Evaluator:
             keys = [*names, *self._limited]
             looked = {key: looked.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}
         gradients = {}
+        by_variable = {}
         for name in names:
             first = looked[name][0].gradient
             if gradient and first is not None:
-                gradients[name] = first
+                gradients[name] = first[: self._n]
+                if self.case.variables:
+                    by_variable[name] = self._space.named(first)
         constraints, rows = np.einsum("ij,j->i", self._rows, design) - self._bounds, self._rows
         if self._limited:
             rows = rows.copy()
@@ -381,12 +401,15 @@ class Evaluator:
             gradients=gradients,
             peak_times={name: looked[name][0].time for name in names},
             constraints=constraints,
-            constraint_gradients=rows,
+            constraint_gradients=rows[:, : self._n] if self.case.variables else rows,
             peaks={name: looked[name] for name in names},
             constraint_peaks={int(key[len("constraints[") : -1]): looked[key] for key in self._limited},
             work=work,
             status=status,
             message=message,
+            variables=self._space.named(design),
+            variable_gradients=by_variable,
+            constraint_variable_gradients=self._space.named(rows),
         )
 
 

@@ -20,7 +20,8 @@ class Peak:
     """One of the competing peaks of an objective.
 
     time in s (NaN where the objective is no value at one time); value: raw; gradient (N,): d value / d alpha with
-    the time held fixed, None where no gradient was asked for.
+    the time held fixed, None where no gradient was asked for. Where the case has variables of laws, their derivatives
+    (P,) stand behind those by alpha.
     """
 
     time: float
@@ -38,6 +39,9 @@ class Evaluation:
     leaves values NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all
     that compete. all_compete: whether all peaks are rows whatever the reduction over time, because they are those of a
     measure over a sample. errors: estimates of the errors of objectives and gradients, where they were asked for.
+    variables: the values that parameters of laws had, by the name of the design variable; variable_gradients: dG by
+    them, by objective, then by variable; constraint_variable_gradients: (n_con, values), by variable. All in the
+    parameters' own units.
     """
 
     objectives: Mapping[str, float]
@@ -52,3 +56,6 @@ class Evaluation:
     constraint_peaks: Mapping[int, tuple[Peak, ...]] = field(default_factory=dict)
     all_compete: bool = False
     errors: "Mapping[str, ErrorEstimate]" = field(default_factory=dict)
+    variables: Mapping[str, FloatArray] = field(default_factory=dict)
+    variable_gradients: Mapping[str, Mapping[str, FloatArray]] = field(default_factory=dict)
+    constraint_variable_gradients: Mapping[str, FloatArray] = field(default_factory=dict)

@@ -5,9 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import field
 
+import numpy as np
+
 from mdstopo.case.arrays import FloatArray, FrozenDict, read_only
 from mdstopo.case.parts import Pair
 from mdstopo.case.value import Value, frozen
+
+
+def _none() -> FloatArray:
+    return np.zeros(0)
 
 
 @frozen
@@ -40,19 +46,49 @@ class Objective(Value):
 
 
 @frozen
+class Variable(Value):
+    """A parameter of laws that the optimiser varies.
+
+    groups: whose; laws: in each of them the place of the law. each: group | member; count: how many values it has, one
+    or as many as a group has members. initial, lower, upper in the parameter's unit; cost: what one unit of each value
+    adds to volume rows that cover any of the groups.
+    """
+
+    name: str
+    groups: tuple[str, ...]
+    laws: tuple[int, ...]
+    parameter: str
+    each: str
+    count: int
+    initial: float
+    lower: float
+    upper: float
+    cost: float = 0.0
+    unit: str = ""
+
+
+@frozen
 class VolumeRow(Value):
     """coefficients (N,) . alpha <= bound (``limit``), = bound (``equals``), >= bound (``at_least``) (Eq. 14).
 
-    A fraction of the total has become its limit.
+    A fraction of the total has become its limit. prices (P,): the same of the values of variables, added to it; none
+    where the case has none.
     """
 
     groups: tuple[str, ...]
     coefficients: FloatArray
     bound: float
     sense: str
+    prices: FloatArray = field(default_factory=_none)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "coefficients", read_only(self.coefficients))
+        object.__setattr__(self, "prices", read_only(self.prices))
+
+    def spent(self, design: FloatArray) -> float:
+        """The sum of a design, alpha (N,) with the values of variables (P,) behind it."""
+        total = float(self.coefficients @ design[: len(self.coefficients)])
+        return total + float(self.prices @ design[len(self.coefficients) :]) if len(self.prices) else total
 
 
 @frozen

@@ -11,9 +11,10 @@ import numpy as np
 from mdstopo.case.arrays import FloatArray, FrozenDict
 from mdstopo.case.geometry import Frames
 from mdstopo.case.loading import DEFAULT
-from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, VolumeRow
+from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema import SENSES
+from mdstopo.case.variables import prices
 from mdstopo.case.volume import check_feasible
 from mdstopo.case.words import inside, listed, number_text, shown
 
@@ -150,7 +151,11 @@ def build_response(fields: Fields, frames: Frames, reading: Reading) -> Response
 
 
 def build_constraints(
-    top: Fields, groups: dict[str, MemberGroup] | None, frames: Frames, reading: Reading
+    top: Fields,
+    groups: dict[str, MemberGroup] | None,
+    variables: tuple[Variable, ...],
+    frames: Frames,
+    reading: Reading,
 ) -> tuple[VolumeRow | ResponseRow, ...]:
     """The rows that can be made, checked against the bounds. groups: None where members could not be read."""
     built: list[VolumeRow | ResponseRow] = []
@@ -164,12 +169,12 @@ def build_constraints(
             if row is not None:
                 built.append(row)
         elif "volume" in fields.stated and fields["volume"] is not BAD:
-            volume = _volume_row(fields, sense, top, groups, reading)
+            volume = _volume_row(fields, sense, top, groups, variables, reading)
             if volume is not None:
                 built.append(volume)
                 volumes.append((inside(fields.path, sense or ""), volume))
     if groups is not None:
-        check_feasible(volumes, [group for group in groups.values() if group.design], reading)
+        check_feasible(volumes, [group for group in groups.values() if group.design], variables, reading)
     return tuple(built)
 
 
@@ -184,43 +189,51 @@ def _response_row(
 
 
 def _volume_row(
-    fields: Fields, sense: str | None, top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading
+    fields: Fields,
+    sense: str | None,
+    top: Fields,
+    groups: dict[str, MemberGroup] | None,
+    variables: tuple[Variable, ...],
+    reading: Reading,
 ) -> VolumeRow | None:
     stated, path = fields["volume"], inside(fields.path, "volume")
     named = [stated] if isinstance(stated, str) else stated
     good = sense is not None and not any(name is BAD for name in named)
     sections = top["members"] if isinstance(top["members"], dict) else {}
+    priced = {name: None for each in variables if each.cost > 0.0 for name in each.groups}
     for index, name in enumerate(named):
         where = path if isinstance(stated, str) else f"{path}[{index}]"
         section = sections.get(name) if name is not BAD else None
         if name is not BAD and name in named[:index]:
             reading.mistake(where, f"{shown(name)} is in the list already")
             good = False
-        elif isinstance(section, Fields) and section["design"] is False:
+        elif isinstance(section, Fields) and section["design"] is False and name not in priced:
             reading.mistake(where, f"{shown(name)} has `design: false`: it has no variables and no cost")
             good = False
-    if stated == "all" and groups is not None and not any(group.design for group in groups.values()):
+    if stated == "all" and groups is not None and not priced and not any(g.design for g in groups.values()):
         reading.mistake(path, "no member is a design variable: there is no volume")
         good = False
     if not good or groups is None or sense is None:
         return None
     design = {name: group for name, group in groups.items() if group.design}
-    names = tuple(design) if stated == "all" else tuple(named)
-    if not all(name in design for name in names):
+    names = tuple(design | priced) if stated == "all" else tuple(named)
+    if not all(name in design or name in priced for name in names):
         return None
     coefficients = _coefficients(design, names)
     bound = fields[sense]
     if sense == "fraction":
-        bound = bound * math.fsum(float(design[name].cost.sum()) for name in names)
+        bound = bound * math.fsum(float(design[name].cost.sum()) for name in names if name in design)
         if not math.isfinite(bound):
             reading.mistake(inside(fields.path, sense), "times sum V_i it is too large for a number")
             return None
-    return VolumeRow(names, coefficients, bound, "limit" if sense == "fraction" else sense)
+    own = prices(variables, names) if priced else np.zeros(0)
+    return VolumeRow(names, coefficients, bound, "limit" if sense == "fraction" else sense, own)
 
 
 def _coefficients(design: dict[str, MemberGroup], names: tuple[str, ...]) -> FloatArray:
     """(N,) V_i of the members of `names`, 0 of the others."""
-    return np.concatenate([g.cost if name in names else np.zeros(len(g)) for name, g in design.items()])
+    pieces = [g.cost if name in names else np.zeros(len(g)) for name, g in design.items()]
+    return np.concatenate(pieces) if pieces else np.zeros(0)
 
 
 def build_combine(top: Fields, reading: Reading) -> Combine | None:

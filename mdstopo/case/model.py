@@ -20,9 +20,11 @@ from mdstopo.case.aims import (
     Response,
     ResponseRow,
     SolverSettings,
+    Variable,
     VolumeRow,
 )
 from mdstopo.case.arrays import FloatArray, FrozenDict, IndexArray, Signal, Table, VectorSignal, read_only
+from mdstopo.case.design_space import DesignSpace, slots_of
 from mdstopo.case.errors import Mistake
 from mdstopo.case.laws import (
     LAWS,
@@ -98,6 +100,7 @@ __all__ = [
     "TableLaw",
     "Triple",
     "Uncertainty",
+    "Variable",
     "VectorSignal",
     "VolumeRow",
 ]
@@ -149,7 +152,9 @@ class Case(Value):
 
     text, sha256: the YAML as read and its hash; overrides: keys set from outside, key path -> value in YAML;
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
-    the user should know. uncertainty: None where all is certain; the other fields are the nominal case.
+    the user should know. uncertainty: None where all is certain; the other fields are the nominal case. shared: groups
+    whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws that are
+    varied.
     """
 
     title: str
@@ -173,6 +178,9 @@ class Case(Value):
     marks: Marks
     warnings: tuple[Mistake, ...] = ()
     uncertainty: Uncertainty | None = None
+    shared: tuple[str, ...] = ()
+    mirrored: tuple[tuple[str, ...], ...] = ()
+    variables: tuple[Variable, ...] = ()
 
     @property
     def design_groups(self) -> tuple[MemberGroup, ...]:
@@ -202,7 +210,19 @@ class Case(Value):
     @property
     def is_optimizable(self) -> bool:
         """Whether there is something to vary and something to improve."""
-        return bool(self.objectives) and self.n_design > 0
+        return bool(self.objectives) and (self.n_design > 0 or bool(self.variables))
+
+    @property
+    def space(self) -> DesignSpace:
+        """What the optimiser's variables stand for."""
+        counts = {group.name: len(group) for group in self.design_groups}
+        return DesignSpace(self.n_design, slots_of(counts, self.shared, self.mirrored), self.variables)
+
+    @property
+    def start(self) -> FloatArray:
+        """(N + P,) the initial design: alpha, then the values of variables."""
+        values = [np.full(each.count, each.initial) for each in self.variables]
+        return read_only(np.concatenate([self.initial, *values])) if values else self.initial
 
     @property
     def initial(self) -> FloatArray:
@@ -229,6 +249,12 @@ class Case(Value):
         """(N,) V_i of Eq. 14."""
         groups = self.design_groups
         return read_only(np.concatenate([g.cost for g in groups]) if groups else np.zeros(0))
+
+    def whole(self, design: FloatArray) -> FloatArray:
+        """A design (N + P,) from alpha (N,), to which the initial values of variables are added, or from a whole."""
+        if self.variables and design.shape == (self.n_design,):
+            return np.concatenate([design, self.start[self.n_design :]])
+        return design
 
     def body(self, name: str) -> Body:
         """The body of that name; KeyError where there is none (``ground`` is none)."""

@@ -25,6 +25,7 @@ from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.schema import FORMAT
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
+from mdstopo.case.variables import build_shared, build_variables
 from mdstopo.case.words import inside
 
 _SECTIONS = {
@@ -142,6 +143,7 @@ def _build(top: Fields, reading: Reading) -> dict[str, Any]:
     complete = isinstance(top["members"], dict) and len(made) == len(top["members"])
     groups = designed if complete or top["members"] is None else None
     motions = {case: build_motions(by_body) for case, by_body in by_case.items()}
+    variables = build_variables(top, groups, reading)
     warn_assemble(top, reading)
     load_cases = build_load_cases(top, times, motions, starts, frames, reading)
     return {
@@ -153,9 +155,11 @@ def _build(top: Fields, reading: Reading) -> dict[str, Any]:
         "load_cases": load_cases,
         "objectives": build_objectives(top, frames, reading),
         "combine": build_combine(top, reading),
-        "constraints": build_constraints(top, groups, frames, reading),
+        "constraints": build_constraints(top, groups, variables, frames, reading),
         "optimizer": build_optimizer(top["optimizer"]),
         "solver": build_solver(top["solver"], times, reading),
+        "variables": variables,
+        **build_shared(top, groups, reading),
     }
 
 

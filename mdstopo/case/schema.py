@@ -26,6 +26,7 @@ from mdstopo.case.schema_scene import (
     PAIR,
     POINTS,
     POSITIVE,
+    parameter_words,
 )
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
 from mdstopo.optimizer.options import OPTIONS
@@ -40,6 +41,43 @@ def _design(name: str, number: Number, doc: str, default: float) -> Key:
     return Key(name, kind, doc + "; a number or {group: number}", default=default)
 
 
+_VARIABLE = Record(
+    "a design variable",
+    (
+        Key(
+            "group",
+            ByShape(
+                "a member group or a list of member groups", scalar=GROUP, sequence=ListOf(GROUP, 1, "member groups")
+            ),
+            "whose law it is; of several groups, all have the same values",
+            required=True,
+        ),
+        Key("parameter", explained(parameter_words()), "which key of the law varies", required=True),
+        Key(
+            "law",
+            Number(minimum=0, whole=True),
+            "where the group has a list of laws: which of them, from 0",
+            otherwise="the only one that has the parameter",
+        ),
+        Key(
+            "each",
+            explained({"group": "one value for all members", "member": "a value for each member"}),
+            "how many values there are",
+            default="group",
+        ),
+        Key("initial", NUMBER, "where the optimiser begins, in the unit of the parameter", otherwise="the law's own"),
+        Key("lower", NUMBER, "lower bound, within what the law allows", required=True),
+        Key("upper", NUMBER, "upper bound", required=True),
+        Key(
+            "cost",
+            NOT_NEGATIVE,
+            "what a unit of each value adds to volume rows that cover the group, as V_i does for a unit of alpha",
+            default=0.0,
+        ),
+    ),
+    doc="A parameter of laws that the optimiser varies, whether alpha of its group varies or not. Its value takes the "
+    "place of the law's own.",
+)
 DESIGN = Record(
     "design settings",
     (
@@ -47,8 +85,17 @@ DESIGN = Record(
         _design("lower", Number(minimum=0, maximum=1), "lower bound; above 0 where the power is below 1", 0.001),
         _design("upper", Number(minimum=0, maximum=1), "upper bound", 1.0),
         _design("power", POSITIVE, "mu of Eq. 12: a member's force is alpha^mu times its law's", 1.0),
+        Key("shared", ListOf(GROUP, what="member groups"), "groups whose members all have one alpha", default=()),
+        Key(
+            "mirrored",
+            ListOf(ListOf(GROUP, 2, "member groups"), what="lists of member groups"),
+            "lists of groups with equal counts: member k of each has the same alpha",
+            default=(),
+        ),
+        Key("variables", Named(_VARIABLE, "design variable"), "parameters of laws that vary, by name"),
     ),
-    doc="The design variables alpha, one for each member with `design: true`. Groups left out have the default.",
+    doc="The design variables: alpha, one for each member with `design: true`, and parameters of laws. In `initial`, "
+    "`lower`, `upper` and `power` groups left out have the default.",
 )
 _RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
 _OF_BODY = Key("body", BODY, "whose motion it is", required=True)

@@ -312,6 +312,21 @@ LAW = Tagged(
         ),
     },
 )
+
+
+def parameter_words() -> dict[str, str]:
+    """The numbers that laws have, each with its unit and the laws that have it."""
+    found: dict[str, tuple[str, list[str]]] = {}
+    for law, record in LAW.variants.items():
+        for key in record.keys:
+            if isinstance(key.kind, Number):
+                found.setdefault(key.name, (key.unit, []))[1].append(law)
+    return {
+        name: f"of {'every law' if len(laws) == len(LAW.variants) else ', '.join(laws)}, in {unit}"
+        for name, (unit, laws) in found.items()
+    }
+
+
 _END = ByShape(
     "the name of a point grid or {body: name, at: [x, y]}",
     scalar=Ref("point grid"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from mdstopo.case.model import MemberGroup, VolumeRow
+from mdstopo.case.model import MemberGroup, Variable, VolumeRow
 from mdstopo.case.reading import Reading
 from mdstopo.case.words import listed, number_text
 
@@ -12,17 +12,24 @@ ROUNDING = 1e-12
 """Sums are compared up to this share of them: 1020 x 0.001 may be spent exactly."""
 
 
-def check_feasible(rows: list[tuple[str, VolumeRow]], design: list[MemberGroup], reading: Reading) -> None:
+def check_feasible(
+    rows: list[tuple[str, VolumeRow]], design: list[MemberGroup], variables: tuple[Variable, ...], reading: Reading
+) -> None:
     """Notes rows (with the path of their bound) that bounds, alone or with one other row, make infeasible.
 
     The sum over a group can be anything between those at its bounds, whatever other groups do: so a row, and
-    a pair of rows, can be judged from the groups' sums alone.
+    a pair of rows, can be judged from the groups' sums alone. What variables cost counts as a group of its own.
     """
     low = {g.name: _sum(g, g.lower) for g in design}
     high = {g.name: _sum(g, g.upper) for g in design}
+    priced = [each for each in variables if each.cost > 0.0]
+    for each in priced:  # no group has a name with a blank
+        low[f"variable {each.name}"] = each.cost * each.lower * each.count
+        high[f"variable {each.name}"] = each.cost * each.upper * each.count
+    covered = {path: _covered(row, low, priced) for path, row in rows}
     alone: set[str] = set()
     for path, row in rows:
-        least, most = _total(low, row.groups), _total(high, row.groups)
+        least, most = _total(low, covered[path]), _total(high, covered[path])
         slack = ROUNDING * max(abs(least), abs(most), abs(row.bound))
         if row.sense != "at_least" and row.bound < least - slack:
             why = f"at the lower bounds the sum is {number_text(least)} already"
@@ -38,7 +45,7 @@ def check_feasible(rows: list[tuple[str, VolumeRow]], design: list[MemberGroup],
                 continue
             if path in alone or other_path in alone:
                 continue
-            most = _most_beside(row, other, low, high)
+            most = _most_beside(row.bound, covered[path], covered[other_path], low, high)
             if other.bound > most + ROUNDING * max(abs(most), abs(other.bound), abs(row.bound)):
                 reading.mistake(
                     other_path,
@@ -56,9 +63,17 @@ def _total(sums: dict[str, float], names: tuple[str, ...]) -> float:
     return math.fsum(sums[name] for name in names)
 
 
-def _most_beside(row: VolumeRow, other: VolumeRow, low: dict[str, float], high: dict[str, float]) -> float:
-    """The largest sum over `other`'s groups while `row` is at most its bound."""
-    shared = tuple(name for name in other.groups if name in row.groups)
-    rest = tuple(name for name in other.groups if name not in row.groups)
-    beside = tuple(name for name in row.groups if name not in other.groups)
-    return min(_total(high, shared), row.bound - _total(low, beside)) + _total(high, rest)
+def _covered(row: VolumeRow, known: dict[str, float], priced: list[Variable]) -> tuple[str, ...]:
+    """The groups and variables that a row sums up."""
+    groups = [name for name in row.groups if name in known]
+    return (*groups, *(f"variable {each.name}" for each in priced if set(each.groups) & set(row.groups)))
+
+
+def _most_beside(
+    bound: float, own: tuple[str, ...], others: tuple[str, ...], low: dict[str, float], high: dict[str, float]
+) -> float:
+    """The largest sum over `others` while that over `own` is at most its bound."""
+    both = tuple(name for name in others if name in own)
+    rest = tuple(name for name in others if name not in own)
+    beside = tuple(name for name in own if name not in others)
+    return min(_total(high, both), bound - _total(low, beside)) + _total(high, rest)

@@ -41,6 +41,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     _say_bodies(output, case)
     _say_joints(output, case)
     _say_members(output, case)
+    _say_variables(output, case)
     sums = totals(case)
     output.say("totals")
     output.table([[name, f"{number(value)} {unit}".rstrip()] for name, value, unit in sums])
@@ -55,6 +56,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "joints": [joint.name for joint in case.joints],
         "members": case.n_members,
         "design_variables": case.n_design,
+        "variables": {each.name: {"values": each.count, "initial": each.initial} for each in case.variables},
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
         "objectives": [objective.name for objective in case.objectives],
         "optimizable": case.is_optimizable and not refused,
@@ -122,6 +124,25 @@ def _say_members(output: Output, case: "Case") -> None:
                 design if group.design else "1 (no variable)",
             ]
         )
+    output.table(rows)
+
+
+def _say_variables(output: Output, case: "Case") -> None:
+    """What is shared, and the parameters of laws that vary."""
+    together = [f"shared: {name}" for name in case.shared]
+    together += [f"mirrored: {', '.join(names)}" for names in case.mirrored]
+    if together:
+        output.say(f"{case.space.size - case.space.length + case.n_design} different alphas; {'; '.join(together)}")
+    if not case.variables:
+        return
+    output.say(f"{case.space.length - case.n_design} values of laws that vary")
+    rows = [["variable", "of", "values", "initial", "lower", "upper", "unit", "cost"]]
+    for each in case.variables:
+        numbers = (number(value) for value in (each.initial, each.lower, each.upper))
+        rows.append(
+            [each.name, f"{each.parameter} of {', '.join(each.groups)}", str(each.count), *numbers, each.unit,
+             number(each.cost)]
+        )  # fmt: skip
     output.table(rows)
 
 

@@ -59,10 +59,19 @@ def material(case: Case) -> list[list[str]]:
         if isinstance(row, VolumeRow):
             values = (
                 row.bound,
-                *(float(row.coefficients @ x) for x in (case.initial, case.lower, case.upper)),
+                *(row.spent(x) for x in (case.start, *_bounds(case))),
             )
             rows.append([", ".join(row.groups), words[row.sense], *(number(value) for value in values)])
     return rows
+
+
+def _bounds(case: Case) -> tuple[Floats, Floats]:
+    """Designs with everything at its lower, and at its upper bound."""
+    low, high = [case.lower], [case.upper]
+    for each in case.variables:
+        low.append(np.full(each.count, each.lower))
+        high.append(np.full(each.count, each.upper))
+    return np.concatenate(low), np.concatenate(high)
 
 
 def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
@@ -75,7 +84,7 @@ def frequencies(case: Case, engine: Vibrates) -> list[dict[str, Any]]:
     for load_case in case.load_cases:
         duration = load_case.end - load_case.start
         initial, lower = (
-            _elastic(engine.natural_frequencies(alpha, load_case.name)) for alpha in (case.initial, case.lower)
+            _elastic(engine.natural_frequencies(alpha, load_case.name)) for alpha in (case.start, _bounds(case)[0])
         )
         both = min(len(initial), len(lower)) > 0
         found.append(

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 METHODS = ("adjoint", "direct", "iterative", "constant_load")
 _TIGHT = 1e-12  # solver tolerance for differences: what the integrator leaves of noise is divided by the step
+_SHOWN = 6  # values of a variable that are shown
 
 
 @click.command("gradient")
@@ -98,14 +99,14 @@ def command(
         announce_compilation(output, case)
         from mdstopo.evaluators import evaluator_of
         from mdstopo.status import RunStatus
-        from mdstopo.store.contents import sensitivity_part
+        from mdstopo.store.contents import design_part, sensitivity_part
 
         engine = evaluator_of(case)
         check_design(engine, alpha, alpha_path)
-        datasets: dict[str, Any] = {"design/alpha": alpha}
+        datasets: dict[str, Any] = design_part(case, engine.design(alpha))
         results, failure = _all_methods(engine, alpha, methods, estimating)
         for method, result in results.items():
-            datasets |= sensitivity_part(result["gradients"], method)
+            datasets |= sensitivity_part(result["gradients"], method, result["by_variable"])
         if differencing and not failure:
             failure = _difference(case, alpha, count, results, datasets)
         if history and not failure:
@@ -126,8 +127,12 @@ def command(
 def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool) -> "Case":
     """The case as the methods need it; raises CaseError where they cannot be applied."""
     from mdstopo.case.errors import CaseError
+    from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters
 
-    if not case.objectives or not case.n_design:
+    refused = [method for method in methods if method not in BY_PARAMETERS]
+    if case.variables and refused:
+        raise CaseError([case.marks.mistake("design.variables", no_parameters(refused[0]))], str(case_path))
+    if not case.is_optimizable:
         key = "members" if case.objectives else "objectives"
         words = "a gradient needs at least one objective and one design variable"
         raise CaseError([case.marks.mistake(key, words)], str(case_path))
@@ -146,7 +151,7 @@ def _all_methods(
     engine: "Evaluator", alpha: "NDArray[np.float64]", methods: tuple[str, ...], estimating: bool
 ) -> tuple[dict[str, dict[str, Any]], str]:
     """Gradients, time and disagreement by method, and why it failed where it did."""
-    from mdstopo.cli.gradient_numbers import disagreement, relative, timed
+    from mdstopo.cli.gradient_numbers import disagreement, relative, timed, whole_gradient
 
     results: dict[str, dict[str, Any]] = {}
     for method in methods:
@@ -154,13 +159,16 @@ def _all_methods(
         if not evaluation.status.usable:
             return results, f"{method}: {_in_words(evaluation)}"
         gradients = dict(evaluation.gradients)
-        reference = results[methods[0]]["gradients"] if results else gradients
+        whole = {name: whole_gradient(engine.case, evaluation, name) for name in gradients}
+        reference = results[methods[0]]["whole"] if results else whole
         results[method] = {
             "objectives": dict(evaluation.objectives),
             "gradients": gradients,
+            "by_variable": evaluation.variable_gradients,
+            "whole": whole,
             "seconds": timed(partial(engine.evaluate, alpha, sensitivity=method)),
             "message": evaluation.message if evaluation.status.ok else _in_words(evaluation),
-            "disagreement": {name: disagreement(gradients[name], reference[name]) for name in gradients},
+            "disagreement": {name: disagreement(whole[name], reference[name]) for name in gradients},
         }
         if estimating:
             errors = engine.with_errors(alpha, evaluation, method).errors
@@ -185,7 +193,7 @@ def _difference(
     """Add differences of some members to the results; why there are none, where there are none."""
     import numpy as np
 
-    from mdstopo.cli.gradient_numbers import chosen_members, differences
+    from mdstopo.cli.gradient_numbers import chosen_members, differences, ranges, value_differences
     from mdstopo.evaluators import evaluator_of
 
     members = chosen_members(case.n_design, count, case.optimizer.seed)
@@ -200,17 +208,28 @@ def _difference(
             raise ArithmeticError(f"{found.status.value} {found.message}".strip())
         return found.objectives
 
+    places = chosen_members(case.space.length - case.n_design, count, case.optimizer.seed)
     try:
-        found = differences(objectives, alpha, members)
+        found = differences(objectives, alpha, members, float(alpha[: case.n_design].max(initial=0.0)))
+        of_values = value_differences(objectives, case, alpha, places)
     except ArithmeticError as error:
         return f"differences: {error}"
     for result in results.values():
-        result["differences"] = {
-            name: float(np.abs(gradient[members] - found[name]).max() / (np.abs(gradient).max() or 1.0))
-            for name, gradient in result["gradients"].items()
-        }
+        result["differences"] = {}
+        for name, whole in result["whole"].items():
+            # values of variables by their share of the range, as in `whole`
+            own = np.concatenate([found.get(name, np.zeros(0)), of_values.get(name, np.zeros(0))])
+            chosen = np.concatenate([members, case.n_design + places])
+            off = np.abs(whole[chosen] - own).max(initial=0.0)
+            result["differences"][name] = float(off / (np.abs(whole).max(initial=0.0) or 1.0))
     datasets["differences/members"] = members.astype(np.int64)
     datasets |= {f"differences/{name}": values for name, values in found.items()}
+    if case.variables:
+        for name, values in of_values.items():
+            whole = np.full(case.space.length, np.nan)
+            whole[case.n_design + places] = values / ranges(case)[places]
+            named = case.space.named(whole)
+            datasets |= {f"differences/variables/{name}/{variable}": each for variable, each in named.items()}
     return ""
 
 
@@ -223,7 +242,11 @@ def _histories(engine: "Evaluator", case: "Case", alpha: "NDArray[np.float64]", 
         if not status.ok:
             return f"history: {status.value}"
         datasets[f"trajectories/{objective.load_case}/t"] = t
-        datasets |= sensitivity_part({objective.name: rows}, "direct/history")
+        datasets |= sensitivity_part(
+            {objective.name: rows[:, : case.n_design]},
+            "direct/history",
+            {objective.name: case.space.named(rows)} if case.variables else {},
+        )
     return ""
 
 
@@ -246,7 +269,7 @@ def _say(
                     method,
                     name,
                     number(result["objectives"][name], 9),
-                    number(float(abs(gradient).max()), 9),
+                    number(float(abs(gradient).max(initial=0.0)), 9),
                     number(result["disagreement"][name], 3),
                     number(result["differences"][name], 3) if "differences" in result else "",
                     duration(result["seconds"]),
@@ -254,10 +277,22 @@ def _say(
                 ]
             )
     output.table(rows)
+    _say_variables(output, results)
     for method, result in results.items():
         if result["message"]:
             output.notice(f"warning: {method}: {result['message']}")
     output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"], ["result", str(path)]], indent="")
+
+
+def _say_variables(output: Output, results: dict[str, dict[str, Any]]) -> None:
+    """What values of variables do to objectives, in their own units, by the first method."""
+    rows = [["objective", "variable", "derivative by its value"]]
+    for name, named in next(iter(results.values()), {}).get("by_variable", {}).items():
+        for variable, gradient in named.items():
+            more = f", ... ({len(gradient)} values)" if len(gradient) > _SHOWN else ""
+            rows.append([name, variable, ", ".join(number(value, 9) for value in gradient[:_SHOWN]) + more])
+    if len(rows) > 1:
+        output.table(rows)
 
 
 def _document(
@@ -269,7 +304,8 @@ def _document(
         "status": "failed" if failure else "converged",
         "reason": failure or "done",
         "methods": {
-            method: {key: value for key, value in result.items() if key != "gradients"}
+            method: {key: value for key, value in result.items() if key not in ("gradients", "by_variable", "whole")}
+            | ({"variables": result["by_variable"]} if result["by_variable"] else {})
             for method, result in results.items()
         },
         "integrator": engine.integrator,

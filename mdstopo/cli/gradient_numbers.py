@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    from mdstopo.case.model import Case
     from mdstopo.error_estimate import ErrorEstimate
     from mdstopo.evaluation import Evaluation
 
@@ -51,23 +52,55 @@ def chosen_members(count: int, wanted: int, seed: int) -> NDArray[np.intp]:
     return np.sort(rng.choice(count, size=min(wanted, count), replace=False)).astype(np.intp)
 
 
-def differences(objectives: Objectives, alpha: Floats, members: NDArray[np.intp]) -> dict[str, Floats]:
+def ranges(case: "Case") -> Floats:
+    """(P,): upper less lower bound of every value of the case's variables; 1 where they are one."""
+    width = [np.full(each.count, each.upper - each.lower or 1.0) for each in case.variables]
+    return np.concatenate(width) if width else np.zeros(0)
+
+
+def whole_gradient(case: "Case", evaluation: "Evaluation", name: str) -> Floats:
+    """(N + P,): dG/dalpha, then the derivatives by variables, as shares of their ranges, so that all compare."""
+    named = evaluation.variable_gradients.get(name, {})
+    own = np.concatenate(list(named.values())) * ranges(case) if named else np.zeros(0)
+    return np.concatenate([evaluation.gradients[name], own])
+
+
+def value_differences(
+    objectives: Objectives, case: "Case", design: Floats, places: NDArray[np.intp]
+) -> dict[str, Floats]:
+    """As `differences`, by some values of the case's variables, as shares of their ranges."""
+    if not len(places):
+        return {}
+    n, width = case.n_design, ranges(case)
+    low = np.concatenate([np.full(each.count, each.lower) for each in case.variables])
+
+    def of_shares(shares: Floats) -> Mapping[str, float]:
+        return objectives(np.concatenate([design[:n], low + shares * width]))
+
+    return differences(of_shares, (design[n:] - low) / width, places, 1.0)
+
+
+def differences(
+    objectives: Objectives, alpha: Floats, members: NDArray[np.intp], size: float | None = None
+) -> dict[str, Floats]:
     """dG/dalpha of some members by central differences, extrapolated to step zero (Richardson), by objective.
+
+    size: what steps are a share of; default the largest alpha.
 
     Steps never leave alpha >= 0: where a member is closer to zero than the step, its step is shorter; at
     zero itself differences are one-sided.
     """
     found: dict[str, Floats] = {}
     for place, member in enumerate(members):
-        for name, value in _one(objectives, alpha, int(member)).items():
+        for name, value in _one(objectives, alpha, int(member), size).items():
             found.setdefault(name, np.zeros(len(members)))[place] = value
     return found
 
 
-def _one(objectives: Objectives, alpha: Floats, member: int) -> dict[str, float]:
+def _one(objectives: Objectives, alpha: Floats, member: int, size: float | None) -> dict[str, float]:
     here = float(alpha[member])
     central = here > 0.0
-    step = _STEP * float(alpha.max(initial=0.0)) or _STEP
+    step = _STEP * (float(alpha.max(initial=0.0)) if size is None else size) or _STEP
     if central:
         step = min(step, 0.5 * here)
     # The error of a central difference has even powers of the step only.

@@ -99,12 +99,15 @@ def open_case(path: Path, overrides: dict[str, str]) -> "Case":
 
 
 def open_design(path: Path | None, case: "Case") -> "NDArray[np.float64]":
-    """The design of --alpha, else the case's own. Raises StoreError for a file that holds none."""
+    """The design of --alpha, else the case's own: alpha, then the values of variables.
+
+    Raises StoreError for a file that holds none.
+    """
     if path is None:
-        return case.initial
+        return case.start
     from mdstopo.store.design import read_design
 
-    return read_design(path, case.n_design)
+    return case.whole(read_design(path, case.n_design, case.space.parts))
 
 
 def check_design(engine: "Evaluator", alpha: "NDArray[np.float64]", path: Path | None) -> None:

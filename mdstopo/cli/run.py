@@ -154,6 +154,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
 
     from mdstopo.case.model import VolumeRow
     from mdstopo.case.units import words
+    from mdstopo.cli.show import values_text
 
     case, lines = outcome.case, []
     for i, (row, excess) in enumerate(zip(case.constraints, outcome.constraints.tolist(), strict=True)):
@@ -164,14 +165,17 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
             lines.append((f"{row.over_time} {words(row.response)}{where}", found))
             lines += [(title, sentence) for title, sentence in lines_of(outcome.conclusion, f"constraints[{i}]")]
         else:
-            used = float(row.coefficients @ outcome.alpha)
+            used = row.spent(np.concatenate([outcome.alpha, *outcome.variables.values()]))
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower
     share = np.divide(outcome.alpha - case.lower, width, out=np.zeros(case.n_design), where=width > 0.0)
     grey = int(np.count_nonzero((share > _GREY[0]) & (share < _GREY[1])))
     full = int(np.count_nonzero(share >= _GREY[1]))
-    lines.append(("members", f"{full} present, {grey} grey, {case.n_design - full - grey} absent of {case.n_design}"))
+    if case.n_design:
+        gone = case.n_design - full - grey
+        lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}"))
+    lines += [(each.name, f"{values_text(outcome.variables[each.name])} {each.unit}") for each in case.variables]
     return lines
 
 
@@ -192,6 +196,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         ],
         "best_start": outcome.best_start,
         "constraints": outcome.constraints,
+        "variables": outcome.variables,
         "combined": outcome.combined,
         "utopia": outcome.utopia,
         "maxima": outcome.maxima,

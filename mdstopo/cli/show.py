@@ -11,6 +11,9 @@ from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.uncertain import say_result
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from mdstopo.store.reader import ResultView
 
 _ROWS = 12  # iterates that a condensed history shows
@@ -63,6 +66,12 @@ def resume_command(view: "ResultView") -> str:
     words = [word for word in words if word not in ("--overwrite", "--resume")]
     place = 3 if words[1] == "run" else len(words)
     return shlex.join([*words[:place], "--resume", *words[place:]])
+
+
+def values_text(values: "NDArray[np.generic]", shown: int = 6) -> str:
+    """The values of a variable; the first of many."""
+    more = f", ... ({len(values)} values)" if len(values) > shown else ""
+    return ", ".join(number(value, 9) for value in values[:shown]) + more
 
 
 def condensed(count: int, rows: int = _ROWS) -> list[int]:
@@ -150,6 +159,12 @@ def _say_members(output: Output, view: "ResultView", count: int) -> None:
 
     if "design/alpha" not in view.arrays or count == 0:
         return
+    values = view.under("design/variables")
+    if values:
+        output.say("design variables of laws")
+        output.table([["name", "value"], *([name, values_text(each)] for name, each in values.items())])
+    if not len(view.alpha):
+        return
     alpha, design = view.alpha, np.asarray(view.array("members/design"), dtype=np.bool_)
     p, q = view.array("members/p")[design], view.array("members/q")[design]
     groups = np.array(view.lines("members/group"))[design]
@@ -187,4 +202,6 @@ def _document(view: "ResultView") -> dict[str, Any]:
         content["iterations"] = len(columns["combined"]) - 1
         content["evaluations"] = int(columns["evaluations"][-1])
         content["objectives"] = {name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))}
+    if variables := view.under("design/variables"):
+        content["variables"] = variables
     return content

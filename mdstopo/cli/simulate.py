@@ -59,7 +59,7 @@ def command(
         announce_compilation(output, case)
         from mdstopo.engine import Evaluator
         from mdstopo.status import RunStatus, Status
-        from mdstopo.store.contents import trajectory_part
+        from mdstopo.store.contents import design_part, trajectory_part
 
         began = time.perf_counter()
         engine = Evaluator(case)
@@ -73,7 +73,7 @@ def command(
         file.write(
             status.value,
             reason,
-            {"design/alpha": alpha} | trajectory_part(motions),
+            design_part(case, alpha) | trajectory_part(motions),
             {"integrator": engine.integrator, "integrator_reason": engine.integrator_reason},
         )
     output.say(f"{case.title or case.name}: {reason}")

@@ -84,7 +84,8 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
     w, m = directions.shape
     signs = np.array([sign_of(objective) for objective in case.objectives])
     objectives = np.full((w, m), np.nan)
-    alpha = np.full((w, case.n_design), np.nan)
+    space = case.space
+    designs = np.full((w, space.length), np.nan)
     numbers = {name: np.full(w, np.nan) for name in ("kkt", "violation", "seconds")}
     status, reason = ["running"] * w, ["not solved yet"] * w
     visited: dict[int, list[Floats]] = {}
@@ -100,14 +101,14 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
         if point is None:
             continue
         status[j], reason[j] = point.status.value, point.reason
-        objectives[j], alpha[j] = point.objectives, point.alpha
+        objectives[j], designs[j] = point.objectives, space.expand(point.alpha)
         for name, column in numbers.items():
             column[j] = getattr(point, name)
         visited.setdefault(j, [point.visited])
     part: Datasets = {
         "weights": directions,
         "objectives": objectives,
-        "alpha": alpha,
+        "alpha": designs[:, : space.n_alpha],
         "status": status,
         "reason": reason,
         "dominated": _dominated(signs * objectives, numbers["violation"], status),
@@ -115,8 +116,9 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
         "utopia": np.tile(front.utopia, (w, 1)),
         "maxima": np.tile(front.maxima, (w, 1)),
         "ends": np.array([end.objectives for end in front.ends]),
-        "ends_alpha": np.array([end.alpha for end in front.ends]),
+        "ends_alpha": np.array([space.expand(end.alpha)[: space.n_alpha] for end in front.ends]),
     }
+    part |= {f"variables/{name}": values for name, values in space.named(designs).items()}
     part |= numbers
     part |= {f"visited/{j}": np.concatenate(rows) for j, rows in sorted(visited.items())}
     return {f"pareto/{name}": value for name, value in part.items()}

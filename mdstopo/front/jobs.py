@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import Case
+from mdstopo.case.model import Case, FloatArray
 from mdstopo.front.tasks import Found, StoppedError, Task, failed, solve
 from mdstopo.session.combining import even, problem_of
 from mdstopo.session.engine import Engine, make_engine
@@ -53,8 +53,13 @@ def perform(setting: Setting, job: Job, stop: Callable[[], bool] | None = None) 
     except Exception as error:
         words = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
         if isinstance(job, Trial):
-            return failed(0, job.key, job.case.initial, len(job.case.objectives), words)
+            return failed(0, job.key, first(job.case), len(job.case.objectives), words)
         return failed(job.point, job.key(setting.case_key), job.start, len(setting.case.objectives), words)
+
+
+def first(case: Case) -> FloatArray:
+    """The optimiser's x of the initial design."""
+    return case.space.reduce(case.start)
 
 
 def ready_engine(setting: Setting) -> Engine:
@@ -88,16 +93,16 @@ def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
     except KeyboardInterrupt as error:
         raise StoppedError from error
     except CaseError as error:
-        return failed(0, trial.key, trial.case.initial, m, "; ".join(mistake.message for mistake in error.mistakes))
+        return failed(0, trial.key, first(trial.case), m, "; ".join(mistake.message for mistake in error.mistakes))
     except NoUtopiaError as error:
-        return failed(0, trial.key, trial.case.initial, m, str(error))
+        return failed(0, trial.key, first(trial.case), m, str(error))
     if outcome.status is RunStatus.INTERRUPTED:
         raise StoppedError
     objectives = np.array([outcome.objectives[each.name] for each in trial.case.objectives])
     state = outcome.states[outcome.best_start]
     assert state is not None
     return Found(
-        0, trial.key, outcome.alpha, objectives, float(state.best_objective), outcome.status, outcome.reason,
+        0, trial.key, state.best_alpha, objectives, float(state.best_objective), outcome.status, outcome.reason,
         outcome.evaluations, float(state.kkt), float(state.best_violation),
         np.array(outcome.history["objectives"], dtype=np.float64), time.perf_counter() - began, platform.node(),
     )  # fmt: skip

@@ -23,7 +23,7 @@ from mdstopo.session.combining import even
 from mdstopo.session.crew import cores
 from mdstopo.session.engine import make_engine
 from mdstopo.session.ready import compile_apart
-from mdstopo.session.starts import first_design, replaced
+from mdstopo.session.starts import NOTHING_VARIES, first_design, replaced, unshared
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
@@ -132,8 +132,8 @@ def check(case: Case) -> None:
     mistakes = []
     if len(case.objectives) < 2:
         mistakes.append(case.marks.mistake("objectives", "a front needs at least two objectives"))
-    if not case.n_design:
-        mistakes.append(case.marks.mistake("members", "an optimisation needs members with `design: true`"))
+    if not case.n_design and not case.variables:
+        mistakes.append(case.marks.mistake("members", NOTHING_VARIES))
     if mistakes:
         raise CaseError(mistakes, str(case.path or case.name))
 
@@ -206,6 +206,8 @@ class _FrontRun:
         assert self.case.combine is not None
         problem = make_engine(self.case).problem(even(self.case))
         stated, first = first_design(self.case, problem, None)
+        if words := unshared(self.case, None):
+            self.notify(words)
         if not np.array_equal(stated, first):
             self.notify(replaced(stated, first))
         more = [random_feasible(problem, self.case.optimizer.seed, k) for k in range(1, self.ask.starts)]

@@ -13,7 +13,7 @@ from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
 from mdstopo.front.content import read_tasks, tasks_part
 from mdstopo.front.directions import MOST, parse_range
-from mdstopo.front.jobs import Setting, Trial
+from mdstopo.front.jobs import Setting, Trial, first
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.session import WORTH, Snapshot
 from mdstopo.front.tasks import Found, case_key, failed
@@ -169,6 +169,7 @@ class _Sweep:
         self.keys = keys
         self.values = values
         self.runs = [case_key(case) for case in cases]
+        self.spaces = [case.space for case in cases]
         self.solved: dict[str, Found] = {}
         self.fixed: Datasets = case_part(base)
         self.provenance = Provenance.collect(command)
@@ -207,7 +208,11 @@ class _Sweep:
         for k, key in enumerate(self.keys):
             part[f"values/{key}"] = [row[k] for row in self.values]
         tasks = [each for each in done if each is not None]
-        part |= {f"alpha/{i}": each.alpha for i, each in enumerate(done) if each is not None}
+        for i, (each, space) in enumerate(zip(done, self.spaces, strict=True)):
+            if each is not None:
+                design = space.expand(each.alpha)
+                part[f"alpha/{i}"] = design[: space.n_alpha]
+                part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
         image = result_image(self.base, "sweep", status.value, reason, datasets, self.provenance, {}, ())
@@ -222,4 +227,4 @@ def shortest(value: float) -> str:
 
 def lost(case: Case, result: Lost) -> Found:
     """What stands for a run that no worker finished; its key is empty, so that a resumed sweep tries again."""
-    return failed(0, "", case.initial, len(case.objectives), result.reason)
+    return failed(0, "", first(case), len(case.objectives), result.reason)

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 class Task:
     """point: which point of the front it is for, or -1 - i for the optimum of objective i alone.
 
-    start (N,): the design to begin with; iterations: at most so many.
+    start (n,): the optimiser's x to begin with; iterations: at most so many.
     """
 
     point: int
@@ -49,11 +49,11 @@ class Task:
 class Found:
     """What a task has found.
 
-    alpha (N,): its best design; objectives (m,): all raw G there, NaN where it could not be evaluated; combined: U;
-    visited (K, m): raw G of every iterate, NaN of objectives that were not simulated; the last row is the design that
-    is kept and has all. kkt: the projected residual at the last iterate, relative to the largest gradient entry, NaN
-    where another design is kept; violation: the largest excess over a constraint, relative to its bound. key: empty for
-    what is not to be used again (a lost one).
+    alpha (n,): its best design, as the optimiser's x (`case.space`); objectives (m,): all raw G there, NaN where it
+    could not be evaluated; combined: U; visited (K, m): raw G of every iterate, NaN of objectives that were not
+    simulated; the last row is the design that is kept and has all. kkt: the projected residual at the last iterate,
+    relative to the largest gradient entry, NaN where another design is kept; violation: the largest excess over a
+    constraint, relative to its bound. key: empty for what is not to be used again (a lost one).
     """
 
     point: int
@@ -127,7 +127,7 @@ def solve(engine: Engine, case: Case, task: Task, key: str, stop: Callable[[], b
 
 def _final(engine: Engine, case: Case, alpha: Floats) -> tuple[Floats, float]:
     """All raw objectives of a design, and its largest excess over a constraint."""
-    evaluation = engine.evaluate(alpha, gradient=False)
+    evaluation = engine.evaluate(case.space.expand(alpha), gradient=False)
     values = np.array([evaluation.objectives[objective.name] for objective in case.objectives])
     worst = 0.0
     for row, excess in zip(case.constraints, evaluation.constraints.tolist(), strict=True):

@@ -14,7 +14,8 @@ from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces, inerter_force
 from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
-from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response
+from mdstopo.general.parameters import add_event, add_force_parameters, add_parameters, add_times
+from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response, value_at
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import DESIGN, FORCES
 from mdstopo.jit import kernel
@@ -28,7 +29,10 @@ ASIDE, VANISHING = 1e-6, 0.02
 
 @kernel
 def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # type: ignore[no-untyped-def]
-    """out (M_padded,) -= f_i (b_i . T z) at unit strength, += weight V_i, of all design members at one state."""
+    """out (M_padded,) -= f_i (b_i . T z) at unit strength, += weight V_i, of all design members at one state.
+
+    Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
+    """
     n_pair = model.pair.shape[0]
     work[DESIGN] += 1
     rel = np.empty((n_pair, POSE))
@@ -50,6 +54,8 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # t
             for r in range(6):
                 value += row[r] * z[3 * model.pair[p, r // 3] + r % 3]
             out[i] -= f * value
+    if model.varied.shape[0] > 0:
+        add_parameters(model, segment, t, strength, q, v, a, z, weight, out)
 
 
 @kernel
@@ -74,7 +80,9 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # 
         for k in range(model.block.shape[0]):
             if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
                 continue
-            i = model.block[k, 1] + who
+            if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
+                continue
+            i = model.block[k, 1] + who - model.block[k, 7]
             if model.block[k, 3] == INERTER:
                 f = inerter_force(model, k, i, q, v, a, row)
             else:
@@ -83,6 +91,9 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # 
                 total += strength[0, i] * f
             else:
                 out[i] += scale * sign * f
+    if model.varied.shape[0] > 0:
+        sign = 1.0 if total >= 0.0 else -1.0
+        add_force_parameters(model, segment, model.response[j, 5], who, t, strength, q, v, a, scale * sign, out)
 
 
 @kernel
@@ -110,10 +121,11 @@ def free_only(model, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def through_events(model, track, state, lam_q, lam_v, drops):  # type: ignore[no-untyped-def]
+def through_events(model, track, state, lam_q, lam_v, drops, strength, out):  # type: ignore[no-untyped-def]
     """Pull cotangents behind the events of a state back to before them (saltation), in place.
 
-    drops (E,): by how much an integrand falls at each event (`event_drops`), or no rows.
+    drops (E,): by how much an integrand falls at each event (`event_drops`), or no rows. out (M_padded + P,): what
+    parameters do to the events' times is added to it, behind the members.
     """
     last = track.index[state, 3]
     first = track.index[state - 1, 3] if state > 0 else last
@@ -124,6 +136,8 @@ def through_events(model, track, state, lam_q, lam_v, drops):  # type: ignore[no
         pulled = 0.0
         for d in range(lam_v.shape[0]):
             pulled += lam_v[d] * track.salt[e, 2, d]
+        if model.varied.shape[0] > 0:
+            add_event(model, track, strength, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), out)
         for d in range(lam_v.shape[0]):
             lam_q[d] -= pulled * track.salt[e, 0, d]
             lam_v[d] -= pulled * track.salt[e, 1, d]
@@ -136,11 +150,13 @@ def through_events(model, track, state, lam_q, lam_v, drops):  # type: ignore[no
 
 
 @kernel
-def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_bar, drops, desk, out, work):  # type: ignore[no-untyped-def]
+def sweep(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, w, c, lam_q, lam_v, bars, rows_bar, drops, j, square, desk, out, work
+):
     """Pull cotangents of fraction c of step w's motion back to the start; every stage adds to out (M_padded,).
 
     bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of all stages (no rows: none); drops as of
-    `through_events`.
+    `through_events`; j, square: as of `parameters.add_times`.
     """
     n = lam_q.shape[0]
     z = np.empty((17, n))
@@ -155,13 +171,15 @@ def sweep(tag, model, tables, strength, track, w, c, lam_q, lam_v, bars, rows_ba
         step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, b, r, z, y, desk, work)
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
-        for j in range(end - o):
-            stage = track.stage[o + j]
-            add_design(model, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], z[j], 0.0, out, work)
+        for i in range(end - o):
+            stage = track.stage[o + i]
+            add_design(model, segment, track.when[o + i], strength, stage[0], stage[1], stage[2], z[i], 0.0, out, work)
         c = 1.0
         before = track.index[w, 1]
+        if model.varied.shape[0] > 0:
+            add_times(model, track, strength, count, before + 1, j, square, lam_v, 0.0, out)
         if before >= 0:
-            through_events(model, track, before + 1, lam_q, lam_v, drops)
+            through_events(model, track, before + 1, lam_q, lam_v, drops, strength, out)
         w = before
 
 
@@ -175,7 +193,10 @@ def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, 
     w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, out, work)
     if w >= 0:
         no_drops = np.empty(0)
-        sweep(tag, model, tables, strength, track, w, c, bars[0], bars[1], none, no_rows, no_drops, desk, out, work)
+        sweep(
+            tag, model, tables, strength, track, count, w, c, bars[0], bars[1], none, no_rows, no_drops, np.int64(-1),
+            np.bool_(False), desk, out, work,
+        )  # fmt: skip
 
 
 @kernel
@@ -220,11 +241,17 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     add_design(model, segment, t, strength, q, v, a, z, weight, out, work)
     explicit_part(model, segment, j, who, t, strength, q, v, a, 1.0, out)
     at = k if c <= 0.0 else k + 1
+    if model.varied.shape[0] > 0 and (c <= 0.0 or c >= 1.0):
+        # what lies behind the state does nothing to a value before it
+        behind = bars[1] if c <= 0.0 or at == count else np.zeros(n)
+        add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, row[4], out)
     if c <= 0.0 and k > 0:
-        through_events(model, track, k, bars[0], bars[1], np.empty(0))
+        through_events(model, track, k, bars[0], bars[1], np.empty(0), strength, out)
     if (c <= 0.0 and k > 0) or c >= 1.0:
         event = _first_event(track, at)
         if event >= 0:
+            if model.varied.shape[0] > 0:
+                add_event(model, track, strength, event, row[4], out)
             for d in range(n):
                 bars[0, d] -= row[4] * track.salt[event, 0, d]
                 bars[1, d] -= row[4] * track.salt[event, 1, d]
@@ -254,7 +281,12 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
         lam_q = np.zeros(n)
         lam_v = np.zeros(n)
         drops = event_drops(model, strength, track, count, j, square, desk)
-        sweep(tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, drops, desk, out, work)
+        if model.varied.shape[0] > 0:
+            add_times(model, track, strength, count, count, j, square, lam_v, 0.0, out)
+        sweep(
+            tag, model, tables, strength, track, count, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, drops, j, square,
+            desk, out, work,
+        )  # fmt: skip
     return total
 
 
@@ -277,23 +309,6 @@ def event_drops(model, strength, track, count, j, square, desk):  # type: ignore
             values *= values
         drops[e] = values[0] - values[1]
     return drops
-
-
-@kernel
-def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-untyped-def]
-    """g_j at a state (2, n), in the modes that members are in."""
-    n = model.mass.shape[0]
-    q = state[0].copy()
-    v = state[1].copy()
-    a = np.empty(n)
-    lam = np.empty(model.size[0])
-    bars = np.empty((3, n))
-    row_bar = np.empty(model.size[0])
-    balance(model, strength, segment, t, q, v, np.bool_(False), desk, a, lam)
-    who = -1
-    if model.response[j, 0] == MEMBER_FORCE:
-        who = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
-    return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
 
 
 @kernel

@@ -12,6 +12,7 @@ from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.responses import KINDS, POINT
+from mdstopo.general.variables import RATES, each_member, lasting, varied
 from mdstopo.integrators.choice import choose
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
@@ -66,7 +67,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
     fine = choose(case.solver, "laws")[0] == "generalized_alpha"
-    more = [t for group in case.members for law in group.laws for t in laws.landings(law, fine)]
+    more = [t for group in case.members for law in lasting(case, group) for t in laws.landings(law, fine)]
     more += motion_times(load_case)
     times = breakpoints(load_case, more)
     driven, drive = drives(load_case, times, q0, v0)
@@ -98,7 +99,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
         load_force=load_force, bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
         joint_par=joint_par, row=rows, place=place, size=np.array([*size, int(damped)], dtype=np.int64),
-        response=response, response_par=response_par,
+        response=response, response_par=response_par, varied=varied(case, members["block"]),
     )  # fmt: skip
     return GeneralScene(
         load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), redundant, responses,
@@ -146,35 +147,41 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...
 
 
 def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], times: FloatArray) -> dict[str, Any]:
-    """Blocks of one law each: a group with a list of laws has as many, which share its design variables."""
+    """Blocks of one law each: a group with a list of laws has as many, which share its design variables.
+
+    A law of which each member has a parameter of its own has a block for each member.
+    """
     blocks, powers, rows, active, level, columns = [], [], [], [], [], []
     curves: list[float] = []
     first = start = 0
     segments = len(times) - 1
     for number, group in enumerate(case.members):
         pair = pairs.setdefault((index[group.body_from], index[group.body_to]), len(pairs))
-        count = len(group)
-        padded = -(-count // VECTOR) * VECTOR
-        for record in group.laws:
-            member = np.zeros((5, padded))
-            member[0:2, :count], member[2:4, :count] = group.p_local.T, group.q_local.T
+        for place, record in enumerate(group.laws):
             rest = getattr(record, "free_length", None)
-            member[4, :count] = group.length if rest is None else rest
             code = laws.CODES[record.type]
-            blocks.append([pair, start, start + padded, code, first if group.design else -1, count, number])
-            rows.append(laws.parameters(record, curves))
-            powers.append(group.power)
-            columns.append(member)
             begin = -np.inf if record.active_from is None else record.active_from
             until = np.inf if record.active_until is None else record.active_until
             middle = 0.5 * (times[:-1] + times[1:])
-            active.append((middle > begin) & (middle < until))
             known = segment_values(record.table, times) if isinstance(record, TableLaw) else np.zeros((segments, 2))
-            level.append(known)
-            start += padded
-        first += count if group.design else 0
+            parts = np.arange(len(group))[:, None] if each_member(case, group, place) else np.arange(len(group))[None]
+            for part in parts:
+                count = len(part)
+                padded = -(-count // VECTOR) * VECTOR
+                member = np.zeros((5, padded))
+                member[0:2, :count], member[2:4, :count] = group.p_local[part].T, group.q_local[part].T
+                member[4, :count] = group.length[part] if rest is None else rest
+                variable = first + int(part[0]) if group.design else -1
+                blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0])])
+                rows.append(laws.parameters(record, curves))
+                powers.append(group.power)
+                columns.append(member)
+                active.append((middle > begin) & (middle < until))
+                level.append(known)
+                start += padded
+        first += len(group) if group.design else 0
     return {
-        "block": np.array(blocks, dtype=np.int64).reshape(-1, 7),
+        "block": np.array(blocks, dtype=np.int64).reshape(-1, 8),
         "law": np.array(rows, dtype=np.float64).reshape(-1, laws.PARAMETERS),
         "active": np.array(active, dtype=np.int64).reshape(-1, segments).T.copy(),
         "level": np.array(level, dtype=np.float64).reshape(-1, segments, 2).transpose(1, 0, 2).copy(),
@@ -287,6 +294,7 @@ def _responses(
 def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, ...]) -> bool:
     """Whether anything depends on velocity: then the steps' stages need velocities that are right."""
     forces = any(laws.depends_on_rate(law) for group in case.members for law in group.laws)
+    forces = forces or any(variable.parameter in RATES for variable in case.variables)
     bushed = any(any(bushing.damping) for bushing in case.bushings)
     looks = any(
         over_time in ("mean", "rms", "integral") and response.kind not in ("energy", "displacement", "angle")

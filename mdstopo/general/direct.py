@@ -14,9 +14,10 @@ from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import INERTER, unpack_general
+from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.track import carve_track, restore_modes
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.laws.table import law
+from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 
 @kernel
@@ -118,18 +119,77 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
             for d in range(4 * n):
                 column[i, d] = spare[d]
             column[i, 4 * n] += spare[4 * n]
+    if model.varied.shape[0] > 0:
+        _parameters_through_step(model, strength, track, w, column, matrix, spare)
     return settled
 
 
 @kernel
-def jump(model, track, state, column, drops):  # type: ignore[no-untyped-def]
+def _parameters_through_step(model, strength, track, w, column, matrix, spare):  # type: ignore[no-untyped-def]
+    """The rows of `column` behind the members, derivatives by parameters, through the map of step w."""
+    n = model.mass.shape[0]
+    o = track.index[w, 0]
+    segment = track.index[w, 2]
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    width = 4 * n + 1
+    members = model.member.shape[1]
+    for c in range(members, column.shape[0]):
+        spare[:] = 0.0
+        for b in range(4 * n):
+            value = column[c, b]
+            if value != 0.0:
+                for d in range(width):
+                    spare[d] += value * matrix[b, d]
+        for e in range(model.varied.shape[0]):
+            k = model.varied[e, 0]
+            place = model.varied[e, 1]
+            if model.varied[e, 2] != c - members or place > FREE_LENGTH or model.active[segment, k] == 0:
+                continue
+            for j in range(track.index[w + 1, 0] - o):
+                stage = track.stage[o + j]
+                for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+                    slope, _ = parameter_slopes(
+                        model, k, i, place, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], row,
+                        row_rate,
+                    )  # fmt: skip
+                    slope *= strength[0, i]
+                    for r in range(6):
+                        b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
+                        for d in range(width):
+                            spare[d] -= slope * row[r] * matrix[b, d]
+        for d in range(4 * n):
+            column[c, d] = spare[d]
+        column[c, 4 * n] += spare[4 * n]
+
+
+@kernel
+def shift_times(model, track, strength, count, state, j, square, column):  # type: ignore[no-untyped-def]
+    """What shifting the times of laws that begin or end at a state does to the derivatives by them (`parameters`)."""
+    n = model.mass.shape[0]
+    dv = np.empty(n)
+    for e in range(model.varied.shape[0]):
+        if model.varied[e, 1] <= FREE_LENGTH:
+            continue
+        does, drop = time_jump(model, track, strength, count, state, e, j, square, dv)
+        if does:
+            c = model.member.shape[1] + model.varied[e, 2]
+            for d in range(n):
+                column[c, n + d] += dv[d]
+            column[c, 4 * n] += drop
+
+
+@kernel
+def jump(model, track, strength, count, state, column, drops, j, square):  # type: ignore[no-untyped-def]
     """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows.
 
-    drops as of `adjoint.through_events`: the last column, an integral's derivative, takes them in.
+    drops as of `adjoint.through_events`: the last column, an integral's derivative, takes them in. j, square: as of
+    `parameters.time_jump`.
     """
     n = model.mass.shape[0]
     if state == 0:
         return
+    members = model.member.shape[1]
     for e in range(track.index[state - 1, 3], track.index[state, 3]):
         if track.event[e, 0] != state:
             continue
@@ -137,10 +197,16 @@ def jump(model, track, state, column, drops):  # type: ignore[no-untyped-def]
             later = 0.0
             for d in range(n):
                 later -= track.salt[e, 0, d] * column[i, d] + track.salt[e, 1, d] * column[i, n + d]
+            if i >= members:
+                for entry in range(model.varied.shape[0]):
+                    if model.varied[entry, 2] == i - members:
+                        later += event_slope(model, track, strength, e, entry)
             for d in range(n):
                 column[i, n + d] += track.salt[e, 2, d] * later
             if drops.shape[0] > 0:
                 column[i, 4 * n] += drops[e] * later
+    if model.varied.shape[0] > 0:
+        shift_times(model, track, strength, count, state, j, square, column)
 
 
 @entry
@@ -192,6 +258,9 @@ def push(  # type: ignore[no-untyped-def]
     else:
         w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
         last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
+    looked = j if integral > 0 else np.int64(-1)
+    if model.varied.shape[0] > 0 and last >= 0 and w >= 0:
+        shift_times(model, track, strength, count, np.int64(0), looked, integral == 2, column)
     for k in range(last):
         o = track.index[k, 0]
         end = track.index[k + 1, 0]
@@ -202,7 +271,7 @@ def push(  # type: ignore[no-untyped-def]
         )
         if not settled:
             return k
-        jump(model, track, k + 1, column, drops)
+        jump(model, track, strength, count, k + 1, column, drops, looked, integral == 2)
     if (
         integral == 0
         and w >= 0
@@ -249,5 +318,7 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
             for d in range(n):
                 padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
         unscale_general(model.block, model.power, alpha, padded, out[k])
+        if k == 0 and model.varied.shape[0] > 0:
+            shift_times(model, track, strength, count, k, np.int64(-1), np.bool_(False), column)
         if k > 0:
-            jump(model, track, k, column, np.empty(0))
+            jump(model, track, strength, count, k, column, np.empty(0), np.int64(-1), np.bool_(False))

@@ -15,10 +15,11 @@ from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
 from mdstopo.general.kinks import kinks, landed
-from mdstopo.general.model import COUNT, GROUP, INERTER, START, GeneralModel, pack_general
+from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, pack_general
 from mdstopo.general.responses import kinked
 from mdstopo.general.rivals import compete, members_peaks
 from mdstopo.general.track import GRAZES, track_room
+from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
@@ -48,17 +49,22 @@ class GeneralDriver:
         self.scene = scene
         self.method = method
         model = scene.model
+        #: the start that was assembled, where it was
+        self._start = model.q0, model.v0
+        self._model = model
         self._packed = self.ints, self.floats = pack_general(model)
         self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
         self.reductions = np.zeros(len(scene.responses), dtype=np.int64)
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
+        self._placing = Placing(case, scene.load_case, model) if case.variables else None
+        varied = 0 if self._placing is None else len(self._placing.initial)
         self._alpha = np.zeros(n_design)
         self.strength = np.zeros((2, padded + 1))
-        self.padded = np.zeros(padded)
+        self.padded = np.zeros(padded + varied)
         self.rows = np.zeros((count, ROWS, COLUMNS))
         self.found = np.zeros(count, dtype=np.int64)
-        self.gradients = np.zeros((count, ROWS, n_design))
+        self.gradients = np.zeros((count, ROWS, n_design + varied))
         self.where = np.full(3, -1, dtype=np.int64)
         self.events = 0
         #: where the steps of the last evaluation had to end (`kinks`)
@@ -68,6 +74,11 @@ class GeneralDriver:
         self._message = ""
         self._make_room(method.steps, method.stages, 64)
         self._fit()
+
+    @property
+    def alpha(self) -> FloatArray:
+        """(N,) of the design that was last taken."""
+        return self._alpha
 
     @property
     def entry(self) -> Any:
@@ -116,8 +127,8 @@ class GeneralDriver:
             )
         self.moved = float(np.abs(q - model.q0).max())
         if move:
-            n = len(q)
-            self.floats[n : 2 * n], self.floats[2 * n : 3 * n] = q, v
+            self._start = q, v
+            self._place(np.zeros(0))
 
     def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
@@ -225,12 +236,12 @@ class GeneralDriver:
         return total
 
     def run(self, alpha: FloatArray, tangent: bool, landings: Sequence[float] = ()) -> tuple[int, int, float]:
-        """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached.
+        """Simulate a design (as of `take`) into the driver's own room: code, number of steps, time reached.
 
         landings: times at which steps are to end, beside those of the model.
         """
-        self._alpha[:] = alpha
-        self.ints, self.floats = pack_general(landed(self._model(), landings)) if landings else self._packed
+        self.take(alpha)
+        self.ints, self.floats = pack_general(landed(self._model, landings)) if landings else self._packed
         while True:
             self.work[:] = 0
             code, count, self.events, time = self.entry.simulate(
@@ -260,10 +271,19 @@ class GeneralDriver:
         """Who is to blame for how the last run ended, or nothing."""
         return self._message
 
-    def _model(self) -> GeneralModel:
-        """The model with the start that was assembled, where it was."""
-        model, n = self.scene.model, len(self.scene.model.mass)
-        return model._replace(q0=self._packed[1][n : 2 * n].copy(), v0=self._packed[1][2 * n : 3 * n].copy())
+    def take(self, design: FloatArray) -> None:
+        """Take a design: alpha (N,), and behind it the values of variables (P,), or none for the initial ones."""
+        n = len(self._alpha)
+        self._alpha[:] = design[:n]
+        if self._placing is not None:
+            self._place(design[n:] if len(design) > n else self._placing.initial)
+
+    def _place(self, values: FloatArray) -> None:
+        """The model at values of variables (P,), packed."""
+        q0, v0 = self._start
+        model = self.scene.model._replace(q0=q0, v0=v0)
+        self._model = model if self._placing is None or not len(values) else self._placing.at(model, values)
+        self._packed = self.ints, self.floats = pack_general(self._model)
 
     def _explain(self, code: int, time: float) -> str:
         if code == OK:
@@ -307,6 +327,7 @@ class GeneralDriver:
             i = padded - block[START]
             if 0 <= i < block[COUNT]:
                 group = self.case.members[block[GROUP]]
+                i += block[OFFSET]
                 p, q = group.p_world[i], group.q_world[i]
                 return (
                     f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "

@@ -183,8 +183,15 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
 
 @kernel
 def unscale_general(block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
-    """out (N,) = mu alpha^(mu - 1) times the padded gradient by alpha^mu, summed over the laws of a member."""
+    """out (N + P,) = mu alpha^(mu - 1) times the padded gradient by alpha^mu, summed over the laws of a member.
+
+    Behind the N come the derivatives by parameters, of which padded (M_padded + P,) has as many behind its members.
+    """
     out[:] = 0.0
+    members = block[block.shape[0] - 1, 2] if block.shape[0] > 0 else 0
+    varied = padded.shape[0] - members
+    for c in range(varied):
+        out[out.shape[0] - varied + c] = padded[members + c]
     for k in range(block.shape[0]):
         first = block[k, 4]
         if first < 0:

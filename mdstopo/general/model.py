@@ -13,8 +13,9 @@ from mdstopo.general.structures import bundle
 from mdstopo.jit import kernel
 from mdstopo.scene.model import FloatArray, IndexArray
 
-#: columns of `GeneralModel.block`; code -1 is an inerter
-PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP = range(7)
+#: columns of `GeneralModel.block`; code -1 is an inerter. A block has all members of a group, or where each has a
+#: parameter of its own one of them, which is number OFFSET of the group
+PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET = range(8)
 #: columns of `GeneralModel.joint`
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
 #: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
@@ -32,7 +33,8 @@ class GeneralModel(NamedTuple):
     q0, v0        (n,)              state at the start
     pair          (n_pair, 2)       the two bodies of each pair that members, joints or bushings connect
     reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
-    block         (n_block, 7)      pair, start, stop (padded), code of the law, first design variable, count, group
+    block         (n_block, 8)      pair, start, stop (padded), code of the law, first design variable, count, group,
+                                    number of its first member in the group
     law           (n_block, 8)      the law's parameters (`mechanics.laws.table`)
     active        (n_seg, n_block)  whether the law acts during a segment
     level         (n_seg, n_block, 2)   a tabulated force at the segment's start, and its slope
@@ -50,6 +52,8 @@ class GeneralModel(NamedTuple):
     place         (n + n_row,)      where each coordinate, then each row, stands in the banded matrix
     size          (3,)              n_row; half width of the band; whether anything depends on velocity
     response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point, its place at the start
+    varied        (n_varied, 4)     parameters that vary: block, place (`mechanics.laws.table`), which value, and
+                                    whether it is a time that stands exactly at the start (the end); rising by value
     ============  ================  =====================================================================
     """
 
@@ -83,6 +87,7 @@ class GeneralModel(NamedTuple):
     size: IndexArray
     response: IndexArray
     response_par: FloatArray
+    varied: IndexArray
 
 
 class ModelView:
@@ -99,7 +104,7 @@ def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
     sizes = [
         len(model.mass), len(model.pair), len(model.block), model.member.shape[1], len(model.curves),
         len(model.times) - 1, len(model.load_body), len(model.bushing_pair), len(model.driven), len(model.joint),
-        len(model.place), len(model.response),
+        len(model.place), len(model.response), len(model.varied),
     ]  # fmt: skip
     ints = [np.asarray(sizes, dtype=np.int64), *(each.ravel() for each in model if each.dtype.kind == "i")]
     floats = [each.ravel() for each in model if each.dtype.kind == "f"]
@@ -121,13 +126,14 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     n_joint = ints[9]
     n_place = ints[10]
     n_resp = ints[11]
-    i = 12
+    n_varied = ints[12]
+    i = 13
     free = ints[i : i + n]
     i += n
     pair = ints[i : i + 2 * n_pair].reshape((n_pair, 2))
     i += 2 * n_pair
-    block = ints[i : i + 7 * n_block].reshape((n_block, 7))
-    i += 7 * n_block
+    block = ints[i : i + 8 * n_block].reshape((n_block, 8))
+    i += 8 * n_block
     active = ints[i : i + n_seg * n_block].reshape((n_seg, n_block))
     i += n_seg * n_block
     load_body = ints[i : i + n_load]
@@ -147,6 +153,8 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     size = ints[i : i + 3]
     i += 3
     response = ints[i : i + 6 * n_resp].reshape((n_resp, 6))
+    i += 6 * n_resp
+    varied = ints[i : i + 4 * n_varied].reshape((n_varied, 4))
     mass = floats[0:n]
     q0 = floats[n : 2 * n]
     v0 = floats[2 * n : 3 * n]
@@ -181,5 +189,5 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     return ModelView(
         free, mass, q0, v0, pair, reach, block, law, active, level, power, member, curves, times, force, load_body,
         load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row, place, size,
-        response, response_par,
+        response, response_par, varied,
     )  # fmt: skip

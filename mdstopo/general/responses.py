@@ -54,10 +54,11 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  
     pair = 0
     slopes[:] = 0.0
     for k in range(model.block.shape[0]):
-        if model.block[k, 6] != group or model.active[segment, k] == 0 or i >= model.block[k, 5]:
+        own_i = i - model.block[k, 7]
+        if model.block[k, 6] != group or model.active[segment, k] == 0 or own_i < 0 or own_i >= model.block[k, 5]:
             continue
         pair = model.block[k, 0]
-        m = model.block[k, 1] + i
+        m = model.block[k, 1] + own_i
         scale = strength[0, m]
         x, rate = member_rows(model, pair, m, q, v, own[0], own[1])
         if model.block[k, 3] == INERTER:
@@ -87,7 +88,7 @@ def largest_force(model, strength, segment, t, group, q, v, a):  # type: ignore[
     count = 0
     for k in range(model.block.shape[0]):
         if model.block[k, 6] == group:
-            count = model.block[k, 5]
+            count = max(count, model.block[k, 7] + model.block[k, 5])
     for i in range(count):
         f, _ = member_force(model, strength, segment, t, group, i, q, v, a, slopes, own)
         if abs(f) > best:
@@ -170,8 +171,10 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # t
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != model.response[j, 5] or model.block[k, 3] != INERTER or model.active[segment, k] == 0:
             continue
+        if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
+            continue
         pair = model.block[k, 0]
-        m = model.block[k, 1] + who
+        m = model.block[k, 1] + who - model.block[k, 7]
         for part in range(2):
             x = q if part == 0 else v
             for c in range(6):
@@ -189,6 +192,23 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # t
                     slope += weight * (plus - inerter_force(model, k, m, q, v, a, own))
                 x[d] = kept
                 bars[part, d] += sign * strength[0, m] * slope / size
+
+
+@kernel
+def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-untyped-def]
+    """g_j at a state (2, n), in the modes that members are in."""
+    n = model.mass.shape[0]
+    q = state[0].copy()
+    v = state[1].copy()
+    a = np.empty(n)
+    lam = np.empty(model.size[0])
+    bars = np.empty((3, n))
+    row_bar = np.empty(model.size[0])
+    balance(model, strength, segment, t, q, v, np.bool_(False), desk, a, lam)
+    who = -1
+    if model.response[j, 0] == MEMBER_FORCE:
+        who = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
+    return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
 
 
 @kernel

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.extremes import FRACTIONS, Samples, peaks
-from mdstopo.general.model import COUNT, GROUP
+from mdstopo.general.model import COUNT, GROUP, OFFSET
 from mdstopo.general.responses import MEMBER_FORCE
 from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -63,7 +63,8 @@ def _compare(
     """The largest |f*| of every member (count of members,), and |f*| with rate of some (C, K, 2), at places (K, 2)."""
     model = driver.scene.model
     group = int(model.response[j, 5])
-    members = int(model.block[model.block[:, GROUP] == group, COUNT].max())
+    own = model.block[model.block[:, GROUP] == group]
+    members = int((own[:, OFFSET] + own[:, COUNT]).max())
     top, seen = np.zeros(members), np.zeros((len(who), len(places), 2))
     driver.entry.compare(
         driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,

@@ -22,7 +22,8 @@ def natural_frequencies(driver: "GeneralDriver", alpha: FloatArray) -> FloatArra
     stiffness, mass = np.zeros((n, n)), np.zeros((n, n))
     rows = np.zeros((int(model.size[0]), n))
     driver.strength[:] = 0.0
-    linearise(driver.ints, driver.floats, alpha.copy(), driver.strength, stiffness, mass, rows)
+    driver.take(alpha)
+    linearise(driver.ints, driver.floats, driver.alpha.copy(), driver.strength, stiffness, mass, rows)
     free = np.flatnonzero(model.free)
     k, m, j = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], rows[:, free]
     root = np.linalg.cholesky(m)

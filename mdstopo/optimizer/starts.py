@@ -19,9 +19,14 @@ def random_feasible(problem: Problem, seed: int, index: int) -> Floats:
     """The design of random start `index` >= 1: few thick members and many thin ones, projected on the linear rows.
 
     The shares of the range are powers of uniform numbers. Good designs are nearly 0/1, and such starts find the better
-    basins more often than uniform or sparser ones (measured on the two-body scenes).
+    basins more often than uniform or sparser ones (measured on the two-body scenes). The last `even` variables of a
+    problem that has such are uniform: there is no reason for a parameter of a law to be near its lower bound.
     """
-    share = np.random.default_rng([seed, index]).uniform(size=len(problem.lower)) ** SHARPNESS
+    drawn = np.random.default_rng([seed, index]).uniform(size=len(problem.lower))
+    share = drawn**SHARPNESS
+    even = getattr(problem, "even", 0)
+    if even:
+        share[-even:] = drawn[-even:]
     draw = problem.lower + share * (problem.upper - problem.lower)
     return project(draw, problem.lower, problem.upper, problem.linear)
 

@@ -7,6 +7,7 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 
 import numpy as np
 
+from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.engine import Evaluator
@@ -48,15 +49,20 @@ class StructureProblem:
         self._objectives = [case.objectives[i] for i in active]
         self._signs = [sign_of(objective) for objective in self._objectives]
         self._evaluator = evaluator.looking_at([objective.name for objective in self._objectives])
-        self.initial: Floats = np.array(case.initial)
-        self.lower: Floats = np.array(case.lower)
-        self.upper: Floats = np.array(case.upper)
+        #: what x stands for
+        self.space = case.space
+        #: how many of the last x are values of variables, of which all parts of their range are alike
+        self.even = self.space.length - self.space.n_alpha
+        self.initial: Floats = np.array(self.space.reduce(case.start))
+        self.lower: Floats
+        self.upper: Floats
+        self.lower, self.upper = self.space.bounds(case.lower, case.upper)
         self._responses = [(i, row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
-        self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], case.n_design)
+        self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], self.space)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
-        """The rows of U at a design; a design that cannot be computed comes back with its status."""
-        evaluation = self._evaluator.evaluate(x, gradient)
+        """The rows of U at x; a design that cannot be computed comes back with its status."""
+        evaluation = self._evaluator.evaluate(self.space.expand(x), gradient)
         info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
         for place, objective in zip(self._places, self._objectives, strict=True):
             info["objectives"][place] = evaluation.objectives[objective.name]
@@ -88,7 +94,7 @@ class StructureProblem:
         peaks = evaluation.peaks[objective.name]
         chosen = peaks if evaluation.all_compete or competes(objective, sign) else peaks[:1]
         values = sign * np.array([peak.value for peak in chosen])
-        slopes = [sign * peak.gradient for peak in chosen if peak.gradient is not None]
+        slopes = [sign * self.space.pull(peak.gradient) for peak in chosen if peak.gradient is not None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
 
     def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats]:
@@ -107,7 +113,7 @@ class StructureProblem:
                     peak = peaks[min(r, len(peaks) - 1) if compete else 0]
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
-                        slopes.append(sign * peak.gradient / scale)
+                        slopes.append(sign * self.space.pull(peak.gradient) / scale)
         return np.array(rows), np.array(slopes).reshape(len(slopes), len(self.initial))
 
 
@@ -123,12 +129,13 @@ def competes(looked: Objective | ResponseRow, sign: float) -> bool:
     return looked.over_time in (("max", "max_abs") if sign > 0.0 else ("min",))
 
 
-def _linear_rows(rows: list[VolumeRow], n: int) -> LinearRows:
-    """Volume rows (Eq. 14), `at least` with its signs turned."""
+def _linear_rows(rows: list[VolumeRow], space: DesignSpace) -> LinearRows:
+    """Volume rows (Eq. 14) of x, `at least` with its signs turned."""
     signs = np.array([-1.0 if row.sense == "at_least" else 1.0 for row in rows])
-    matrix = np.array([row.coefficients for row in rows]).reshape(len(rows), n)
+    own = [space.row(row) for row in rows]
+    matrix = np.array([coefficients for coefficients, _ in own]).reshape(len(rows), space.size)
     return LinearRows(
         matrix * signs[:, None],
-        np.array([row.bound for row in rows]) * signs,
+        np.array([bound for _, bound in own]) * signs,
         np.array([row.sense == "equals" for row in rows], dtype=np.bool_),
     )

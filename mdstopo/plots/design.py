@@ -23,7 +23,7 @@ def draw(module: Any, source: Source) -> Any:
         axis.plot(places, alpha[part], ".", color=colour, markersize=2, label=name)
     axis.set_xlabel("member")
     axis.set_ylabel("alpha")
-    axis.set_ylim(bottom=min(0.0, float(alpha.min())))
+    axis.set_ylim(bottom=min(0.0, float(alpha.min(initial=0.0))))
     if len(source.case.group_slices) > 1:
         axis.legend()
     return figure

@@ -23,7 +23,7 @@ def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
         span = case.load_case(name)
         times[name] = np.linspace(span.start, span.end, SAMPLES)
         try:
-            series |= response_history(source.engine, source.alpha, name, times[name])
+            series |= response_history(source.engine, source.design, name, times[name])
         except ValueError as error:
             raise StoreError(str(error)) from error
     figure, axes = new_figure(module, len(chosen))
@@ -39,7 +39,8 @@ def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
 
 def draw_sensitivities(module: Any, source: Source, members: int = 8) -> Any:
     """dg(t)/dalpha of the first members, as `mdstopo gradient --history` stored it."""
-    found = {path: a for path, a in source.view.under("sensitivities").items() if "/history/" in path}
+    stored = source.view.under("sensitivities").items()
+    found = {path: a for path, a in stored if "/history/" in path and "variables" not in path.split("/")[:-1]}
     lines = {path: array for path, array in found.items() if not path.endswith("/t")}
     if not lines:
         raise StoreError(f"{source.view.path}: has no sensitivities over time; `mdstopo gradient --history` makes them")

@@ -11,7 +11,11 @@ from mdstopo.store.errors import StoreError
 
 def draw(module: Any, source: Source, members: int | None = None) -> Any:
     """One panel for each objective. members: the first so many only."""
-    found = {path: array for path, array in source.view.under("sensitivities").items() if "/history/" not in path}
+    found = {
+        path: array
+        for path, array in source.view.under("sensitivities").items()
+        if "/history/" not in path and "variables" not in path.split("/")[:-1] and len(array)
+    }
     if not found:
         raise StoreError(f"{source.view.path}: has no sensitivities; `mdstopo run` and `mdstopo gradient` make them")
     names = [name for name in source.names if any(path.split("/")[-1] == name for path in found)]

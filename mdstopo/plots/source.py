@@ -71,6 +71,18 @@ class Source:
         chosen: Floats = designs[point]
         return chosen
 
+    @cached_property
+    def design(self) -> Floats:
+        """The design that is shown: alpha, then the values of variables, as far as the file has them."""
+        alpha = self.alpha
+        if not self.case.variables:
+            return alpha
+        front = "design/alpha" not in self.view.arrays
+        point = len(self.view.array("pareto/alpha")) // 2 if self._point is None and front else self._point
+        prefix = "pareto" if front else "design"
+        values = [self.view.array(f"{prefix}/variables/{each.name}") for each in self.case.variables]
+        return np.concatenate([alpha, *(each[point] if front else each for each in values)])
+
     @property
     def load_cases(self) -> tuple[str, ...]:
         """Their names."""
@@ -84,7 +96,7 @@ class Source:
         stored = self.view.under(f"trajectories/{load_case}")
         if stored and times is None and len(stored["t"]) > 1:
             return Motion(stored["t"].astype(np.float64), stored["q"].astype(np.float64))
-        motion = self.engine.trajectory(self.alpha, load_case)
+        motion = self.engine.trajectory(self.design, load_case)
         if times is None:
             times = np.linspace(motion.t[0], motion.t[-1], SAMPLES)
         if times.max() > motion.t[-1] or times.min() < motion.t[0]:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from importlib import import_module
 
+import numpy as np
+
 from mdstopo.store.reader import ResultView
 
 
@@ -39,14 +41,15 @@ def fitting(view: ResultView) -> list[str]:
     found = []
     if "pareto/objectives" in paths:
         found.append("front")
+    alphas = bool(np.any(view.arrays.get("members/design", True)))
     if view.kind in ("run", "pareto") or "design/alpha" in paths:
-        found += ["layout", "design"]
+        found += ["layout", "design"] if alphas else ["layout"]
     if "iterations/combined" in paths:
         found.insert(0, "convergence")
-    if any(path.startswith("sensitivities/") and "/history/" not in path for path in paths):
+    if alphas and any(path.startswith("sensitivities/") and "/history/" not in path for path in paths):
         found.append("sensitivities")
-    if any("/history/" in path for path in paths):
+    if alphas and any("/history/" in path for path in paths):
         found.append("sensitivity-histories")
-    if "design" in found and view.lines("objectives"):
+    if "layout" in found and view.lines("objectives"):
         found.append("histories")
     return found

@@ -83,8 +83,9 @@ def _designs(source: Source) -> list[dict[str, Any]]:
     """One design of a run, or all of a front; each with its members, motions and responses."""
     arrays = source.view.arrays
     if "pareto/alpha" not in arrays:
-        return [_design(source, source.engine, source.alpha)]
-    designs = np.asarray(arrays["pareto/alpha"], dtype=np.float64)
+        return [_design(source, source.engine, source.design)]
+    values = [arrays[f"pareto/variables/{each.name}"] for each in source.case.variables]
+    designs = np.concatenate([arrays["pareto/alpha"], *values], axis=1).astype(np.float64)
     usable = [k for k in range(len(designs)) if np.isfinite(designs[k]).all()]
     chosen = set(usable[:: max(1, math.ceil(len(usable) / SIMULATED))])
     return [_design(source, source.engine, designs[k], k in chosen) if k in usable else {} for k in range(len(designs))]
@@ -149,8 +150,13 @@ def _members(case: Case, alpha: Floats) -> tuple[dict[str, Any], list[tuple[Memb
 def _forces(
     case: Case, alpha: Floats, kept: list[tuple[MemberGroup, NDArray[np.int64]]], q: Floats, v: Floats
 ) -> Floats | None:
-    """f* (T, K) of the members that are drawn, pull positive; None where a law is no spring or gap that always acts."""
+    """f* (T, K) of the members that are drawn, pull positive.
+
+    None where a law is no spring or gap that always acts, and where laws vary.
+    """
     slices, columns = case.group_slices, []
+    if case.variables:
+        return None
     for group, chosen in kept:
         if not all(
             isinstance(law, (SpringLaw, GapLaw)) and law.active_from is None and law.active_until is None

@@ -14,6 +14,8 @@ def beyond_springs(case: Case) -> str:
         return "bushings"
     if any(load_case.motions for load_case in case.load_cases):
         return "prescribed motions"
+    if case.variables:
+        return "design variables of laws"
     for group in case.members:
         found = _law(group)
         if found:

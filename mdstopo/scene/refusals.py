@@ -11,6 +11,14 @@ from mdstopo.scene.family import beyond_springs
 #: methods of the general kernels
 INTEGRATORS = frozenset({"auto", "runge_kutta", "generalized_alpha"})
 
+#: methods that differentiate by parameters of laws
+BY_PARAMETERS = frozenset({"auto", "adjoint", "direct"})
+
+
+def no_parameters(method: str) -> str:
+    """Why a method does not go with variables."""
+    return f"{method} gives no derivatives by parameters of laws; adjoint does, and direct"
+
 
 def refusals(case: Case) -> list[Mistake]:
     """Every part of `case` that the engine cannot compute, each at its place in the file."""
@@ -26,3 +34,5 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
             "solver.integrator",
             f"{solver.integrator} does not compute {beyond}; runge_kutta does, and auto takes it",
         )
+    if case.variables and solver.sensitivity not in BY_PARAMETERS:
+        yield "solver.sensitivity", no_parameters(solver.sensitivity)

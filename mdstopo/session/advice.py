@@ -15,8 +15,8 @@ _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
 _MOTIONS = ("displacement", "angle")  # responses whose limit, or whose minimum, restrains
 
 
-def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
-    """Warnings about the final design `alpha`.
+def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
+    """Warnings about the final design, alpha with the values of variables (N + P,).
 
     before, after: the motion by load case with the starting and the final design. Both warnings are signs of
     the soft branch: stored energy, accelerations and forces also fall when members that restrain the bodies are taken
@@ -26,7 +26,7 @@ def advise(case: Case, alpha: Floats, before: Mapping[str, Motion], after: Mappi
     soft = any(not is_held(case, objective.load_case) for objective in _minimised(case))
     for row in case.constraints if soft else ():
         if isinstance(row, VolumeRow) and row.sense == "limit" and row.bound > 0.0:
-            share = float(row.coefficients @ alpha) / row.bound
+            share = row.spent(design) / row.bound
             if share < _USED:
                 found.append(
                     f"only {share:.1%} of the volume limit {row.bound:g} of {', '.join(row.groups)} is used: "

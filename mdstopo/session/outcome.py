@@ -1,7 +1,7 @@
 """What a run tells while it goes and when it ends."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -66,7 +66,7 @@ class Outcome:
     start's last state, None where it has not begun; best_start: whose result this is. evaluations,
     iterations: of all starts. seconds: wall time of the iterations in this process; compile_seconds: of
     getting ready, loading or compiling kernels. conclusion: nominal and robust values and the fresh sample's, of an
-    uncertain case.
+    uncertain case. variables: the best design's values, by name, in the parameters' units.
     """
 
     case: Case
@@ -92,3 +92,4 @@ class Outcome:
     integrator: str
     integrator_reason: str
     conclusion: "Conclusion | None" = None
+    variables: Mapping[str, Floats] = field(default_factory=dict)

@@ -58,24 +58,24 @@ def get_ready(
 ) -> tuple[Floats, Floats, dict[str, Motion]]:
     """Load every kernel, always in this order, so that iterations are timed for themselves and repeat to the bit.
 
-    Returns the stated first design (N,), the nearest one that keeps bounds and volume rows, and that one's motion in
-    each load case. Raises CaseError where no design keeps the rows.
+    Returns the stated first x (n,), the nearest one that keeps bounds and volume rows, and its motion in each load
+    case. Raises CaseError where no design keeps the rows.
     """
-    for size in [3, *(many for many in (MANY, WIDE) if case.n_design >= many)]:
+    for size in [3, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
         optimizer = make_optimizer(case, _Toy(size))
         state = optimizer.start()
         if state.running:
             optimizer.step(state)
     stated, begin = first_design(case, problem, initial)
-    before = motions(case, engine, begin)
+    before = motions(case, engine, case.space.expand(begin))
     if case.n_members <= _SMALL:
         problem.evaluate(begin)
     return stated, begin, before
 
 
-def motions(case: Case, engine: Engine, alpha: Floats) -> dict[str, Motion]:
+def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
     """The motion of a design in each load case."""
-    return {each.name: engine.trajectory(alpha, each.name) for each in case.load_cases}
+    return {each.name: engine.trajectory(design, each.name) for each in case.load_cases}
 
 
 class _Toy:
@@ -102,7 +102,7 @@ def _marker(case: Case) -> Path:
     from mdstopo.native.store import cache_folder
 
     family = "general" if beyond_springs(case) else "springs"
-    family += "".join(f"-{many}" for many in (MANY, WIDE) if case.n_design >= many)
+    family += "".join(f"-{many}" for many in (MANY, WIDE) if case.space.size >= many)
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"
 
 
@@ -116,7 +116,7 @@ def _main() -> None:
     engine = make_engine(case)
     problem = problem_of(engine, even(case))
     _, begin, _ = get_ready(case, engine, problem, None)
-    engine.evaluate(begin, gradient=True)
+    engine.evaluate(case.space.expand(begin), gradient=True)
     _marker(case).touch()
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case, VolumeRow
 from mdstopo.optimizer.starts import best_run
 from mdstopo.optimizer.state import State
-from mdstopo.store.contents import Datasets
+from mdstopo.store.contents import Datasets, design_part
 from mdstopo.store.errors import DamagedError
 from mdstopo.store.reader import ResultView
 
@@ -70,7 +70,7 @@ def run_part(case: Case, states: Sequence[State | None], before: int = 0, final:
         raise ValueError("no start has begun")
     state = states[best]
     assert state is not None
-    part: Datasets = {"design/alpha": state.best_alpha}
+    part: Datasets = design_part(case, case.space.expand(state.best_alpha))
     part |= {f"iterations/{name}": column for name, column in iteration_columns(case, state, before, final).items()}
     if len(states) > 1:
         part |= _starts_part(case, states)
@@ -82,14 +82,16 @@ def run_part(case: Case, states: Sequence[State | None], before: int = 0, final:
 
 def _starts_part(case: Case, states: Sequence[State | None]) -> Datasets:
     objectives = np.full((len(states), len(case.objectives)), np.nan)
-    alpha = np.full((len(states), case.n_design), np.nan)
+    space = case.space
+    designs = np.full((len(states), space.length), np.nan)
     words = []
     for index, state in enumerate(states):
         words.append("running" if state is None else str(state.status))
         if state is not None:
             objectives[index] = iteration_columns(case, state)["objectives"][best_row(state)]
-            alpha[index] = state.best_alpha
-    return {"starts/objectives": objectives, "starts/alpha": alpha, "starts/status": words}
+            designs[index] = space.expand(state.best_alpha)
+    part: Datasets = {"starts/objectives": objectives, "starts/status": words}
+    return part | design_part(case, designs, "starts")
 
 
 def restore(view: ResultView, starts: int) -> list[State | None]:

@@ -24,7 +24,7 @@ from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
-from mdstopo.session.starts import is_moved, replaced, run_start
+from mdstopo.session.starts import NOTHING_VARIES, is_moved, replaced, run_start, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
@@ -78,7 +78,7 @@ def run_session(
         how many starts (default: the case's) on how many processes (default 1); no result depends on the
         latter.
     initial
-        (N,) design to begin with in place of the case's.
+        (N,) design to begin with in place of the case's; with the values of variables (P,) behind it, or without.
     on_iteration, stop_requested, notify
         called after each iteration; asked after each iteration whether to stop; given sentences for the user.
     command
@@ -100,8 +100,10 @@ def run_session(
         if starts < 1:
             raise ValueError(f"starts must be at least 1, not {starts}")
         case = replace(case, optimizer=replace(case.optimizer, starts=starts))
-    if initial is not None and (initial.shape != (case.n_design,) or not np.isfinite(initial).all()):
-        raise ValueError(f"initial must be {case.n_design} finite numbers, one for each design variable")
+    if initial is not None:
+        initial = case.whole(initial)
+        if initial.shape != (case.space.length,) or not np.isfinite(initial).all():
+            raise ValueError(f"initial must be {case.n_design} finite numbers, one for each design variable")
     tell = notify or ignore
     run = _Run(case, initial, on_iteration or ignore, stop_requested or never, tell, command)
     if path is None:
@@ -246,7 +248,11 @@ class _Run:
 
     def compare(self, stated: Floats, nearest: Floats) -> None:
         """A notice where the first design is not the stated one."""
-        if self.states[0] is None and is_moved(stated, nearest):
+        if self.states[0] is not None:
+            return
+        if words := unshared(self.case, self.initial):
+            self.notify(words)
+        if is_moved(stated, nearest):
             self.notify(replaced(stated, nearest))
 
     def iterate(
@@ -254,7 +260,7 @@ class _Run:
     ) -> None:
         """Advance every start, checkpointing as time goes by."""
         chosen = self.case.optimizer
-        size = 8.0 * self.case.n_design * _STATE_ARRAYS * chosen.starts
+        size = 8.0 * self.case.space.size * _STATE_ARRAYS * chosen.starts
         saver = None if path is None else Checkpointer(lambda: self.checkpoint(path), size / _DISK_SPEED)
 
         def keep(index: int, state: State) -> None:
@@ -289,7 +295,9 @@ class _Run:
         """Add what only the final design has: its motion, its sensitivities, advice."""
         state = self.states[best]
         assert state is not None
-        evaluation = engine.evaluate(state.best_alpha, gradient=True)
+        space = self.case.space
+        design = space.expand(state.best_alpha)
+        evaluation = engine.evaluate(design, gradient=True)
         if not evaluation.status.ok:
             lacks = "the sensitivities of the final design: " if evaluation.gradients else "no sensitivities: "
             self.warnings += (f"{lacks}{evaluation.status.value}",)
@@ -304,18 +312,19 @@ class _Run:
             names = [objective.name for objective in self.case.objectives]
             last = evaluation
             if not np.array_equal(state.alpha, state.best_alpha):
-                last = engine.evaluate(state.alpha, gradient=False)
+                last = engine.evaluate(space.expand(state.alpha), gradient=False)
             self.final_objectives = np.array([[each.objectives[name] for name in names] for each in (evaluation, last)])
-        after = motions(self.case, engine, state.best_alpha)
+        after = motions(self.case, engine, design)
         for name, motion in after.items():
             if not motion.status.ok:
                 self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
-        self.warnings += advise(self.case, state.best_alpha, self.before, after)
-        self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients)
+        self.warnings += advise(self.case, design, self.before, after)
+        by_variable = getattr(evaluation, "variable_gradients", {})
+        self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients, by_variable=by_variable)
         if self.case.uncertainty is not None and evaluation.status.usable:
             from mdstopo.robust.helpers import concluded
 
-            self.conclusion = concluded(engine, state.best_alpha)
+            self.conclusion = concluded(engine, design)
             self.finals |= self.conclusion.part
             self.warnings += self.conclusion.warnings
 
@@ -387,10 +396,13 @@ class _Run:
         before = self.combining.evaluations
         columns = iteration_columns(self.case, state, before, self.final_objectives)
         names = [objective.name for objective in self.case.objectives]
+        space = self.case.space
+        design = space.expand(state.best_alpha)
         begun = [each for each in self.states if each is not None]
         return Outcome(
             case=self.case,
-            alpha=state.best_alpha,
+            alpha=design[: space.n_alpha],
+            variables=space.named(design),
             objectives=dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True)),
             initial_objectives=dict(zip(names, columns["objectives"][0].tolist(), strict=True)),
             peaks=self.peaks,
@@ -419,7 +431,7 @@ def _check_optimizable(case: Case) -> None:
     mistakes = []
     if not case.objectives:
         mistakes.append(case.marks.mistake("objectives", "an optimisation needs at least one objective"))
-    if not case.n_design:
-        mistakes.append(case.marks.mistake("members", "an optimisation needs members with `design: true`"))
+    if not case.n_design and not case.variables:
+        mistakes.append(case.marks.mistake("members", NOTHING_VARIES))
     if mistakes:
         raise CaseError(mistakes, str(case.path or case.name))

@@ -21,6 +21,8 @@ _IGNORED: dict[type, set[str]] = {
     Body: {"stated"},
     LoadCase: {"bodies"},  # follow from the case's bodies and the motions
 }
+# What later versions added, and left out by most: files from before know nothing of it.
+_ADDED = {"shared", "mirrored", "variables", "prices"}
 _DESIGN = {"initial", "lower", "upper", "power"}
 _MAY_DIFFER = {"optimizer.max_iterations", "optimizer.tolerance", "optimizer.starts"}
 
@@ -51,6 +53,8 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, str]]:
         if isinstance(value, Case) and value.uncertainty is None:
             ignored = ignored | {"uncertainty"}  # as before there was such a section
         for f in fields(value):
+            if f.name in _ADDED and not len(getattr(value, f.name)):
+                continue
             if f.name not in ignored and hasattr(value, f.name):
                 yield from _leaves(_key(path, f.name, value), getattr(value, f.name))
     elif isinstance(value, Mapping):
@@ -89,6 +93,8 @@ def _key(path: str, field: str, owner: Any) -> str:
         return f"design.{field}.{owner.name}"
     if isinstance(owner, MemberGroup) and field == "laws" and len(owner.laws) == 1:
         return _join(path, "law")
+    if isinstance(owner, Case) and field in _ADDED:
+        return f"design.{field}"
     if isinstance(owner, LoadCase) and field in ("start", "end"):
         return _join(path, f"time.{field}")
     return _join(path, field)

@@ -73,10 +73,27 @@ def trajectory_part(trajectories: Mapping[str, Motion]) -> Datasets:
     return part
 
 
-def sensitivity_part(gradients: Mapping[str, Floats], method: str | None = None) -> Datasets:
-    """dG/dalpha (N,) by objective, below its method's name where there are several methods."""
+def design_part(case: Case, design: Floats, group: str = "design") -> Datasets:
+    """Designs (..., N + P): alpha, and the values of each variable."""
+    space = case.space
+    values = {f"{group}/variables/{name}": each for name, each in space.named(design).items()}
+    return {f"{group}/alpha": design[..., : space.n_alpha], **values}
+
+
+def sensitivity_part(
+    gradients: Mapping[str, Floats],
+    method: str | None = None,
+    by_variable: Mapping[str, Mapping[str, Floats]] | None = None,
+) -> Datasets:
+    """dG/dalpha (N,) by objective, below its method's name where there are several methods.
+
+    by_variable: the derivatives by the values of variables, by objective and name.
+    """
     prefix = "sensitivities" if method is None else f"sensitivities/{method}"
-    return {f"{prefix}/{objective}": gradient for objective, gradient in gradients.items()}
+    part: Datasets = {f"{prefix}/{objective}": gradient for objective, gradient in gradients.items()}
+    for objective, named in (by_variable or {}).items():
+        part |= {f"{prefix}/variables/{objective}/{name}": gradient for name, gradient in named.items()}
+    return part
 
 
 def result_image(

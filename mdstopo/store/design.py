@@ -1,6 +1,7 @@
 """A design read from a file: `--alpha FILE`."""
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from tokenize import TokenError  # numpy parses the header of a .npy file as Python
 
@@ -8,17 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.store.errors import StoreError
-from mdstopo.store.reader import read_result
+from mdstopo.store.reader import ResultView, read_result
 
 _NOT_NEEDED = ("trajectories", "sensitivities", "optimizer", "members", "pareto/tasks", "pareto/visited")
 _SUFFIXES = ".npy, .txt or .h5 (a result file)"
 
 
-def read_design(path: Path | str, count: int) -> NDArray[np.float64]:
+def read_design(path: Path | str, count: int, parts: Mapping[str, slice] | None = None) -> NDArray[np.float64]:
     """The design variables in a file, (count,).
 
     `.npy` holds one array, `.txt` numbers separated by blanks or lines (text after # is ignored), `.h5` is a
-    result file, whose best design is taken, `front.h5:3` the design of point 3 of a front.
+    result file, whose best design is taken, `front.h5:3` the design of point 3 of a front. parts: where the values of
+    the case's variables stand in a design, by name; a file that has them gives them behind alpha.
 
     Raises
     ------
@@ -26,12 +28,49 @@ def read_design(path: Path | str, count: int) -> NDArray[np.float64]:
         if the file cannot be read, does not hold `count` numbers, or holds negative or non-finite ones.
     """
     path, point = _place(str(path))
-    if point is not None:
-        return _checked(path, _read_front(path, point), count)
-    reader = {".npy": _read_npy, ".txt": _read_text, ".h5": _read_h5, ".hdf5": _read_h5}.get(path.suffix.lower())
+    if path.suffix.lower() in (".h5", ".hdf5"):
+        view = read_result(path, leave_out=_NOT_NEEDED)
+        alpha = _checked(path, _read_h5(view) if point is None else _read_front(view, point), count)
+        return _with_values(view, point, alpha, parts or {})
+    reader = {".npy": _read_npy, ".txt": _read_text}.get(path.suffix.lower())
     if reader is None:
         raise StoreError(f"{path}: a design is read from {_SUFFIXES}, not from {path.suffix or 'a bare name'!r}")
-    return _checked(path, np.squeeze(reader(path)), count)
+    found = np.squeeze(reader(path))
+    length = max((part.stop for part in (parts or {}).values()), default=count)
+    if parts and found.shape == (length,):
+        return np.concatenate(
+            [_checked(path, found[:count], count), _finite(path, found[count:], "values of variables")]
+        )
+    return _checked(path, found, count)
+
+
+def _with_values(
+    view: ResultView, point: int | None, alpha: NDArray[np.float64], parts: Mapping[str, slice]
+) -> NDArray[np.float64]:
+    """alpha with the values of all variables behind it where the file has them; alpha alone where it has none."""
+    prefix = "design" if point is None else "pareto"
+    own = {name: view.arrays.get(f"{prefix}/variables/{name}") for name in parts}
+    if all(values is None for values in own.values()):
+        return alpha
+    pieces = [alpha]
+    for name, part in parts.items():
+        values = own[name]
+        if values is None:
+            raise StoreError(f"{view.path}: it holds no values of the design variable {name}")
+        chosen = np.asarray(values if point is None else values[point], dtype=np.float64)
+        if chosen.shape != (part.stop - part.start,):
+            raise StoreError(
+                f"{view.path}: it holds {chosen.size} values of the design variable {name}; the case has "
+                f"{part.stop - part.start}"
+            )
+        pieces.append(_finite(view.path, chosen, name))
+    return np.concatenate(pieces)
+
+
+def _finite(path: Path, values: NDArray[np.float64], what: str) -> NDArray[np.float64]:
+    if not np.isfinite(values).all():
+        raise StoreError(f"{path}: {what} must be finite; found {values[~np.isfinite(values)][0]}")
+    return values
 
 
 def _place(text: str) -> tuple[Path, int | None]:
@@ -87,18 +126,18 @@ def _read_text(path: Path) -> NDArray[np.float64]:
     return np.array(values, dtype=np.float64)
 
 
-def _read_h5(path: Path) -> NDArray[np.float64]:
-    view = read_result(path, leave_out=_NOT_NEEDED)
+def _read_h5(view: ResultView) -> NDArray[np.float64]:
+    path = view.path
     if view.kind == "pareto":
         last = len(view.array("pareto/alpha")) - 1
         raise StoreError(f"{path}: a front has several designs; write {path}:K with K from 0 to {last}")
     if "design/alpha" not in view.arrays:
         raise StoreError(f"{path}: this result of `{view.kind}` holds no design")
-    return view.alpha
+    return np.squeeze(view.alpha)
 
 
-def _read_front(path: Path, point: int) -> NDArray[np.float64]:
-    view = read_result(path, leave_out=_NOT_NEEDED)
+def _read_front(view: ResultView, point: int) -> NDArray[np.float64]:
+    path = view.path
     designs = view.arrays.get("pareto/alpha")
     if designs is None:
         raise StoreError(f"{path}: a result of `{view.kind}` has no points")

@@ -60,7 +60,7 @@ def _members(view: ResultView) -> Table:
     if "pareto/alpha" in view.arrays:
         extra |= {f"alpha_point_{k}": row for k, row in enumerate(view.arrays["pareto/alpha"])}
     for path, array in view.under("sensitivities").items():
-        if "history/" not in path:
+        if "history/" not in path and "variables" not in path.split("/")[:-1]:
             extra["dG/dalpha " + path.replace("/", " ")] = array
     for name, values in extra.items():
         if values.shape == places.shape:

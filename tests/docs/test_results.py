@@ -21,6 +21,19 @@ bodies: {arm: {mass: 1, inertia: 1, position: [1, 0]}}
 joints: [{name: pin, type: revolute, bodies: [ground, arm], at: [0, 0]}]
 motions: [{body: arm, angle: {acceleration: {file: turn.csv}}}]
 """
+VARIED = """\
+format: 1
+time: {end: 0.1}
+bodies: {cart: {mass: 1, inertia: 1, position: [1, 0], velocity: [1, 0]}}
+members:
+  spring: {from: {body: ground, at: [0, 0]}, to: {body: cart, at: [1, 0]}, law: {type: spring, stiffness: 9}}
+design: {variables: {k: {group: spring, parameter: stiffness, lower: 1, upper: 20}}}
+objectives:
+  E: {response: energy, over_time: mean}
+  X: {response: {displacement: {body: cart}}, over_time: mean}
+combine: {weights: {E: 1, X: 1}, normalize: false}
+optimizer: {starts: 2, max_iterations: 1}
+"""
 
 UNCERTAIN = """\
 uncertainty: {parameters: {bodies.cargo.mass: {normal: {deviation: 5}}}, sample: 4, validation: 30}
@@ -50,6 +63,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     (folder / boat.title).write_text(boat.text, encoding="utf-8")
     (folder / "windy.yaml").write_text(boat.text + UNCERTAIN, encoding="utf-8")
     (folder / "jointed.yaml").write_text(JOINTED, encoding="utf-8")
+    (folder / "varied.yaml").write_text(VARIED, encoding="utf-8")
     (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
     for command in (
         "simulate jointed.yaml",
@@ -59,6 +73,10 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "run boat.yaml --alpha results/boat.simulate.h5 --out results/again.h5",
         "gradient boat.yaml --history --differences --members 2",
         "pareto boat.yaml --points 2 --starts 1",
+        "run varied.yaml",
+        "gradient varied.yaml --history --differences",
+        "pareto varied.yaml --points 2 --starts 1",
+        "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
         "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
     ):
         done = run(f"mdstopo {command}", folder)

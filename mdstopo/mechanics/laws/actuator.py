@@ -40,6 +40,32 @@ def actuator_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
+def actuator_slopes(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp."""
+    if mode != LINEAR:
+        return ((1.0 if mode == UPPER else -1.0) if slot == 3 else 0.0), 0.0
+    if slot == 0:
+        return x - p[2], 0.0
+    if slot == 1:
+        return xd, 0.0
+    return (-p[0] if slot == 2 else 0.0), 0.0
+
+
+@inline
+def actuator_margin_slope(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+    """Slope of the margin by a parameter."""
+    f = p[0] * (x - p[2]) + p[1] * xd
+    sign = 1.0 / p[3]
+    if mode == LOWER or (mode == LINEAR and f >= 0.0):
+        sign = -sign
+    if slot == 0:
+        return sign * (x - p[2])
+    if slot == 1:
+        return sign * xd
+    return -sign * p[0] if slot == 2 else -sign * f / p[3]
+
+
+@inline
 def actuator_start(p, x, xd):  # type: ignore[no-untyped-def]
     """The mode by the force alone: it is continuous at both limits."""
     f = p[0] * (x - p[2]) + p[1] * xd

@@ -9,3 +9,11 @@ def cubic_force(p, x):  # type: ignore[no-untyped-def]
     square = x * x
     f = x * (p[0] + p[1] * square)
     return f, p[0] + 3.0 * p[1] * square, 0.0, square * (0.5 * p[0] + 0.25 * p[1] * square), f
+
+
+@inline
+def cubic_slopes(p, slot, x):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp."""
+    if slot == 0:
+        return x, 0.5 * x * x
+    return x * x * x, 0.25 * x * x * x * x

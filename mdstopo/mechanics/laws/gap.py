@@ -63,6 +63,33 @@ def gap_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
+def gap_slopes(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp."""
+    if mode == OPEN:
+        return 0.0, 0.0
+    y = p[3] * x - p[2]
+    acts = 0.0 if mode == CLIPPED else 1.0
+    if slot == 0:
+        return acts * p[3] * y, 0.5 * y * y
+    if slot == 1:
+        return acts * xd, 0.0
+    return -acts * p[3] * p[0], -p[0] * y
+
+
+@inline
+def gap_margin_slope(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+    """Slope of the margin by a parameter."""
+    y = p[3] * x - p[2]
+    unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1]) if _clips(p) else y
+    if mode == OPEN or not _clips(p) or y <= (unclipped if mode == CLOSED else -unclipped):
+        return (0.0 if slot != 2 else 1.0) if mode == OPEN else (0.0 if slot != 2 else -1.0)
+    sign = (1.0 if mode == CLOSED else -1.0) / (p[0] + p[1])
+    if slot == 2:
+        return -sign * p[0]
+    return sign * ((y if slot == 0 else p[3] * xd) - unclipped)
+
+
+@inline
 def _closed(p, y, rate):  # type: ignore[no-untyped-def]
     """Closed, or clipped where damping would reverse the force."""
     if _clips(p) and p[0] * y + p[1] * rate < 0.0:

@@ -8,3 +8,13 @@ def linear_force(p, x, xd):  # type: ignore[no-untyped-def]
     """f, f_x, f_xd, V, V_x."""
     pull = p[0] * x
     return pull + p[1] * xd + p[2], p[0], p[1], 0.5 * pull * x, pull
+
+
+@inline
+def linear_slopes(p, slot, x, xd):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp."""
+    if slot == 0:
+        return x, 0.5 * x * x
+    if slot == 1:
+        return xd, 0.0
+    return 1.0, 0.0

@@ -12,6 +12,18 @@ def pulse_force(p, t):  # type: ignore[no-untyped-def]
     return p[0] * math.exp(-min(p[1] * min(s * s, 1e300), 745.0)), 0.0, 0.0, 0.0, 0.0
 
 
+@inline
+def pulse_slopes(p, slot, t):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp."""
+    s = t - p[2]
+    share = math.exp(-min(p[1] * min(s * s, 1e300), 745.0))
+    if slot == 0:
+        return share, 0.0
+    if slot == 1:
+        return -min(s * s, 1e300) * p[0] * share, 0.0
+    return 2.0 * p[1] * s * p[0] * share, 0.0
+
+
 #: steps in the width of a pulse where they are of second order
 FINE = 16
 

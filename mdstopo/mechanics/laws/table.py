@@ -13,15 +13,26 @@ from mdstopo.jit import inline
 from mdstopo.mechanics.laws.actuator import (
     actuator_force,
     actuator_margin,
+    actuator_margin_slope,
     actuator_margin_slopes,
     actuator_next,
+    actuator_slopes,
     actuator_start,
 )
-from mdstopo.mechanics.laws.cubic import cubic_force
+from mdstopo.mechanics.laws.cubic import cubic_force, cubic_slopes
 from mdstopo.mechanics.laws.curve import curve_data, curve_force
-from mdstopo.mechanics.laws.gap import gap_force, gap_grazes, gap_margin, gap_margin_slopes, gap_next, gap_start
-from mdstopo.mechanics.laws.linear import linear_force
-from mdstopo.mechanics.laws.pulse import pulse_force, pulse_landings
+from mdstopo.mechanics.laws.gap import (
+    gap_force,
+    gap_grazes,
+    gap_margin,
+    gap_margin_slope,
+    gap_margin_slopes,
+    gap_next,
+    gap_slopes,
+    gap_start,
+)
+from mdstopo.mechanics.laws.linear import linear_force, linear_slopes
+from mdstopo.mechanics.laws.pulse import pulse_force, pulse_landings, pulse_slopes
 
 PARAMETERS = 8
 SPRING, GAP, CUBIC, CURVE, PULSE, TABLE, ACTUATOR = range(7)
@@ -37,6 +48,19 @@ CODES = {
     "actuator": ACTUATOR,
     "inerter": INERTER,
 }
+#: the place of each parameter that may be a design variable: in the law's row, and beyond it what all laws share
+PLACES = {
+    "spring": {"stiffness": 0, "damping": 1, "preload": 2},
+    "gap": {"stiffness": 0, "damping": 1, "gap": 2},
+    "cubic": {"stiffness": 0, "cubic": 1},
+    "curve": {},
+    "pulse": {"peak": 0, "rate": 1, "time": 2},
+    "table": {},
+    "actuator": {"proportional": 0, "derivative": 1, "target": 2, "limit": 3},
+    "inerter": {"inertance": 0},
+}
+FREE_LENGTH, ACTIVE_FROM, ACTIVE_UNTIL = range(PARAMETERS, PARAMETERS + 3)
+COMMON = {"free_length": FREE_LENGTH, "active_from": ACTIVE_FROM, "active_until": ACTIVE_UNTIL}
 
 
 @inline
@@ -57,6 +81,38 @@ def law(code, p, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
     if code == ACTUATOR:
         return actuator_force(p, x, xd, mode)
     return np.nan, np.nan, np.nan, np.nan, np.nan  # an inerter has no place here
+
+
+@inline
+def law_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp by the parameter at a place of the law's row, or by the free length; not of an inerter."""
+    if place == FREE_LENGTH:
+        _, f_x, _, _, pull = law(code, p, x, xd, mode, t, value, curves)
+        return -f_x, -pull
+    if code == SPRING:
+        return linear_slopes(p, place, x, xd)
+    if code == GAP:
+        return gap_slopes(p, place, x, xd, mode)
+    if code == CUBIC:
+        return cubic_slopes(p, place, x)
+    if code == PULSE:
+        return pulse_slopes(p, place, t)
+    if code == ACTUATOR:
+        return actuator_slopes(p, place, x, xd, mode)
+    return np.nan, np.nan
+
+
+@inline
+def law_margin_slope(code, p, place, x, xd, mode):  # type: ignore[no-untyped-def]
+    """Slope of the margin by the parameter at a place of the law's row, or by the free length."""
+    if place == FREE_LENGTH:
+        by_x, _ = law_margin_slopes(code, p, x, xd, mode)
+        return -by_x
+    if code == GAP:
+        return gap_margin_slope(p, place, x, xd, mode)
+    if code == ACTUATOR and p[3] > 0.0:
+        return actuator_margin_slope(p, place, x, xd, mode)
+    return 0.0
 
 
 @inline

@@ -1,0 +1,191 @@
+"""What varies besides each member's own alpha: alphas that are one, and parameters of laws (`design_space`)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray
+from mdstopo.case.kinds import Number
+from mdstopo.case.model import MemberGroup, Variable
+from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.schema_scene import LAW
+from mdstopo.case.words import inside, listed, number_text, shown
+
+_ALWAYS = ("active_from", "active_until")
+#: the parameters of each law by which the engine differentiates
+PARAMETERS = {
+    "spring": ("stiffness", "damping", "free_length", "preload", *_ALWAYS),
+    "gap": ("stiffness", "damping", "gap", "free_length", *_ALWAYS),
+    "cubic": ("stiffness", "cubic", "free_length", *_ALWAYS),
+    "curve": ("free_length", *_ALWAYS),
+    "pulse": ("peak", "rate", "time", *_ALWAYS),
+    "table": _ALWAYS,
+    "actuator": ("proportional", "derivative", "target", "limit", *_ALWAYS),
+    "inerter": ("inertance", *_ALWAYS),
+}
+
+
+def build_shared(top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> dict[str, Any]:
+    """The parts `shared` and `mirrored` of the case; groups: None where members could not be read."""
+    design = top["design"]
+    nothing: dict[str, Any] = {"shared": (), "mirrored": ()}
+    if design is BAD or design is None or groups is None or not design.good("shared", "mirrored"):
+        return nothing
+    path = inside(design.path, "shared")
+    good = _are_design(design["shared"], path, groups, reading)
+    place = inside(design.path, "mirrored")
+    for i, names in enumerate(design["mirrored"]):
+        own = f"{place}[{i}]"
+        if not _are_design(names, own, groups, reading):
+            good = False
+            continue
+        counts = [len(groups[name]) for name in names]
+        if len(set(counts)) > 1:
+            told = ", ".join(f"{name} has {count:,}" for name, count in zip(names, counts, strict=True))
+            reading.mistake(own, f"{told}; member k of one goes with member k of the other: equal counts are needed")
+            good = False
+        low, high = max(groups[name].lower for name in names), min(groups[name].upper for name in names)
+        if low > high:
+            message = f"their bounds have nothing in common: lower {number_text(low)}, upper {number_text(high)}"
+            reading.mistake(own, message)
+            good = False
+    return {"shared": tuple(design["shared"]), "mirrored": tuple(map(tuple, design["mirrored"]))} if good else nothing
+
+
+def _are_design(names: list[str], path: str, groups: dict[str, MemberGroup], reading: Reading) -> bool:
+    """Whether all are groups with variables, none of them named twice."""
+    good = all(name in groups for name in names)
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            reading.mistake(f"{path}[{i}]", f"{shown(name)} is in the list already")
+            good = False
+        elif name in groups and not groups[name].design:
+            reading.mistake(f"{path}[{i}]", f"{shown(name)} has `design: false`: its alpha is 1 and no variable")
+            good = False
+    return good
+
+
+def build_variables(top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> tuple[Variable, ...]:
+    """The variables that can be made, in the file's order."""
+    design = top["design"]
+    sections = design["variables"] if isinstance(design, Fields) else None
+    if not isinstance(sections, dict) or groups is None:
+        return ()
+    built: list[Variable] = []
+    taken: dict[tuple[str, int, str], str] = {}
+    for name, fields in sections.items():
+        if fields is BAD or not fields.good():
+            continue
+        variable = _build(name, fields, groups, reading)
+        if variable is None:
+            continue
+        for group, law in zip(variable.groups, variable.laws, strict=True):
+            other = taken.setdefault((group, law, variable.parameter), name)
+            if other != name:
+                message = f"{variable.parameter} of {group!r} is varied by {shown(other)} already"
+                reading.mistake(inside(fields.path, "parameter"), message)
+        built.append(variable)
+    if isinstance(top["objectives"], dict) and "variables" in top["objectives"]:
+        message = "this name is taken where there are design.variables: results keep the derivatives by them under it"
+        reading.mistake("objectives.variables", message)
+    return tuple(built)
+
+
+def _build(name: str, fields: Fields, groups: dict[str, MemberGroup], reading: Reading) -> Variable | None:
+    stated = fields["group"]
+    names = [stated] if isinstance(stated, str) else list(stated)
+    if not all(group in groups for group in names):
+        return None
+    path, parameter = fields.path, fields["parameter"]
+    repeated = [group for i, group in enumerate(names) if group in names[:i]]
+    if repeated:
+        reading.mistake(inside(path, "group"), f"{shown(repeated[0])} is in the list twice")
+        return None
+    laws = [_law(groups[group], fields, reading) for group in names]
+    if any(law is None for law in laws):
+        return None
+    records = [groups[group].laws[law or 0] for group, law in zip(names, laws, strict=True)]
+    counts = [len(groups[group]) for group in names]
+    if fields["each"] == "member" and len(set(counts)) > 1:
+        told = ", ".join(f"{group} has {count:,}" for group, count in zip(names, counts, strict=True))
+        reading.mistake(inside(path, "each"), f"{told}; member k of each has the same value: equal counts are needed")
+        return None
+    initial = fields["initial"]
+    if initial is None:
+        own = {getattr(record, parameter) for record in records}
+        if len(own) > 1 or None in own:
+            why = "differ" if len(own) > 1 else "do not say it"
+            reading.mistake(path, f"the key 'initial' is missing, and the laws {why} (the first value of {parameter})")
+            return None
+        initial = own.pop()
+    if not _within(fields, initial, parameter, records[0].type, reading):
+        return None
+    key = _key(records[0].type, parameter)
+    return Variable(
+        name, tuple(names), tuple(law or 0 for law in laws), parameter, fields["each"],
+        counts[0] if fields["each"] == "member" else 1, initial, fields["lower"], fields["upper"], fields["cost"],
+        key.unit,
+    )  # fmt: skip
+
+
+def _law(group: MemberGroup, fields: Fields, reading: Reading) -> int | None:
+    """The place of the law that is meant, of those of a group."""
+    parameter, stated = fields["parameter"], fields["law"]
+    having = [i for i, law in enumerate(group.laws) if parameter in PARAMETERS.get(law.type, ())]
+    if stated is None:
+        if len(having) == 1:
+            return having[0]
+        if having:
+            which = listed(map(str, having))
+            message = f"several laws of {group.name!r} have {parameter}: say which with `law`, one of {which}"
+            reading.mistake(inside(fields.path, "parameter"), message)
+            return None
+    elif stated >= len(group.laws):
+        there = f"0 to {len(group.laws) - 1}" if len(group.laws) > 1 else "0 alone"
+        reading.mistake(inside(fields.path, "law"), f"found {stated}, {group.name!r} has {there}")
+        return None
+    elif stated in having:
+        return int(stated)
+    types = [law.type for law in group.laws] if stated is None else [group.laws[stated].type]
+    can = dict.fromkeys(name for law in types for name in PARAMETERS.get(law, ()))
+    reading.mistake(
+        inside(fields.path, "parameter"),
+        f"found {shown(parameter)}, which can be varied in no law of {group.name!r} ({listed(types)}); "
+        f"there can be {listed(can) or 'none'}",
+    )
+    return None
+
+
+def _key(law: str, parameter: str) -> Any:
+    return next(key for key in LAW.variants[law].keys if key.name == parameter)
+
+
+def _within(fields: Fields, initial: float, parameter: str, law: str, reading: Reading) -> bool:
+    """Whether bounds and start go together, and with what the law allows; notes what does not."""
+    good = True
+    kind = _key(law, parameter).kind
+    # a limit of 0 means another law: no force at all
+    above = 0.0 if parameter == "limit" else kind.above
+    lower, upper = fields["lower"], fields["upper"]
+    if (above is not None and lower <= above) or (kind.minimum is not None and lower < kind.minimum):
+        allowed = Number(above=above).allowed() if above is not None else kind.allowed()
+        reading.mistake(inside(fields.path, "lower"), f"found {number_text(lower)}, {parameter} is {allowed}")
+        good = False
+    if lower > upper:
+        message = f"found {number_text(lower)}, allowed is at most upper {number_text(upper)}"
+        reading.mistake(inside(fields.path, "lower"), message)
+        good = False
+    elif not lower <= initial <= upper:
+        given = "" if "initial" in fields.stated else " (the law's own)"
+        message = f"found {number_text(initial)}{given}, allowed is {number_text(lower)} to {number_text(upper)}"
+        reading.mistake(inside(fields.path, "initial"), message)
+        good = False
+    return good
+
+
+def prices(variables: tuple[Variable, ...], groups: tuple[str, ...]) -> FloatArray:
+    """(P,) what the values of variables add to a volume row over some groups; none where there are no variables."""
+    pieces = [np.full(v.count, v.cost if set(v.groups) & set(groups) else 0.0) for v in variables]
+    return np.concatenate(pieces) if pieces else np.zeros(0)

@@ -1,0 +1,235 @@
+"""Derivatives by the laws' own parameters: what they add to the balance, at events, and where a law begins or ends.
+
+A parameter p of a law with force s f(Delta, dDelta/dt, t; p), s = alpha^mu, stands in the balance as
+
+    d(M a + Phi_q^T lam - F)/dp = sum B^T s f_p,
+
+so it is differentiated as s is, with s f_p in place of f (an inerter's f_p is d2Delta/dt2, a free length's -f_Delta).
+Energy adds s V_p. Where a member switches at a margin m(Delta, dDelta/dt; p) = 0, the time of the event varies by
+-m_p dp/m' besides (`events`), with the saltation dv+ = (a- - a+) dt_e that follows from it.
+
+A law that begins to act at tau (`active_from`) is a jump of the right side of the motion at a time that is given. Shift
+tau by dtau: before it the motion is as it was, during dtau it goes on without the law, so behind it
+
+    dv+ = (a_without - a_with) dtau,    dq+ = 0,    d(integral of g) = (g_without - g_with) dtau,
+
+and a peak that stands at tau itself moves along the motion on its own side: dG = dg/dt dtau. Where it ceases
+(`active_until`), with and without change places. Both accelerations are those of the balance at one state; joints and
+inerters are in it. A pulse is smooth: its time is a parameter as any other.
+
+With tau exactly at the start (at the end) it can move to one side only: that side's derivative is taken.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.events import block_of, member_rows
+from mdstopo.general.forces import inerter_row
+from mdstopo.general.model import INERTER
+from mdstopo.general.responses import value_at
+from mdstopo.general.track import restore_modes
+from mdstopo.jit import kernel
+from mdstopo.mechanics.laws.table import (
+    ACTIVE_FROM,
+    ACTIVE_UNTIL,
+    FREE_LENGTH,
+    law_margin_slope,
+    law_margin_slopes,
+    law_slopes,
+)
+
+
+@kernel
+def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate):  # type: ignore[no-untyped-def]
+    """df/dp and dV/dp of member i of block k at unit strength, and its B over its bodies into row (6,)."""
+    if model.block[k, 3] == INERTER:
+        first = 3 * model.pair[model.block[k, 0], 0]
+        second = 3 * model.pair[model.block[k, 0], 1]
+        bias = np.empty(1)
+        inerter_row(model, q, v, i, first, second, row, bias)
+        value = bias[0]
+        for r in range(6):
+            value += row[r] * a[first + r if r < 3 else second + r - 3]
+        return value, 0.0
+    x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+    level = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
+    return law_slopes(model.block[k, 3], model.law[k], place, x, rate, int(strength[1, i]), t, level, model.curves)
+
+
+@kernel
+def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):  # type: ignore[no-untyped-def]
+    """out (M_padded + P,), behind the members, += s (weight V_p - f_p (b . T z)) of all parameters at one state."""
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    members = model.member.shape[1]
+    for e in range(model.varied.shape[0]):
+        k = model.varied[e, 0]
+        place = model.varied[e, 1]
+        if place > FREE_LENGTH or model.active[segment, k] == 0:
+            continue
+        own = weight if model.block[k, 4] >= 0 else 0.0
+        total = 0.0
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate)
+            pulled = 0.0
+            for r in range(6):
+                pulled += row[r] * z[3 * model.pair[model.block[k, 0], r // 3] + r % 3]
+            total += strength[0, i] * (own * by_energy - by_force * pulled)
+        out[members + model.varied[e, 2]] += total
+
+
+@kernel
+def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+    """out, behind the members, += scale df*/dp at fixed motion of member `who` of a group."""
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    members = model.member.shape[1]
+    for e in range(model.varied.shape[0]):
+        k = model.varied[e, 0]
+        place = model.varied[e, 1]
+        own = who - model.block[k, 7]
+        if place > FREE_LENGTH or model.active[segment, k] == 0 or model.block[k, 6] != group:
+            continue
+        if own >= 0 and own < model.block[k, 5]:
+            i = model.block[k, 1] + own
+            slope, _ = parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate)
+            out[members + model.varied[e, 2]] += scale * strength[0, i] * slope
+
+
+@kernel
+def event_slope(model, track, strength, event, e):  # type: ignore[no-untyped-def]
+    """dt_e/dp = -m_p/m' of an event by the parameter of entry e of `varied`; 0 where it has nothing to do with it."""
+    k = model.varied[e, 0]
+    place = model.varied[e, 1]
+    state = track.event[event, 0]
+    who = track.event[event, 1]
+    if place > FREE_LENGTH or state == 0 or block_of(model, who) != k:
+        return 0.0
+    given = True
+    for part in range(2):
+        for d in range(model.mass.shape[0]):
+            given = given and track.salt[event, part, d] == 0.0
+    if given:
+        return 0.0
+    segment = track.index[state - 1, 2]
+    q = track.state[state, 0]
+    v = track.state[state, 1]
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    x, rate = member_rows(model, model.block[k, 0], who, q, v, row, row_rate)
+    code = model.block[k, 3]
+    mode = int(track.event[event, 2])
+    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode)
+    if by_p == 0.0:
+        return 0.0
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+    speed = by_x * rate
+    if by_rate != 0.0:
+        a = np.empty(model.mass.shape[0])
+        lam = np.empty(model.size[0])
+        restore_modes(track, event, strength)
+        desk = make_desk(model)
+        balance(model, strength, segment, track.t[state], q.copy(), v.copy(), np.bool_(False), desk, a, lam)
+        for r in range(6):
+            d = 3 * model.pair[model.block[k, 0], r // 3] + r % 3
+            speed += by_rate * (row[r] * a[d] + row_rate[r] * v[d])
+    return -by_p / speed
+
+
+@kernel
+def add_event(model, track, strength, event, factor, out):  # type: ignore[no-untyped-def]
+    """out, behind the members, += factor dt_e/dp of an event; modes are not what they were before the call."""
+    if factor == 0.0:
+        return
+    for e in range(model.varied.shape[0]):
+        out[model.member.shape[1] + model.varied[e, 2]] += factor * event_slope(model, track, strength, event, e)
+
+
+@kernel
+def begins_or_ends(model, track, count, state, e):  # type: ignore[no-untyped-def]
+    """Whether the law of entry e begins (1) or ceases (-1) to act at a state, at the time that varies; else 0."""
+    place = model.varied[e, 1]
+    if place < ACTIVE_FROM:
+        return 0
+    k = model.varied[e, 0]
+    edge = model.varied[e, 3] != 0
+    before = edge and state == count
+    after = edge and state == 0
+    if state > 0:
+        before = model.active[track.index[state - 1, 2], k] != 0 and (before or state < count)
+    if state < count:
+        after = model.active[track.index[state, 2], k] != 0 and (after or state > 0)
+    if place == ACTIVE_FROM and after and not before:
+        return 1
+    if place == ACTIVE_UNTIL and before and not after:
+        return -1
+    return 0
+
+
+@kernel
+def time_jump(model, track, strength, count, state, e, j, square, dv):  # type: ignore[no-untyped-def]
+    """What shifting the time of entry e does at a state: dv (n,) behind it, and to the integral of g_j (of its square).
+
+    Returns whether it does anything, and the latter (0 for j < 0). Only the first entry of a value does: it stands for
+    all laws that the value shifts.
+    """
+    dv[:] = 0.0
+    which = model.varied[e, 2]
+    if e > 0 and model.varied[e - 1, 2] == which:
+        return False, 0.0
+    shifted = np.zeros(model.varied.shape[0], np.int64)
+    way = 0
+    for other in range(e, model.varied.shape[0]):
+        if model.varied[other, 2] == which:
+            shifted[other] = begins_or_ends(model, track, count, state, other)
+            way = shifted[other] if shifted[other] != 0 else way
+    if way == 0:
+        return False, 0.0
+    step = state if way > 0 else state - 1
+    segment = track.index[step, 2]
+    restore_modes(track, track.index[step, 3], strength)
+    desk = make_desk(model)
+    a = np.empty(dv.shape[0])
+    lam = np.empty(model.size[0])
+    drop = 0.0
+    for side in range(2):  # with the laws, then without them
+        sign = -way if side == 0 else way
+        for other in range(e, model.varied.shape[0]):
+            if shifted[other] != 0:
+                model.active[segment, model.varied[other, 0]] = 1 - side
+        balance(
+            model, strength, segment, track.t[state], track.state[state, 0].copy(), track.state[state, 1].copy(),
+            np.bool_(False), desk, a, lam,
+        )  # fmt: skip
+        for d in range(dv.shape[0]):
+            if model.free[d] != 0:
+                dv[d] += sign * a[d]
+        if j >= 0:
+            value = value_at(model, strength, segment, track.t[state], track.state[state], j, desk)
+            drop += sign * (value * value if square else value)
+    for other in range(e, model.varied.shape[0]):
+        if shifted[other] != 0:
+            model.active[segment, model.varied[other, 0]] = 1
+    return True, drop
+
+
+@kernel
+def add_times(model, track, strength, count, state, j, square, lam_v, rate, out):  # type: ignore[no-untyped-def]
+    """out, behind the members, += what shifting the times of laws that begin or end at a state does.
+
+    lam_v (n,): its cotangent of the velocities behind the state; rate: dg/dt of a peak that stands there, which moves
+    with the time; j, square: as of `time_jump`, for an integral. Modes are not what they were before the call.
+    """
+    dv = np.empty(lam_v.shape[0])
+    for e in range(model.varied.shape[0]):
+        if model.varied[e, 1] < ACTIVE_FROM:
+            continue
+        does, drop = time_jump(model, track, strength, count, state, e, j, square, dv)
+        if not does:
+            continue
+        total = drop
+        if state > 0 and state < count:
+            total += rate
+        for d in range(dv.shape[0]):
+            total += lam_v[d] * dv[d]
+        out[model.member.shape[1] + model.varied[e, 2]] += total

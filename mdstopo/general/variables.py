@@ -1,0 +1,126 @@
+"""Where the design variables of laws stand in a general scene, and the scene's arrays at their values.
+
+Nothing is compiled anew for other values: they are written into the law's row, the free length of members, and, where
+they say when a law acts, into the ends of segments. Which block a value belongs to does not change.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.model import Case, CurveLaw, Law, LoadCase, MemberGroup, PulseLaw, Variable
+from mdstopo.general.kinks import landed
+from mdstopo.general.model import COUNT, GROUP, START, GeneralModel
+from mdstopo.integrators.choice import choose
+from mdstopo.mechanics.laws import table as laws
+from mdstopo.scene.model import FloatArray, IndexArray
+
+#: parameters that say when something happens
+TIMES = frozenset({"active_from", "active_until", "time", "rate"})
+#: parameters by which a force may depend on velocities or accelerations
+RATES = frozenset({"damping", "derivative", "inertance"})
+
+
+def of_law(case: Case, group: MemberGroup, place: int) -> list[Variable]:
+    """The variables of one law of a group."""
+    return [each for each in case.variables if (group.name, place) in zip(each.groups, each.laws, strict=True)]
+
+
+def each_member(case: Case, group: MemberGroup, place: int) -> bool:
+    """Whether members have parameters of their own in a law, so that each is a block."""
+    return any(each.each == "member" for each in of_law(case, group, place))
+
+
+def lasting(case: Case, group: MemberGroup) -> list[Law]:
+    """The laws of a group without the times that vary."""
+    found = []
+    for place, law in enumerate(group.laws):
+        names = {each.parameter for each in of_law(case, group, place)}
+        without: dict[str, Any] = dict.fromkeys(names & {"active_from", "active_until"})
+        if isinstance(law, PulseLaw) and names & {"time", "rate"}:
+            without["rate"] = 0.0
+        found.append(replace(law, **without) if without else law)
+    return found
+
+
+def _blocks(case: Case, block: IndexArray) -> dict[tuple[str, int], list[int]]:
+    """(group, place of the law) -> its blocks, in the order of members."""
+    found: dict[tuple[str, int], list[int]] = {}
+    k = 0
+    for group in case.members:
+        for place in range(len(group.laws)):
+            count = len(group) if each_member(case, group, place) else 1
+            found[group.name, place] = list(range(k, k + count))
+            k += count
+    assert k == len(block)
+    return found
+
+
+def varied(case: Case, block: IndexArray) -> IndexArray:
+    """(n_varied, 4): block, place of the parameter, which value, rising; the last column is set by `Placing`."""
+    if not case.variables:
+        return np.zeros((0, 4), dtype=np.int64)
+    blocks = _blocks(case, block)
+    rows = []
+    first = 0
+    for variable in case.variables:
+        for group, law in zip(variable.groups, variable.laws, strict=True):
+            own = blocks[group, law]
+            code = case.members[int(block[own[0], GROUP])].laws[law].type
+            place = {**laws.COMMON, **laws.PLACES[code]}[variable.parameter]
+            for i, k in enumerate(own):
+                rows.append([k, place, first + (i if variable.each == "member" else 0), 0])
+        first += variable.count
+    return np.array(sorted(rows, key=lambda row: row[2]), dtype=np.int64)
+
+
+class Placing:
+    """Puts values of the variables into the arrays of one load case."""
+
+    def __init__(self, case: Case, load_case: LoadCase, model: GeneralModel) -> None:
+        self._load_case = load_case
+        self._fine = choose(case.solver, "laws")[0] == "generalized_alpha"
+        #: block -> its law, and which value each parameter takes
+        self._taken: dict[int, tuple[Law, dict[str, int]]] = {}
+        blocks = _blocks(case, model.block)
+        first = 0
+        for variable in case.variables:
+            for name, law in zip(variable.groups, variable.laws, strict=True):
+                for i, k in enumerate(blocks[name, law]):
+                    record = case.members[int(model.block[k, GROUP])].laws[law]
+                    taken = self._taken.setdefault(k, (record, {}))[1]
+                    taken[variable.parameter] = first + (i if variable.each == "member" else 0)
+            first += variable.count
+        self.initial = np.concatenate([np.full(each.count, each.initial) for each in case.variables])
+
+    def at(self, model: GeneralModel, values: FloatArray) -> GeneralModel:
+        """The arrays with values (P,) in them."""
+        law, member = model.law.copy(), model.member.copy()
+        start, end = self._load_case.start, self._load_case.end
+        times: set[float] = set()
+        acts: dict[int, tuple[float, float]] = {}
+        for k, (record, taken) in self._taken.items():
+            changed = {name: float(values[c]) for name, c in taken.items()}
+            now = replace(record, **changed)
+            if not isinstance(now, CurveLaw):
+                law[k] = laws.parameters(now, [])
+            if "free_length" in changed:
+                first = int(model.block[k, START])
+                member[4, first : first + int(model.block[k, COUNT])] = changed["free_length"]
+            if TIMES & changed.keys():
+                times |= {t for t in laws.landings(now, self._fine) if start < t < end}
+                begin = -np.inf if now.active_from is None else now.active_from
+                until = np.inf if now.active_until is None else now.active_until
+                acts[k] = begin, until
+        model = landed(model._replace(law=law, member=member), sorted(times))
+        if not acts:
+            return model
+        active, varied = model.active.copy(), model.varied.copy()
+        middle = 0.5 * (model.times[:-1] + model.times[1:])
+        for k, (begin, until) in acts.items():
+            active[:, k] = (middle > begin) & (middle < until)
+        for row in varied:
+            begin, until = acts.get(int(row[0]), (np.nan, np.nan))
+            row[3] = (row[1] == laws.ACTIVE_FROM and begin == start) or (row[1] == laws.ACTIVE_UNTIL and until == end)
+        return model._replace(active=active, varied=varied)
