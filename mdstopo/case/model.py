@@ -27,6 +27,7 @@ from mdstopo.case.errors import Mistake
 from mdstopo.case.laws import (
     LAWS,
     ActuatorLaw,
+    CrushLaw,
     CubicLaw,
     CurveLaw,
     GapLaw,
@@ -64,6 +65,7 @@ __all__ = [
     "Bushing",
     "Case",
     "Combine",
+    "CrushLaw",
     "CubicLaw",
     "CurveLaw",
     "DistanceJoint",

@@ -9,6 +9,7 @@ import numpy as np
 
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.balance import make_desk
+from mdstopo.general.crush import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.duties import step_forward
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
@@ -75,16 +76,20 @@ def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):  # typ
     if model.block[k, 3] == INERTER:
         return inerter_force(model, k, i, q, v, a, row)
     x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+    x -= strength[2, i]
     value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
     f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
     return f
 
 
 @kernel
-def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, desk, column, matrix, spare):  # type: ignore[no-untyped-def]
+def through_step(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, sets_bar, desk, column, sets, matrix, spare
+):
     """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
 
-    The last column sums up the derivative of an integral (`step_map`).
+    The last column sums up the derivative of an integral (`step_map`). sets (slots, M_padded): those of the sets
+    (`crush`), whose part in the integral's stages is sets_bar (s, slots).
     """
     n = model.mass.shape[0]
     o = track.index[w, 0]
@@ -95,6 +100,13 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
     restore_modes(track, track.index[w, 3], strength)
     settled = step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, matrix)
     width = 4 * n + 1
+    slots = sets.shape[0]
+    by_set = np.empty((slots, width))
+    if slots > 0:
+        through_sets(model, strength, track, w, matrix, by_set)
+        for m in range(slots):
+            for j in range(sets_bar.shape[0]):
+                by_set[m, 4 * n] += sets_bar[j, m]
     for k in range(model.block.shape[0]):
         if model.block[k, 4] < 0:
             continue
@@ -115,6 +127,10 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
                         b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
                         for d in range(width):
                             spare[d] -= f * row[r] * matrix[b, d]
+            for m in range(slots):
+                if sets[m, i] != 0.0:
+                    for d in range(width):
+                        spare[d] += sets[m, i] * by_set[m, d]
             for d in range(4 * n):
                 column[i, d] = spare[d]
             column[i, 4 * n] += spare[4 * n]
@@ -122,10 +138,11 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
 
 
 @kernel
-def jump(model, track, state, column, drops):  # type: ignore[no-untyped-def]
+def jump(model, track, state, column, sets, drops):  # type: ignore[no-untyped-def]
     """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows.
 
-    drops as of `adjoint.through_events`: the last column, an integral's derivative, takes them in.
+    sets as of `through_step`; drops as of `adjoint.through_events`: the last column, an integral's derivative, takes
+    them in.
     """
     n = model.mass.shape[0]
     if state == 0:
@@ -137,10 +154,14 @@ def jump(model, track, state, column, drops):  # type: ignore[no-untyped-def]
             later = 0.0
             for d in range(n):
                 later -= track.salt[e, 0, d] * column[i, d] + track.salt[e, 1, d] * column[i, n + d]
+            if sets.shape[0] > 0:
+                later += time_forward(model, track, e, sets, i)
             for d in range(n):
                 column[i, n + d] += track.salt[e, 2, d] * later
             if drops.shape[0] > 0:
                 column[i, 4 * n] += drops[e] * later
+        if sets.shape[0] > 0:
+            sets_forward(model, track, e, column, sets)
 
 
 @entry
@@ -180,41 +201,49 @@ def push(  # type: ignore[no-untyped-def]
     stages = track.index[count, 0] if integral > 0 else 0
     stage_bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, n_row))
+    slots = count_sets(model)
+    sets = np.zeros((slots, padded.shape[0]))
+    bar_set = np.zeros(slots)
+    sets_bar = np.zeros((stages, slots))
     drops = np.empty(0)
     w = count
     c = 1.0
     last = count
     if integral > 0:
         integral_cotangents(
-            tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, desk, padded, work
-        )
+            tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, sets_bar, desk, padded,
+            work,
+        )  # fmt: skip
         drops = event_drops(model, strength, track, count, j, integral == 2, desk)
     else:
-        w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
+        w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, padded, work)
         last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
     for k in range(last):
         o = track.index[k, 0]
         end = track.index[k + 1, 0]
         own = stage_bars[o:end] if integral > 0 else stage_bars
         own_rows = rows_bar[o:end] if integral > 0 else rows_bar
+        own_sets = sets_bar[o:end] if integral > 0 else sets_bar
         settled = through_step(
-            tag, model, tables, strength, track, k, 1.0, sweeps, own, own_rows, desk, column, matrix, spare
-        )
+            tag, model, tables, strength, track, k, 1.0, sweeps, own, own_rows, own_sets, desk, column, sets, matrix,
+            spare,
+        )  # fmt: skip
         if not settled:
             return k
-        jump(model, track, k + 1, column, drops)
-    if (
-        integral == 0
-        and w >= 0
-        and not through_step(
-            tag, model, tables, strength, track, w, c, sweeps, stage_bars, rows_bar, desk, column, matrix, spare
-        )
-    ):
-        return last
+        jump(model, track, k + 1, column, sets, drops)
+    if integral == 0 and w >= 0:
+        settled = through_step(
+            tag, model, tables, strength, track, w, c, sweeps, stage_bars, rows_bar, sets_bar, desk, column, sets,
+            matrix, spare,
+        )  # fmt: skip
+        if not settled:
+            return last
     for i in range(padded.shape[0]):
         padded[i] += column[i, 4 * n]
         for d in range(n):
             padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+        for m in range(slots):
+            padded[i] += bar_set[m] * sets[m, i]
     unscale_general(model.block, model.power, alpha, padded, out)
     return -1
 
@@ -235,6 +264,10 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
     bars = np.zeros((3, n))
     nothing = np.zeros((0, 3, n))
     no_rows = np.zeros((0, model.size[0]))
+    slots = count_sets(model)
+    sets = np.zeros((slots, padded.shape[0]))
+    bar_set = np.zeros(slots)
+    no_sets = np.zeros((0, slots))
     row = np.zeros(7)
     for k in range(count + 1):
         row[2] = max(k - 1, 0)
@@ -242,12 +275,15 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
         row[6] = who[k]
         if k > 0:
             through_step(
-                tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, desk, column, matrix, spare
-            )
-        row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
+                tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, no_sets, desk, column, sets,
+                matrix, spare,
+            )  # fmt: skip
+        row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, padded, work)
         for i in range(padded.shape[0]):
             for d in range(n):
                 padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+            for m in range(slots):
+                padded[i] += bar_set[m] * sets[m, i]
         unscale_general(model.block, model.power, alpha, padded, out[k])
         if k > 0:
-            jump(model, track, k, column, np.empty(0))
+            jump(model, track, k, column, sets, np.empty(0))

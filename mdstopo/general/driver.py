@@ -54,7 +54,7 @@ class GeneralDriver:
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
         self._alpha = np.zeros(n_design)
-        self.strength = np.zeros((2, padded + 1))
+        self.strength = np.zeros((3, padded + 1))
         self.padded = np.zeros(padded)
         self.rows = np.zeros((count, ROWS, COLUMNS))
         self.found = np.zeros(count, dtype=np.int64)

@@ -52,7 +52,8 @@ def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-d
         for i in range(lo, lo + model.block[k, 5]):
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            s = law_margin(code, model.law[k], length - model.member[4, i], rate, int(strength[1, i]))
+            x = length - model.member[4, i] - strength[2, i]
+            s = law_margin(code, model.law[k], x, rate, int(strength[1, i]))
             if s < best:
                 best = s
                 who = i
@@ -81,7 +82,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             r = rel0[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i]
+            x = length - model.member[4, i] - strength[2, i]
             s0 = law_margin(code, model.law[k], x, rate, mode)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
             if by_rate != 0.0:
@@ -90,7 +91,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             r = rel1[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i]
+            x = length - model.member[4, i] - strength[2, i]
             s1 = law_margin(code, model.law[k], x, rate, mode)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
             if by_rate != 0.0:
@@ -218,9 +219,9 @@ def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-de
 
 @kernel
 def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[no-untyped-def]
-    """The mode that member i of block k goes to, s'^2 / (2 |s''|), and slopes (2, n) = s_q / s', s_v / s'.
+    """The mode that member i of block k goes to, s'^2 / (2 |s''|), and -s_x / s'; slopes (2, n) = s_q / s', s_v / s'.
 
-    How far it goes is told of margins of Delta alone (infinite for others).
+    How far it goes is told of margins of Delta alone (infinite for others). A permanent set shortens Delta.
     """
     n = q.shape[0]
     p = model.block[k, 0]
@@ -228,6 +229,7 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
     row = np.empty(6)
     row_rate = np.empty(6)
     x, rate = member_rows(model, p, i, q, v, row, row_rate)
+    x -= strength[2, i]
     second = 0.0
     for r in range(6):
         d = 3 * model.pair[p, r // 3] + r % 3
@@ -245,7 +247,8 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
             slopes[1, d] = by_rate * row[r] / speed
     bend = 2.0 * abs(by_x * second)
     beyond = speed * speed / bend if by_rate == 0.0 and bend > 0.0 else np.inf
-    return law_next(code, model.law[k], x, rate, second, mode), beyond
+    by_set = -by_x / speed if speed != 0.0 else 0.0
+    return law_next(code, model.law[k], x, rate, second, mode), beyond, by_set
 
 
 @kernel
