@@ -41,6 +41,7 @@ from mdstopo.case.parts import (
     GROUND,
     Body,
     Bushing,
+    Contact,
     DistanceJoint,
     FixedJoint,
     Joint,
@@ -65,6 +66,7 @@ __all__ = [
     "Bushing",
     "Case",
     "Combine",
+    "Contact",
     "CrushLaw",
     "CubicLaw",
     "CurveLaw",
@@ -172,6 +174,7 @@ class Case(Value):
     solver: SolverSettings
     marks: Marks
     warnings: tuple[Mistake, ...] = ()
+    contacts: tuple[Contact, ...] = ()
 
     @property
     def design_groups(self) -> tuple[MemberGroup, ...]:

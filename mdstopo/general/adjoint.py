@@ -10,7 +10,7 @@ the way changes the cotangents by saltation (`events`); a peak at an event is no
 import numpy as np
 
 from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unknowns
-from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, sets_back, time_back
+from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces, inerter_force
 from mdstopo.general.members import block_design
@@ -177,8 +177,11 @@ def sweep(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, work):  # type: ignore[no-untyped-def]
-    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu."""
+def row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu.
+
+    start (n,), or no length: the cotangent of the start's positions comes out.
+    """
     n = model.mass.shape[0]
     bars = np.empty((3, n))
     none = np.empty((0, 3, n))
@@ -191,6 +194,7 @@ def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, 
             tag, model, tables, strength, track, w, c, bars[0], bars[1], bar_set, none, no_rows, no_rows, no_drops,
             desk, out, work,
         )  # fmt: skip
+    keep_start(model, track, bars[0], bar_set, start)
 
 
 @kernel
@@ -266,8 +270,11 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, out, work):  # type: ignore[no-untyped-def]
-    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out."""
+def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):  # type: ignore[no-untyped-def]
+    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out.
+
+    start as of `row_gradient`.
+    """
     n = model.mass.shape[0]
     stages = track.index[count, 0] if gradient else 0
     bars = np.zeros((stages, 3, n))
@@ -285,6 +292,7 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
             tag, model, tables, strength, track, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops,
             desk, out, work,
         )  # fmt: skip
+        keep_start(model, track, lam_q, bar_set, start)
     return total
 
 

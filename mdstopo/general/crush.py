@@ -156,6 +156,21 @@ def sets_back(model, track, e, bar, lam_q):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def keep_start(model, track, lam_q, bar, start):  # type: ignore[no-untyped-def]
+    """start (n,) = the cotangents lam_q of the start's positions, with those of the sets that members begin with.
+
+    Nothing where start has no length.
+    """
+    if start.shape[0] == 0:
+        return
+    if bar.shape[0] > 0:
+        for e in range(track.index[0, 3]):
+            sets_back(model, track, e, bar, lam_q)
+    for d in range(start.shape[0]):
+        start[d] = lam_q[d]
+
+
+@kernel
 def sets_forward(model, track, e, column, sets):  # type: ignore[no-untyped-def]
     """sets (slots, M_padded), the derivatives of the sets, behind event e; column as of `direct.through_step`."""
     slot, k = made_set(model, track, e)

@@ -164,6 +164,17 @@ def jump(model, track, state, column, sets, drops):  # type: ignore[no-untyped-d
             sets_forward(model, track, e, column, sets)
 
 
+@kernel
+def begin(model, track, first, column, sets):  # type: ignore[no-untyped-def]
+    """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows)."""
+    for i in range(first.shape[0]):
+        for d in range(first.shape[1]):
+            column[i, d] = first[i, d]
+    if first.shape[0] > 0 and sets.shape[0] > 0:
+        for e in range(track.index[0, 3]):
+            sets_forward(model, track, e, column, sets)
+
+
 @entry
 def push(  # type: ignore[no-untyped-def]
     tag,
@@ -182,12 +193,14 @@ def push(  # type: ignore[no-untyped-def]
     strength,
     padded,
     out,
+    first,
     work,
 ):
     """out (N,) = the derivative of one row of `extremes`, or of an integral, by alpha (N,), carried forward.
 
-    Arguments as those of `look.pull`. sweeps > 0: by the iterative method, with so many sweeps at most; returns the
-    step in which they did not settle, or -1.
+    Arguments as those of `look.pull`; first (M_padded, n), or no rows: derivatives of the start's positions.
+    sweeps > 0: by the iterative method, with so many sweeps at most; returns the step in which they did not settle,
+    or -1.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -205,6 +218,7 @@ def push(  # type: ignore[no-untyped-def]
     sets = np.zeros((slots, padded.shape[0]))
     bar_set = np.zeros(slots)
     sets_bar = np.zeros((stages, slots))
+    begin(model, track, first, column, sets)
     drops = np.empty(0)
     w = count
     c = 1.0
@@ -249,7 +263,9 @@ def push(  # type: ignore[no-untyped-def]
 
 
 @entry
-def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, work):  # type: ignore[no-untyped-def]
+def follow(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, first, work
+):
     """out (count + 1, N) = dg_j/dalpha at the start and at the end of every step, the time held fixed.
 
     Arguments as those of `push`; who (count + 1,): the member looked at. At an event the values before it.
@@ -268,6 +284,7 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
     sets = np.zeros((slots, padded.shape[0]))
     bar_set = np.zeros(slots)
     no_sets = np.zeros((0, slots))
+    begin(model, track, first, column, sets)
     row = np.zeros(7)
     for k in range(count + 1):
         row[2] = max(k - 1, 0)

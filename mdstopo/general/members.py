@@ -13,6 +13,7 @@ import math
 
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel
+from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.table import CRUSH, law, law_first_set, law_start
 
@@ -141,6 +142,11 @@ def set_modes(model, strength, rel, rel_rate):  # type: ignore[no-untyped-def]
             if code == CRUSH and model.active[0, k] == 0:  # whatever it is like now, it has not been crushed
                 strength[1, i] = 0.0
                 strength[2, i] = 0.0
+    for j in range(model.contact_pair.shape[0]):
+        p = model.contact_pair[j]
+        along, height, _, rise = contact_pose(model.contact[j], rel[p])
+        second = second_rise(model.contact[j], rel[p], rel_rate[p])
+        strength[1, model.member.shape[1] + j] = contact_start(model.contact[j], along, height, rise, second)
 
 
 @inline

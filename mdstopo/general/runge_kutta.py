@@ -8,10 +8,10 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.events import block_of, first_sign, has_switches, smallest_margin, switch_of
+from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
-from mdstopo.general.members import meeting, scale_general, set_modes, stretch_of
+from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.track import carve_track, copy_vector, keep_stage, keep_state
@@ -37,7 +37,6 @@ from mdstopo.integrators.steps import (
 )
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.laws.table import law_grazes, law_set
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own
@@ -140,14 +139,9 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
             return events
         if events >= track.event.shape[0]:
             return -1
-        k = block_of(model, who)
         salt = track.salt[events]
-        new, beyond, by_set = switch_of(model, segment, strength, q, v, a, who, k, salt)
+        new, beyond, kind, by_set, grown = switch_any(model, segment, strength, rel, q, v, a, who, salt)
         old = int(strength[1, who])
-        x, _ = stretch_of(model.member, who, rel[model.block[k, 0]])
-        x -= strength[2, who]
-        first = strength[0, who] != 0.0 and strength[2, who] == 0.0
-        kind = law_grazes(model.block[k, 3], model.law[k], x, old) if first else 0
         if beyond < graze and kind == 2:
             where[2] = who
         track.event[events, 0] = state
@@ -156,7 +150,7 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
         track.event[events, 3] = new
         track.event[events, 4] = 1 if beyond < graze and kind > 0 else 0
         track.kept[events, 0] = strength[2, who]
-        strength[2, who] += law_set(model.block[k, 3], model.law[k], x, old, new)
+        strength[2, who] += grown
         track.kept[events, 1] = strength[2, who]
         track.kept[events, 2] = by_set
         strength[1, who] = new
