@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mdstopo.error_estimate import Estimator
     from mdstopo.general.compile import GeneralScene
     from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.settle import Settled
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
     from mdstopo.sensitivity.methods import Differentiated
@@ -257,6 +258,14 @@ class Evaluator:
             chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
             self._narrower[names] = Evaluator(replace(self.case, objectives=chosen), beside=False)
         return self._narrower[names]
+
+    def settled(self, alpha: FloatArray, load_case: str) -> "Settled | None":
+        """How far the start moves to be at rest with alpha (N,); None where the case does not settle, or cannot."""
+        if not self.case.solver.settle:
+            return None
+        driver = self.driver(load_case)
+        assert not isinstance(driver, Driver)
+        return driver.start.settled if driver.settle(self.design(alpha)) and driver.start is not None else None
 
     def degrees_of_freedom(self, load_case: str) -> int:
         """Coordinates that are free, less the independent rows of joints."""

@@ -21,6 +21,7 @@ class Status(enum.Enum):
     STEP_TOO_LARGE = "the fixed step is far too large for the motion"
     SINGULAR = "the joints have become singular: they contradict or repeat each other in this configuration"
     CHATTERING = "a member switches again and again within next to no time"
+    NO_EQUILIBRIUM = "there is no static equilibrium near the stated configuration"
     NO_GRADIENT = "the objective has a value but no gradient here"
     NOT_POSITIVE = "an objective is not positive"
     GRAZING = "a member only just touches, or only just does not: the gradient holds on one side only"

@@ -135,3 +135,4 @@ class SolverSettings(Value):
     assemble: bool = False
     step: float | None = None
     spectral_radius: float | None = None
+    settle: bool = False

@@ -121,6 +121,23 @@ class ActuatorLaw(Law):
 
 
 @frozen(kw_only=True)
+class CrushLaw(Law):
+    """f = stiffness (Delta - set - gap) between 0 and force; beyond it the set grows. V = f^2 / (2 stiffness).
+
+    side: compression | tension, the way in which it is crushed; compression mirrors the law.
+    """
+
+    type: ClassVar[str] = "crush"
+    kind: ClassVar[str] = "reactive"
+
+    stiffness: float
+    force: float
+    gap: float = 0.0
+    free_length: float | None = None
+    side: str = "compression"
+
+
+@frozen(kw_only=True)
 class InerterLaw(Law):
     """f = inertance d2Delta/dt2 (the acceleration of Eq. 1)."""
 
@@ -131,5 +148,6 @@ class InerterLaw(Law):
 
 
 LAWS: dict[str, type[Law]] = {
-    law.type: law for law in (SpringLaw, GapLaw, CubicLaw, CurveLaw, PulseLaw, TableLaw, ActuatorLaw, InerterLaw)
+    law.type: law
+    for law in (SpringLaw, GapLaw, CubicLaw, CurveLaw, PulseLaw, TableLaw, ActuatorLaw, CrushLaw, InerterLaw)
 }

@@ -29,6 +29,7 @@ from mdstopo.case.errors import Mistake
 from mdstopo.case.laws import (
     LAWS,
     ActuatorLaw,
+    CrushLaw,
     CubicLaw,
     CurveLaw,
     GapLaw,
@@ -42,6 +43,7 @@ from mdstopo.case.parts import (
     GROUND,
     Body,
     Bushing,
+    Contact,
     DistanceJoint,
     FixedJoint,
     Joint,
@@ -67,6 +69,8 @@ __all__ = [
     "Bushing",
     "Case",
     "Combine",
+    "Contact",
+    "CrushLaw",
     "CubicLaw",
     "CurveLaw",
     "DistanceJoint",
@@ -181,6 +185,7 @@ class Case(Value):
     shared: tuple[str, ...] = ()
     mirrored: tuple[tuple[str, ...], ...] = ()
     variables: tuple[Variable, ...] = ()
+    contacts: tuple[Contact, ...] = ()
 
     @property
     def design_groups(self) -> tuple[MemberGroup, ...]:

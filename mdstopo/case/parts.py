@@ -148,6 +148,31 @@ class Motion(Value):
 
 
 @frozen(kw_only=True)
+class Contact(Value):
+    """Points of one body against an edge of another; the left of the way from its first end to its second is free.
+
+    index: its place in the file, from 0; name: as stated, else the index as text. points (n, 2), edge_from, edge_to:
+    in coordinates of `body` and of `edge_body`. Each point by itself: stiffness in N/m, damping in N s/m, friction:
+    mu; slip: the sliding speed in m/s at which friction is mu tanh(1).
+    """
+
+    name: str
+    index: int
+    body: str
+    points: FloatArray
+    edge_body: str
+    edge_from: Pair
+    edge_to: Pair
+    stiffness: float
+    damping: float
+    friction: float
+    slip: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", read_only(self.points))
+
+
+@frozen(kw_only=True)
 class Joint(Value):
     """What all joints have in common.
 

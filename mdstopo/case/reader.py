@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.contacts import build_contacts
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.geometry import Frames, build_body, build_points
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
@@ -150,6 +151,7 @@ def _build(top: Fields, reading: Reading) -> dict[str, Any]:
         "bodies": tuple(body for body in frames.bodies.values() if body.name != GROUND),
         "joints": build_joints(top["joints"], frames, reading),
         "bushings": build_bushings(top["bushings"], frames, reading),
+        "contacts": build_contacts(top["contacts"], points, frames, reading),
         "points": FrozenDict(points),
         "members": tuple((designed or {}).values()),
         "load_cases": load_cases,

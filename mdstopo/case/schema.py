@@ -10,6 +10,7 @@ from typing import Any
 
 from mdstopo.case.kinds import Flag, Number, Ref, Text, Version, explained
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
+from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_scene import (
     BODY,
     BODY_KEYS,
@@ -313,6 +314,7 @@ SOLVER = Record(
         ),
         Key("sensitivity", _SENSITIVITIES, "how gradients are computed", default="auto"),
         Key("assemble", Flag(), "move the start to the nearest one that fits the joints", default=False),
+        Key("settle", Flag(), "move the start to the static equilibrium nearby, with each design anew", default=False),
     ),
     doc="How motions and gradients are computed.",
 )
@@ -346,6 +348,7 @@ FORMAT = Record(
         Key("bushings", ListOf(BUSHING, what="bushings"), "elastic joints", default=()),
         MOTIONS,
         Key("points", Named(POINTS, "point grid"), "grids of points by name"),
+        Key("contacts", ListOf(CONTACT, what="contacts"), "points of one body against an edge of another", default=()),
         Key("members", Named(GROUP_KEYS, "member group"), "groups of candidate members by name"),
         LOADS,
         Key(

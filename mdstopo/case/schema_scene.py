@@ -242,6 +242,14 @@ _SIDES = explained(
 )
 
 
+_CRUSHED = explained(
+    {
+        "compression": "it is crushed where the member becomes shorter, and pushes",
+        "tension": "it is drawn out where the member becomes longer, and pulls",
+    }
+)
+
+
 def _law(word: str, doc: str, *keys: Key) -> Record:
     tag = Key("type", Word((word,)), "which law it is", required=True)
     article = "an" if word[0] in "aeiou" else "a"
@@ -304,6 +312,16 @@ LAW = Tagged(
             Key("derivative", NOT_NEGATIVE, "kd at alpha = 1", default=0.0, unit="N s/m"),
             Key("target", NUMBER, "the elongation that it steers to", default=0.0, unit="m"),
             Key("limit", NOT_NEGATIVE, "largest force at alpha = 1", unit="N", otherwise="none"),
+        ),
+        "crush": _law(
+            "crush",
+            "Reactive, a crushable leg or an energy absorber: f rises with k (Delta - gap) up to F, stays F while it "
+            "is crushed further, falls with k on the way back to 0 and leaves a permanent set; energy f^2 / (2 k).",
+            Key("stiffness", POSITIVE, "k at alpha = 1", required=True, unit="N/m"),
+            Key("force", POSITIVE, "F, the plateau, at alpha = 1", required=True, unit="N"),
+            Key("gap", NUMBER, "elongation, or shortening, at which contact begins", default=0.0, unit="m"),
+            _FREE_LENGTH,
+            Key("side", _CRUSHED, "the way in which it is crushed", default="compression"),
         ),
         "inerter": _law(
             "inerter",

@@ -36,7 +36,9 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
     if not fields.good():
         return SolverSettings()
     _warn_ignored(fields, reading)
-    return SolverSettings(integrator, tolerance, sensitivity, fields["assemble"], step, fields["spectral_radius"])
+    return SolverSettings(
+        integrator, tolerance, sensitivity, fields["assemble"], step, fields["spectral_radius"], fields["settle"]
+    )
 
 
 def _warn_ignored(fields: Fields, reading: Reading) -> None:

@@ -73,6 +73,10 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
             output.say(f"load case {name}: {freedom} degrees of freedom")
         document["degrees_of_freedom"] = max(freedoms.values())
         found = frequencies(case, engine)
+        for name in freedoms:
+            rest = engine.settled(case.initial, name)
+            if rest is not None:
+                output.say(f"load case {name}: {rest}")
         _say_frequencies(output, case, found)
         output.say("left out, because nothing asks for it")
         for sentence in engine.skipped or ("nothing",):

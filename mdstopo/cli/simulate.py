@@ -25,6 +25,7 @@ from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
+    from mdstopo.general.settle import Settled
     from mdstopo.store.contents import Motion
 
 
@@ -67,6 +68,7 @@ def command(
         ready = time.perf_counter()
         motions = {name: engine.trajectory(alpha, name) for name in chosen}
         ended = time.perf_counter()
+        rests = {name: engine.settled(alpha, name) for name in chosen}
         failed = [motion for motion in motions.values() if motion.status is not Status.OK]
         status = RunStatus.FAILED if failed else RunStatus.CONVERGED
         reason = f"{failed[0].status.value}: {failed[0].message}" if failed else "done"
@@ -79,6 +81,8 @@ def command(
     output.say(f"{case.title or case.name}: {reason}")
     for name, motion in motions.items():
         _say_motion(output, case, name, motion)
+        if rests[name] is not None:
+            output.say(f"  {rests[name]}")
     output.table(
         [
             ["integrator", f"{engine.integrator}: {engine.integrator_reason}"],
@@ -92,7 +96,7 @@ def command(
             "case": case.name,
             "status": status.value,
             "reason": reason,
-            "load_cases": {name: _motion_document(case, motion) for name, motion in motions.items()},
+            "load_cases": {name: _motion_document(case, motion, rests[name]) for name, motion in motions.items()},
             "integrator": engine.integrator,
             "seconds": ended - ready,
             "compile_seconds": ready - began,
@@ -119,8 +123,9 @@ def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> No
     output.table(rows)
 
 
-def _motion_document(case: "Case", motion: "Motion") -> dict[str, Any]:
-    return {
+def _motion_document(case: "Case", motion: "Motion", rest: "Settled | None") -> dict[str, Any]:
+    settled = {} if rest is None else {"settled": {"moved": rest.moved, "turned": rest.turned}}
+    return settled | {
         "steps": len(motion.t) - 1,
         "end": motion.t[-1],
         "bodies": {

@@ -10,6 +10,7 @@ the way changes the cotangents by saltation (`events`); a peak at an event is no
 import numpy as np
 
 from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unknowns
+from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces, inerter_force
 from mdstopo.general.members import block_design
@@ -107,9 +108,8 @@ def _unit_force(model, k, i, segment, t, r, strength):  # type: ignore[no-untype
     length = np.sqrt(x * x + y * y)
     rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
     value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    f, _, _, _, _ = law(
-        model.block[k, 3], model.law[k], length - model.member[4, i], rate, int(strength[1, i]), t, value, model.curves
-    )
+    stretch = length - model.member[4, i] - strength[2, i]
+    f, _, _, _, _ = law(model.block[k, 3], model.law[k], stretch, rate, int(strength[1, i]), t, value, model.curves)
     return f
 
 
@@ -121,11 +121,12 @@ def free_only(model, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def through_events(model, track, state, lam_q, lam_v, drops, strength, out):  # type: ignore[no-untyped-def]
+def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, out):  # type: ignore[no-untyped-def]
     """Pull cotangents behind the events of a state back to before them (saltation), in place.
 
-    drops (E,): by how much an integrand falls at each event (`event_drops`), or no rows. out (M_padded + P,): what
-    parameters do to the events' times is added to it, behind the members.
+    bar_set (slots,): those of the sets (`crush`). drops (E,): by how much an integrand falls at each event
+    (`event_drops`), or no rows. out (M_padded + P,): what parameters do to the events' times is added to it, behind the
+    members.
     """
     last = track.index[state, 3]
     first = track.index[state - 1, 3] if state > 0 else last
@@ -145,18 +146,22 @@ def through_events(model, track, state, lam_q, lam_v, drops, strength, out):  # 
             for d in range(lam_v.shape[0]):
                 lam_q[d] -= drops[e] * track.salt[e, 0, d]
                 lam_v[d] -= drops[e] * track.salt[e, 1, d]
+        if bar_set.shape[0] > 0:
+            sets_back(model, track, e, bar_set, lam_q)
+            time_back(model, track, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), bar_set)
     free_only(model, lam_q)
     free_only(model, lam_v)
 
 
 @kernel
 def sweep(  # type: ignore[no-untyped-def]
-    tag, model, tables, strength, track, count, w, c, lam_q, lam_v, bars, rows_bar, drops, j, square, desk, out, work
-):
+    tag, model, tables, strength, track, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops, looked,
+    square, desk, out, work,
+):  # fmt: skip
     """Pull cotangents of fraction c of step w's motion back to the start; every stage adds to out (M_padded,).
 
-    bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of all stages (no rows: none); drops as of
-    `through_events`; j, square: as of `parameters.add_times`.
+    bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots): explicit cotangents of all stages (no rows: none);
+    bar_set, drops as of `through_events`; looked, square: j and square of `parameters.add_times`.
     """
     n = lam_q.shape[0]
     z = np.empty((17, n))
@@ -171,39 +176,50 @@ def sweep(  # type: ignore[no-untyped-def]
         step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, b, r, z, y, desk, work)
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
-        for i in range(end - o):
-            stage = track.stage[o + i]
-            add_design(model, segment, track.when[o + i], strength, stage[0], stage[1], stage[2], z[i], 0.0, out, work)
+        for j in range(end - o):
+            stage = track.stage[o + j]
+            add_design(model, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], z[j], 0.0, out, work)
+            if bar_set.shape[0] > 0:
+                add_sets(model, segment, strength, stage[0], stage[1], z[j], 0.0, bar_set)
+                if spread:
+                    for i in range(bar_set.shape[0]):
+                        bar_set[i] += sets_bar[o + j, i]
         c = 1.0
         before = track.index[w, 1]
         if model.varied.shape[0] > 0:
-            add_times(model, track, strength, count, before + 1, j, square, lam_v, 0.0, out)
+            add_times(model, track, strength, count, before + 1, looked, square, lam_v, 0.0, out)
         if before >= 0:
-            through_events(model, track, before + 1, lam_q, lam_v, drops, strength, out)
+            through_events(model, track, before + 1, lam_q, lam_v, bar_set, drops, strength, out)
         w = before
 
 
 @kernel
-def row_gradient(tag, model, tables, strength, track, count, j, row, desk, out, work):  # type: ignore[no-untyped-def]
-    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu."""
+def row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu.
+
+    start (n,), or no length: the cotangent of the start's positions comes out.
+    """
     n = model.mass.shape[0]
     bars = np.empty((3, n))
     none = np.empty((0, 3, n))
     no_rows = np.empty((0, model.size[0]))
-    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, out, work)
+    bar_set = np.zeros(count_sets(model))
+    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, out, work)
     if w >= 0:
         no_drops = np.empty(0)
         sweep(
-            tag, model, tables, strength, track, count, w, c, bars[0], bars[1], none, no_rows, no_drops, np.int64(-1),
-            np.bool_(False), desk, out, work,
+            tag, model, tables, strength, track, count, w, c, bars[0], bars[1], bar_set, none, no_rows, no_rows,
+            no_drops, np.int64(-1), np.bool_(False), desk, out, work,
         )  # fmt: skip
+    keep_start(model, track, bars[0], bar_set, start)
 
 
 @kernel
-def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, out, work):  # type: ignore[no-untyped-def]
+def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, out, work):  # type: ignore[no-untyped-def]
     """What a row pulls on the state where it is read: bars (3, n), q and v (a is used up); and on the members there.
 
-    Returns the step (-1: the start) and its fraction to which the cotangents belong; out (M_padded,) is set.
+    Returns the step (-1: the start) and its fraction to which the cotangents belong; out (M_padded,) and bar_set
+    (slots,) are set.
     """
     n = model.mass.shape[0]
     n_row = model.size[0]
@@ -231,6 +247,9 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     work[FORCES] += 1
     who = int(row[6])
     response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    if bar_set.shape[0] > 0:
+        bar_set[:] = 0.0
+        add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
     z = bars[2]
     factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, np.bool_(True))
     solve_unknowns(model, desk, z, row_bar)
@@ -240,13 +259,15 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
     add_design(model, segment, t, strength, q, v, a, z, weight, out, work)
     explicit_part(model, segment, j, who, t, strength, q, v, a, 1.0, out)
+    if bar_set.shape[0] > 0:
+        add_sets(model, segment, strength, q, v, z, 0.0, bar_set)
     at = k if c <= 0.0 else k + 1
     if model.varied.shape[0] > 0 and (c <= 0.0 or c >= 1.0):
         # what lies behind the state does nothing to a value before it
         behind = bars[1] if c <= 0.0 or at == count else np.zeros(n)
         add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, row[4], out)
     if c <= 0.0 and k > 0:
-        through_events(model, track, k, bars[0], bars[1], np.empty(0), strength, out)
+        through_events(model, track, k, bars[0], bars[1], bar_set, np.empty(0), strength, out)
     if (c <= 0.0 and k > 0) or c >= 1.0:
         event = _first_event(track, at)
         if event >= 0:
@@ -255,6 +276,8 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
             for d in range(n):
                 bars[0, d] -= row[4] * track.salt[event, 0, d]
                 bars[1, d] -= row[4] * track.salt[event, 1, d]
+            if bar_set.shape[0] > 0:
+                time_back(model, track, event, row[4], bar_set)
     return w, (c if w == k else 1.0)
 
 
@@ -270,23 +293,31 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, out, work):  # type: ignore[no-untyped-def]
-    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out."""
+def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):  # type: ignore[no-untyped-def]
+    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out.
+
+    start as of `row_gradient`.
+    """
     n = model.mass.shape[0]
     stages = track.index[count, 0] if gradient else 0
     bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, model.size[0]))
-    total = integral_cotangents(tag, model, tables, strength, track, count, j, square, bars, rows_bar, desk, out, work)
+    sets_bar = np.zeros((stages, count_sets(model)))
+    total = integral_cotangents(
+        tag, model, tables, strength, track, count, j, square, bars, rows_bar, sets_bar, desk, out, work
+    )
     if gradient:
         lam_q = np.zeros(n)
         lam_v = np.zeros(n)
         drops = event_drops(model, strength, track, count, j, square, desk)
         if model.varied.shape[0] > 0:
             add_times(model, track, strength, count, count, j, square, lam_v, 0.0, out)
+        bar_set = np.zeros(sets_bar.shape[1])
         sweep(
-            tag, model, tables, strength, track, count, count - 1, 1.0, lam_q, lam_v, bars, rows_bar, drops, j, square,
-            desk, out, work,
+            tag, model, tables, strength, track, count, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar,
+            drops, j, square, desk, out, work,
         )  # fmt: skip
+        keep_start(model, track, lam_q, bar_set, start)
     return total
 
 
@@ -380,11 +411,13 @@ def one_sided(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integral_cotangents(tag, model, tables, strength, track, count, j, square, bars, rows_bar, desk, out, work):  # type: ignore[no-untyped-def]
+def integral_cotangents(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, j, square, bars, rows_bar, sets_bar, desk, out, work
+):
     """The integral over time of g_j (or of its square), by the weights of the stages.
 
-    Out, unless bars has no rows: bars (S, 3, n), rows_bar (S, n_row), its cotangents of the stages' states,
-    accelerations and multipliers; out (M_padded,), its explicit derivative by alpha^mu.
+    Out, unless bars has no rows: bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots), its cotangents of the
+    stages' states, accelerations, multipliers and sets; out (M_padded,), its explicit derivative by alpha^mu.
     """
     n = model.mass.shape[0]
     n_row = model.size[0]
@@ -436,4 +469,8 @@ def integral_cotangents(tag, model, tables, strength, track, count, j, square, b
             beyond = kind == MEMBER_FORCE and value < 0.0
             own_factor = -factor if beyond else factor
             explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], own_factor, out)
+            if sets_bar.shape[1] > 0:
+                add_looked_sets(
+                    model, strength, segment, j, who, t, stage[0], stage[1], stage[2], own, factor, sets_bar[o + i]
+                )
     return total

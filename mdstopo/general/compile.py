@@ -8,12 +8,14 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow, TableLaw
+from mdstopo.general.contact_compile import contact_rows
 from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.responses import KINDS, POINT
 from mdstopo.general.variables import RATES, each_member, lasting, varied
 from mdstopo.integrators.choice import choose
+from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
@@ -28,7 +30,8 @@ class GeneralScene:
 
     load_case; model: the arrays; bodies: names in the order of the state, ground last; n_bodies: without it; damped:
     whether anything depends on velocity; skipped: what was left out, and why; redundant: joints with rows that others
-    imply; responses, reductions: what is looked at and how, objectives first, in the case's order.
+    imply; responses, reductions: what is looked at and how, objectives first, in the case's order; contacts: each in
+    words.
     """
 
     load_case: LoadCase
@@ -40,6 +43,7 @@ class GeneralScene:
     redundant: tuple[str, ...]
     responses: tuple[Response, ...]
     reductions: tuple[str, ...]
+    contacts: tuple[str, ...] = ()
 
     @cached_property
     def n(self) -> int:
@@ -80,12 +84,15 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     members = _members(case, index, pairs, times)
     bushing_pair, bushing = _bushings(case, index, pairs, q0)
     joint, joint_par = _joints(case, index, pairs, q0)
+    contact_pair, contact, contact_words = contact_rows(case, index, pairs)
     held = {body for pair in pairs for body in pair}
     for i in range(len(names) - 1):
         if i not in held:
             pairs.setdefault((len(names) - 1, i), len(pairs))
     pair = np.array(list(pairs), dtype=np.int64).reshape(-1, 2)
     reach = _reach(case, index, pairs, members)
+    for p, row in zip(contact_pair.tolist(), contact, strict=True):
+        reach[p] = max(reach[p], float(np.hypot(row[PX], row[PY])))
     force, turning, load_force = _loads(load_case, index, times, n)
     responses, reductions = looked_at(case, load_case.name)
     response, response_par = _responses(case, responses, index, q0)
@@ -99,11 +106,12 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
         load_force=load_force, bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
         joint_par=joint_par, row=rows, place=place, size=np.array([*size, int(damped)], dtype=np.int64),
-        response=response, response_par=response_par, varied=varied(case, members["block"]),
+        response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
+        varied=varied(case, members["block"]),
     )  # fmt: skip
     return GeneralScene(
         load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), redundant, responses,
-        reductions,
+        reductions, contact_words,
     )  # fmt: skip
 
 
@@ -300,7 +308,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
         over_time in ("mean", "rms", "integral") and response.kind not in ("energy", "displacement", "angle")
         for response, over_time in zip(responses, reductions, strict=True)
     )
-    return forces or bushed or looks or bool(case.joints)
+    return forces or bushed or looks or bool(case.joints) or bool(case.contacts)
 
 
 def _skipped(case: Case, load_case: LoadCase, damped: bool) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.balance import make_desk
+from mdstopo.general.crush import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.duties import step_forward
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
@@ -76,16 +77,20 @@ def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):  # typ
     if model.block[k, 3] == INERTER:
         return inerter_force(model, k, i, q, v, a, row)
     x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+    x -= strength[2, i]
     value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
     f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
     return f
 
 
 @kernel
-def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, desk, column, matrix, spare):  # type: ignore[no-untyped-def]
+def through_step(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, sets_bar, desk, column, sets, matrix, spare
+):
     """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
 
-    The last column sums up the derivative of an integral (`step_map`).
+    The last column sums up the derivative of an integral (`step_map`). sets (slots, M_padded): those of the sets
+    (`crush`), whose part in the integral's stages is sets_bar (s, slots).
     """
     n = model.mass.shape[0]
     o = track.index[w, 0]
@@ -96,6 +101,13 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
     restore_modes(track, track.index[w, 3], strength)
     settled = step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, matrix)
     width = 4 * n + 1
+    slots = sets.shape[0]
+    by_set = np.empty((slots, width))
+    if slots > 0:
+        through_sets(model, strength, track, w, matrix, by_set)
+        for m in range(slots):
+            for j in range(sets_bar.shape[0]):
+                by_set[m, 4 * n] += sets_bar[j, m]
     for k in range(model.block.shape[0]):
         if model.block[k, 4] < 0:
             continue
@@ -116,17 +128,24 @@ def through_step(tag, model, tables, strength, track, w, c, sweeps, bars, rows_b
                         b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
                         for d in range(width):
                             spare[d] -= f * row[r] * matrix[b, d]
+            for m in range(slots):
+                if sets[m, i] != 0.0:
+                    for d in range(width):
+                        spare[d] += sets[m, i] * by_set[m, d]
             for d in range(4 * n):
                 column[i, d] = spare[d]
             column[i, 4 * n] += spare[4 * n]
     if model.varied.shape[0] > 0:
-        _parameters_through_step(model, strength, track, w, column, matrix, spare)
+        _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare)
     return settled
 
 
 @kernel
-def _parameters_through_step(model, strength, track, w, column, matrix, spare):  # type: ignore[no-untyped-def]
-    """The rows of `column` behind the members, derivatives by parameters, through the map of step w."""
+def _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare):  # type: ignore[no-untyped-def]
+    """The rows of `column` behind the members, derivatives by parameters, through the map of step w.
+
+    sets as of `through_step`, by_set (slots, 4 n + 1): what they do at the end.
+    """
     n = model.mass.shape[0]
     o = track.index[w, 0]
     segment = track.index[w, 2]
@@ -158,6 +177,9 @@ def _parameters_through_step(model, strength, track, w, column, matrix, spare): 
                         b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
                         for d in range(width):
                             spare[d] -= slope * row[r] * matrix[b, d]
+        for m in range(sets.shape[0]):
+            for d in range(width):
+                spare[d] += sets[m, c] * by_set[m, d]
         for d in range(4 * n):
             column[c, d] = spare[d]
         column[c, 4 * n] += spare[4 * n]
@@ -180,11 +202,11 @@ def shift_times(model, track, strength, count, state, j, square, column):  # typ
 
 
 @kernel
-def jump(model, track, strength, count, state, column, drops, j, square):  # type: ignore[no-untyped-def]
+def jump(model, track, strength, count, state, column, sets, drops, j, square):  # type: ignore[no-untyped-def]
     """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows.
 
-    drops as of `adjoint.through_events`: the last column, an integral's derivative, takes them in. j, square: as of
-    `parameters.time_jump`.
+    sets as of `through_step`; drops as of `adjoint.through_events`: the last column, an integral's derivative, takes
+    them in. j, square: as of `parameters.time_jump`.
     """
     n = model.mass.shape[0]
     if state == 0:
@@ -201,12 +223,27 @@ def jump(model, track, strength, count, state, column, drops, j, square):  # typ
                 for entry in range(model.varied.shape[0]):
                     if model.varied[entry, 2] == i - members:
                         later += event_slope(model, track, strength, e, entry)
+            if sets.shape[0] > 0:
+                later += time_forward(model, track, e, sets, i)
             for d in range(n):
                 column[i, n + d] += track.salt[e, 2, d] * later
             if drops.shape[0] > 0:
                 column[i, 4 * n] += drops[e] * later
+        if sets.shape[0] > 0:
+            sets_forward(model, track, e, column, sets)
     if model.varied.shape[0] > 0:
         shift_times(model, track, strength, count, state, j, square, column)
+
+
+@kernel
+def begin(model, track, first, column, sets):  # type: ignore[no-untyped-def]
+    """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows)."""
+    for i in range(first.shape[0]):
+        for d in range(first.shape[1]):
+            column[i, d] = first[i, d]
+    if first.shape[0] > 0 and sets.shape[0] > 0:
+        for e in range(track.index[0, 3]):
+            sets_forward(model, track, e, column, sets)
 
 
 @entry
@@ -227,12 +264,14 @@ def push(  # type: ignore[no-untyped-def]
     strength,
     padded,
     out,
+    first,
     work,
 ):
     """out (N,) = the derivative of one row of `extremes`, or of an integral, by alpha (N,), carried forward.
 
-    Arguments as those of `look.pull`. sweeps > 0: by the iterative method, with so many sweeps at most; returns the
-    step in which they did not settle, or -1.
+    Arguments as those of `look.pull`; first (M_padded, n), or no rows: derivatives of the start's positions.
+    sweeps > 0: by the iterative method, with so many sweeps at most; returns the step in which they did not settle,
+    or -1.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -246,17 +285,23 @@ def push(  # type: ignore[no-untyped-def]
     stages = track.index[count, 0] if integral > 0 else 0
     stage_bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, n_row))
+    slots = count_sets(model)
+    sets = np.zeros((slots, padded.shape[0]))
+    bar_set = np.zeros(slots)
+    sets_bar = np.zeros((stages, slots))
+    begin(model, track, first, column, sets)
     drops = np.empty(0)
     w = count
     c = 1.0
     last = count
     if integral > 0:
         integral_cotangents(
-            tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, desk, padded, work
-        )
+            tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, sets_bar, desk, padded,
+            work,
+        )  # fmt: skip
         drops = event_drops(model, strength, track, count, j, integral == 2, desk)
     else:
-        w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
+        w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, padded, work)
         last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
     looked = j if integral > 0 else np.int64(-1)
     if model.varied.shape[0] > 0 and last >= 0 and w >= 0:
@@ -266,30 +311,35 @@ def push(  # type: ignore[no-untyped-def]
         end = track.index[k + 1, 0]
         own = stage_bars[o:end] if integral > 0 else stage_bars
         own_rows = rows_bar[o:end] if integral > 0 else rows_bar
+        own_sets = sets_bar[o:end] if integral > 0 else sets_bar
         settled = through_step(
-            tag, model, tables, strength, track, k, 1.0, sweeps, own, own_rows, desk, column, matrix, spare
-        )
+            tag, model, tables, strength, track, k, 1.0, sweeps, own, own_rows, own_sets, desk, column, sets, matrix,
+            spare,
+        )  # fmt: skip
         if not settled:
             return k
-        jump(model, track, strength, count, k + 1, column, drops, looked, integral == 2)
-    if (
-        integral == 0
-        and w >= 0
-        and not through_step(
-            tag, model, tables, strength, track, w, c, sweeps, stage_bars, rows_bar, desk, column, matrix, spare
-        )
-    ):
-        return last
+        jump(model, track, strength, count, k + 1, column, sets, drops, looked, integral == 2)
+    if integral == 0 and w >= 0:
+        settled = through_step(
+            tag, model, tables, strength, track, w, c, sweeps, stage_bars, rows_bar, sets_bar, desk, column, sets,
+            matrix, spare,
+        )  # fmt: skip
+        if not settled:
+            return last
     for i in range(padded.shape[0]):
         padded[i] += column[i, 4 * n]
         for d in range(n):
             padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+        for m in range(slots):
+            padded[i] += bar_set[m] * sets[m, i]
     unscale_general(model.block, model.power, alpha, padded, out)
     return -1
 
 
 @entry
-def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, work):  # type: ignore[no-untyped-def]
+def follow(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, first, work
+):
     """out (count + 1, N) = dg_j/dalpha at the start and at the end of every step, the time held fixed.
 
     Arguments as those of `push`; who (count + 1,): the member looked at. At an event the values before it.
@@ -304,6 +354,11 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
     bars = np.zeros((3, n))
     nothing = np.zeros((0, 3, n))
     no_rows = np.zeros((0, model.size[0]))
+    slots = count_sets(model)
+    sets = np.zeros((slots, padded.shape[0]))
+    bar_set = np.zeros(slots)
+    no_sets = np.zeros((0, slots))
+    begin(model, track, first, column, sets)
     row = np.zeros(7)
     for k in range(count + 1):
         row[2] = max(k - 1, 0)
@@ -311,14 +366,17 @@ def follow(tag, ints, floats, tables, alpha, limits, count, j, who, room, room_i
         row[6] = who[k]
         if k > 0:
             through_step(
-                tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, desk, column, matrix, spare
-            )
-        row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, padded, work)
+                tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, no_sets, desk, column, sets,
+                matrix, spare,
+            )  # fmt: skip
+        row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, padded, work)
         for i in range(padded.shape[0]):
             for d in range(n):
                 padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+            for m in range(slots):
+                padded[i] += bar_set[m] * sets[m, i]
         unscale_general(model.block, model.power, alpha, padded, out[k])
         if k == 0 and model.varied.shape[0] > 0:
             shift_times(model, track, strength, count, k, np.int64(-1), np.bool_(False), column)
         if k > 0:
-            jump(model, track, strength, count, k, column, np.empty(0), np.int64(-1), np.bool_(False))
+            jump(model, track, strength, count, k, column, sets, np.empty(0), np.int64(-1), np.bool_(False))

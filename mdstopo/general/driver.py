@@ -15,15 +15,16 @@ from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
 from mdstopo.general.kinks import kinks, landed
-from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, pack_general
+from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.responses import kinked
 from mdstopo.general.rivals import compete, members_peaks
+from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
-from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, WORK, status_of
+from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.status import Status
 
 #: peaks kept of one response
@@ -32,8 +33,6 @@ ROWS = 6
 SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
 #: reductions that are integrals over time: of g (1), of its square (2)
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
-#: misfit of a joint at the start, relative to the scene's size or speeds, up to which it fits
-FITS = 1e-8
 
 
 def load_method(name: str) -> ModuleType:
@@ -60,7 +59,7 @@ class GeneralDriver:
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
         varied = 0 if self._placing is None else len(self._placing.initial)
         self._alpha = np.zeros(n_design)
-        self.strength = np.zeros((2, padded + 1))
+        self.strength = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
         self.rows = np.zeros((count, ROWS, COLUMNS))
         self.found = np.zeros(count, dtype=np.int64)
@@ -74,6 +73,8 @@ class GeneralDriver:
         self._message = ""
         self._make_room(method.steps, method.stages, 64)
         self._fit()
+        #: at rest, where the case asks for it
+        self.start = SettledStart(self) if case.solver.settle else None
 
     @property
     def alpha(self) -> FloatArray:
@@ -106,9 +107,9 @@ class GeneralDriver:
         phi, rates = np.zeros((len(model.joint), 3)), np.zeros((len(model.joint), 3))
         move = self.case.solver.assemble
         assemble(self.ints, self.floats, q, v, move, phi, rates)
-        size = _size(self.case)
+        size = size_of(self.case)
         span = self.scene.load_case.end - self.scene.load_case.start
-        speed = max(_speed(self.case, v), size / span)
+        speed = max(speed_of(self.case, v), size / span)
         mistakes = []
         for j, joint in enumerate(self.case.joints):
             misfit, rate = float(np.abs(phi[j]).max()), float(np.abs(rates[j]).max())
@@ -229,11 +230,26 @@ class GeneralDriver:
         return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
 
     def _pull(self, j: int, row: FloatArray, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
+        start = np.zeros(0 if self.start is None else len(self.scene.model.mass))
         total: float = self.entry.pull(
             *self.steps_arguments(count), j, integral, gradient, row, self.room, self.room_ints, self.strength,
-            self.padded, out, self.work,
+            self.padded, out, start, self.work,
         )  # fmt: skip
+        if self.start is not None and gradient:
+            self.start.pull(self._alpha, start, out)
         return total
+
+    def start_from(self, ints: IndexArray, floats: FloatArray) -> None:
+        """Take another start, packed."""
+        self._packed = self.ints, self.floats = ints, floats
+
+    def start_slopes(self) -> FloatArray:
+        """(M_padded, n): derivatives of the start's positions by alpha^mu; no rows where it is as stated."""
+        return np.zeros((0, 0)) if self.start is None else self.start.slopes(self._alpha)
+
+    def settle(self, alpha: FloatArray) -> bool:
+        """Put the start at rest with alpha (N,) where the case asks for it; False where that is not possible."""
+        return self.start is None or self.start.move(alpha)
 
     def run(self, alpha: FloatArray, tangent: bool, landings: Sequence[float] = ()) -> tuple[int, int, float]:
         """Simulate a design (as of `take`) into the driver's own room: code, number of steps, time reached.
@@ -241,7 +257,10 @@ class GeneralDriver:
         landings: times at which steps are to end, beside those of the model.
         """
         self.take(alpha)
-        self.ints, self.floats = pack_general(landed(self._model, landings)) if landings else self._packed
+        if self.start is not None and not self.start.move(self._alpha):
+            self.room[0], self._message = self.scene.model.times[0], self.start.message
+            return UNSETTLED, 0, float(self.room[0])
+        self.ints, self.floats = pack_general(landed(self._with_start(), landings)) if landings else self._packed
         while True:
             self.work[:] = 0
             code, count, self.events, time = self.entry.simulate(
@@ -285,6 +304,11 @@ class GeneralDriver:
         self._model = model if self._placing is None or not len(values) else self._placing.at(model, values)
         self._packed = self.ints, self.floats = pack_general(self._model)
 
+    def _with_start(self) -> GeneralModel:
+        """The model with the start as it was assembled or has settled."""
+        floats, n = self._packed[1], len(self.scene.model.mass)
+        return self._model._replace(q0=floats[n : 2 * n].copy(), v0=floats[2 * n : 3 * n].copy())
+
     def _explain(self, code: int, time: float) -> str:
         if code == OK:
             return ""
@@ -322,7 +346,9 @@ class GeneralDriver:
         return describe(tied[0]) if tied else f"body {self.scene.bodies[body]}"
 
     def member(self, padded: int) -> str:
-        """A member in words, from its place in the padded arrays."""
+        """A member (or contact) in words, from its place in the padded arrays."""
+        if padded >= self.scene.model.member.shape[1]:
+            return self.scene.contacts[int(padded - self.scene.model.member.shape[1])]
         for block in self.scene.model.block.tolist():
             i = padded - block[START]
             if 0 <= i < block[COUNT]:
@@ -349,27 +375,6 @@ def reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
         return total / span, 1.0 / span
     value = math.sqrt(max(total / span, 0.0))
     return value, 0.5 / (span * value) if value > 0.0 else 0.0
-
-
-def _size(case: Case) -> float:
-    """The largest distance between bodies and points, m."""
-    points = [np.array([body.position for body in case.bodies])]
-    points += [grid.world for grid in case.points.values()]
-    points += [np.concatenate([group.from_world, group.to_world]) for group in case.members]
-    cloud = np.concatenate(points)
-    for joint in case.joints:
-        for name, at in zip(joint.bodies, (joint.at_first, joint.at_second), strict=True):
-            centre = np.zeros(2) if name == "ground" else np.array(case.body(name).position)
-            cloud = np.concatenate([cloud, [centre + np.array(at)]])
-    low, high = cloud.min(axis=0), cloud.max(axis=0)
-    size = float(np.hypot(*(high - low)))
-    return size if size > 0.0 else 1.0
-
-
-def _speed(case: Case, v: FloatArray) -> float:
-    """The largest speed of a body's centre or of a point a scene's size away from it, m/s."""
-    bodies = v.reshape(-1, 3)
-    return float((np.hypot(bodies[:, 0], bodies[:, 1]) + _size(case) * np.abs(bodies[:, 2])).max())
 
 
 class GeneralSteps:

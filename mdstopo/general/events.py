@@ -16,13 +16,15 @@ import math
 
 import numpy as np
 
-from mdstopo.general.members import direction
+from mdstopo.general.contact import contact_switch
+from mdstopo.general.members import direction, stretch_of
 from mdstopo.general.model import INERTER
 from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import deflection
 from mdstopo.jit import kernel
+from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
 from mdstopo.mechanics.geometry import relative_pose
-from mdstopo.mechanics.laws.table import law_margin, law_margin_slopes, law_next, law_switches
+from mdstopo.mechanics.laws.table import law_grazes, law_margin, law_margin_slopes, law_next, law_set, law_switches
 
 #: error of the cubic through both ends of a step, relative to the square of its length times the second derivative:
 #: (h omega)^2 / 384 of a vibration
@@ -35,12 +37,12 @@ def has_switches(model):  # type: ignore[no-untyped-def]
     for k in range(model.block.shape[0]):
         if model.block[k, 3] != INERTER and law_switches(model.block[k, 3], model.law[k]):
             return True
-    return False
+    return model.contact_pair.shape[0] > 0
 
 
 @kernel
 def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-def]
-    """The smallest margin of all acting members at relative poses rel (n_pair, POSE), and whose it is."""
+    """The smallest margin of all acting members and contacts at relative poses rel (n_pair, POSE), and whose it is."""
     best = np.inf
     who = -1
     for k in range(model.block.shape[0]):
@@ -52,10 +54,18 @@ def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-d
         for i in range(lo, lo + model.block[k, 5]):
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            s = law_margin(code, model.law[k], length - model.member[4, i], rate, int(strength[1, i]))
+            x = length - model.member[4, i] - strength[2, i]
+            s = law_margin(code, model.law[k], x, rate, int(strength[1, i]))
             if s < best:
                 best = s
                 who = i
+    for j in range(model.contact_pair.shape[0]):
+        i = model.member.shape[1] + j
+        along, height, _, rise = contact_pose(model.contact[j], rel[model.contact_pair[j]])
+        s = contact_margin(model.contact[j], along, height, rise, int(strength[1, i]))
+        if s < best:
+            best = s
+            who = i
     return best, who
 
 
@@ -81,7 +91,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             r = rel0[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i]
+            x = length - model.member[4, i] - strength[2, i]
             s0 = law_margin(code, model.law[k], x, rate, mode)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
             if by_rate != 0.0:
@@ -90,28 +100,57 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             r = rel1[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i]
+            x = length - model.member[4, i] - strength[2, i]
             s1 = law_margin(code, model.law[k], x, rate, mode)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
             if by_rate != 0.0:
                 continue
             d1 = h * by_x * rate
-            if not (d0 < 0.0 and d1 > 0.0) or s0 < 0.0 or s1 < 0.0:
-                continue
-            # s0 + d0 c + (3 D - 2 d0 - d1) c^2 + (d0 + d1 - 2 D) c^3, D = s1 - s0
-            square = 3.0 * (s1 - s0) - 2.0 * d0 - d1
-            cube = d0 + d1 - 2.0 * (s1 - s0)
-            root = math.sqrt(max(square * square - 3.0 * cube * d0, 0.0))
-            c = -d0 / (square + root) if square + root > 0.0 else 0.5
-            if not (c > 0.0 and c < 1.0):
-                continue
-            dip = s0 + c * (d0 + c * (square + c * cube))
+            c, dip = lowest_between(s0, d0, s1, d1)
             if dip < 0.0:
                 best = min(best, c)
             elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
                 low = dip
                 near = c
+    for j in range(model.contact_pair.shape[0]):
+        row = model.contact[j]
+        mode = int(strength[1, model.member.shape[1] + j])
+        p = model.contact_pair[j]
+        along, height, slide, rise = contact_pose(row, rel0[p])
+        by_along, by_height, by_rise = contact_margin_slopes(row, along, height, rise, mode)
+        s0 = contact_margin(row, along, height, rise, mode)
+        d0 = h * (by_along * slide + by_height * rise)
+        along, height, slide, rise = contact_pose(row, rel1[p])
+        at_along, at_height, at_rise = contact_margin_slopes(row, along, height, rise, mode)
+        if by_rise != 0.0 or at_rise != 0.0 or by_along != at_along or by_height != at_height:
+            continue
+        s1 = contact_margin(row, along, height, rise, mode)
+        d1 = h * (at_along * slide + at_height * rise)
+        c, dip = lowest_between(s0, d0, s1, d1)
+        if dip < 0.0:
+            best = min(best, c)
+        elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
+            low = dip
+            near = c
     return best, near, low
+
+
+@kernel
+def lowest_between(s0, d0, s1, d1):  # type: ignore[no-untyped-def]
+    """Where the cubic with values s0, s1 and slopes d0, d1 at 0 and 1 is lowest between them, and its value there.
+
+    2, infinite where it has no minimum inside, or where s0 or s1 is negative.
+    """
+    if not (d0 < 0.0 and d1 > 0.0) or s0 < 0.0 or s1 < 0.0:
+        return 2.0, np.inf
+    # s0 + d0 c + (3 D - 2 d0 - d1) c^2 + (d0 + d1 - 2 D) c^3, D = s1 - s0
+    square = 3.0 * (s1 - s0) - 2.0 * d0 - d1
+    cube = d0 + d1 - 2.0 * (s1 - s0)
+    root = math.sqrt(max(square * square - 3.0 * cube * d0, 0.0))
+    c = -d0 / (square + root) if square + root > 0.0 else 0.5
+    if not (c > 0.0 and c < 1.0):
+        return 2.0, np.inf
+    return c, s0 + c * (d0 + c * (square + c * cube))
 
 
 @kernel
@@ -131,6 +170,9 @@ def probes_needed(model, segment, rel0, rel1):  # type: ignore[no-untyped-def]
                 needed = max(needed, min(8.0 * moved / max(length, 1e-300), 200.0))
             turn = abs(rel1[p, 6]) + abs(rel0[p, 6])
             needed = max(needed, min(4.0 * turn, 8.0))
+    for j in range(model.contact_pair.shape[0]):
+        p = model.contact_pair[j]
+        needed = max(needed, min(4.0 * (abs(rel1[p, 6]) + abs(rel0[p, 6])), 8.0))
     return int(needed)
 
 
@@ -217,10 +259,31 @@ def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-de
 
 
 @kernel
-def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[no-untyped-def]
-    """The mode that member i of block k goes to, s'^2 / (2 |s''|), and slopes (2, n) = s_q / s', s_v / s'.
+def switch_any(model, segment, strength, rel, q, v, a, who, slopes):  # type: ignore[no-untyped-def]
+    """Of member or contact `who`, whose margin is used up at poses rel: the mode it goes to, how far it goes beyond,
+    what a touch that only just happens does (`law_grazes`), -s_x / s' and by how much its permanent set grows; slopes
+    (2, n) as of `switch_of`.
+    """
+    old = int(strength[1, who])
+    if who >= model.member.shape[1]:
+        j = who - model.member.shape[1]
+        new, beyond = contact_switch(model, strength, q, v, a, j, slopes)
+        return new, beyond, contact_grazes(model.contact[j], old), 0.0, 0.0
+    k = block_of(model, who)
+    code = model.block[k, 3]
+    new, beyond, by_set = switch_of(model, segment, strength, q, v, a, who, k, slopes)
+    x, _ = stretch_of(model.member, who, rel[model.block[k, 0]])
+    x -= strength[2, who]
+    first = strength[0, who] != 0.0 and strength[2, who] == 0.0
+    kind = law_grazes(code, model.law[k], x, old) if first else 0
+    return new, beyond, kind, by_set, law_set(code, model.law[k], x, old, new)
 
-    How far it goes is told of margins of Delta alone (infinite for others).
+
+@kernel
+def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[no-untyped-def]
+    """The mode that member i of block k goes to, s'^2 / (2 |s''|), and -s_x / s'; slopes (2, n) = s_q / s', s_v / s'.
+
+    How far it goes is told of margins of Delta alone (infinite for others). A permanent set shortens Delta.
     """
     n = q.shape[0]
     p = model.block[k, 0]
@@ -228,6 +291,7 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
     row = np.empty(6)
     row_rate = np.empty(6)
     x, rate = member_rows(model, p, i, q, v, row, row_rate)
+    x -= strength[2, i]
     second = 0.0
     for r in range(6):
         d = 3 * model.pair[p, r // 3] + r % 3
@@ -245,7 +309,8 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
             slopes[1, d] = by_rate * row[r] / speed
     bend = 2.0 * abs(by_x * second)
     beyond = speed * speed / bend if by_rate == 0.0 and bend > 0.0 else np.inf
-    return law_next(code, model.law[k], x, rate, second, mode), beyond
+    by_set = -by_x / speed if speed != 0.0 else 0.0
+    return law_next(code, model.law[k], x, rate, second, mode), beyond, by_set
 
 
 @kernel

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.jit import kernel
@@ -287,3 +288,5 @@ def general_forces(model, strength, segment, t, q, v, tangent, rel, sums, f, k_o
     if tangent:
         pair_tangents(pair, rel, q, sums, np.bool_(True), k_out, c_out)
         load_tangent(model, segment, t, q, turn)
+    if model.contact_pair.shape[0] > 0:
+        add_contacts(model, strength, q, v, tangent, f, k_out, c_out)

@@ -55,6 +55,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     track.mass[0] = 0.0
     scale_general(model.block, model.power, alpha, strength)
     strength[1] = 0.0
+    strength[2] = 0.0
     times = model.times
     desk = make_desk(model)
     no = np.bool_(False)
@@ -119,6 +120,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 track.event[events, 2] = 0
                 track.event[events, 3] = int(strength[1, i])
                 track.event[events, 4] = 0
+                track.kept[events, 0] = 0.0
+                track.kept[events, 1] = strength[2, i]
+                track.kept[events, 2] = 0.0
                 track.salt[events] = 0.0
                 events += 1
         strength[1, strength.shape[1] - 1] = events
@@ -144,6 +148,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
                     track.salt[e] = 0.0
+                    track.kept[e, 2] = 0.0
         begin = t
         pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
         done = 0.0
@@ -210,7 +215,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, strength, near_who):
+                    if value < graze and matters(model, strength, rel, near_who):
                         where[2] = near_who
                 relative_pose(model.pair, left[0], left[1], before)
                 happens = margin < -rounding

@@ -6,7 +6,9 @@ until nothing is doubtful. Then the root is bracketed and closed in on.
 """
 
 from mdstopo.general.events import block_of
+from mdstopo.general.members import stretch_of
 from mdstopo.jit import kernel
+from mdstopo.mechanics.contact import contact_grazes
 from mdstopo.mechanics.laws.table import law_grazes
 
 #: looks at one event
@@ -52,9 +54,17 @@ def cut_at(dip, near, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def matters(model, strength, i):  # type: ignore[no-untyped-def]
-    """Whether it makes a difference to derivatives that member i only just does not leave its mode."""
-    if i < 0 or strength[0, i] == 0.0:
+def matters(model, strength, rel, i):  # type: ignore[no-untyped-def]
+    """Whether it makes a difference to derivatives that member or contact i only just does not leave its mode.
+
+    rel (n_pair, POSE): where.
+
+    What has been crushed before comes back to just its plateau where nothing is lost: that is no touch to be told.
+    """
+    if i >= model.member.shape[1]:
+        return contact_grazes(model.contact[i - model.member.shape[1]], int(strength[1, i])) == 2
+    if i < 0 or strength[0, i] == 0.0 or strength[2, i] != 0.0:
         return False
     k = block_of(model, i)
-    return law_grazes(model.block[k, 3], model.law[k], int(strength[1, i])) == 2
+    x, _ = stretch_of(model.member, i, rel[model.block[k, 0]])
+    return law_grazes(model.block[k, 3], model.law[k], x, int(strength[1, i])) == 2

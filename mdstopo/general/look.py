@@ -26,12 +26,13 @@ def pull(  # type: ignore[no-untyped-def]
     strength,
     padded,
     out,
+    start,
     work,
 ):
     """out (N,) = the derivative of one row of `extremes` by alpha (N,).
 
     integral 1 (2): of the integral over time of response j (of its square), which is returned. Room: padded
-    (M_padded,).
+    (M_padded,). start: as of `adjoint.row_gradient`.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -39,10 +40,10 @@ def pull(  # type: ignore[no-untyped-def]
     total = 0.0
     if integral > 0:
         total = integral_gradient(
-            tag, model, tables, strength, track, count, j, integral == 2, gradient, desk, padded, work
+            tag, model, tables, strength, track, count, j, integral == 2, gradient, desk, start, padded, work
         )
     elif gradient:
-        row_gradient(tag, model, tables, strength, track, count, j, row, desk, padded, work)
+        row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, padded, work)
     if gradient:
         unscale_general(model.block, model.power, alpha, padded, out)
     return total

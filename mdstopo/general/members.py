@@ -13,11 +13,12 @@ import math
 
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel
+from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.mechanics.laws.table import law, law_start
+from mdstopo.mechanics.laws.table import CRUSH, law, law_first_set, law_start
 
-#: rows of `strength` (2, M_padded): alpha^mu, and the mode of a law that switches
-SCALE, MODE = range(2)
+#: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
+SCALE, MODE, SET = range(3)
 
 
 @kernel
@@ -69,7 +70,8 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
             continue
         rate = bx * vx + by * vy + bt * vt
         scale = strength[0, i]
-        f, fd, fr, energy, pull = law(code, p, length - member[4, i], rate, int(strength[1, i]), t, value, model.curves)
+        x = length - member[4, i] - strength[2, i]
+        f, fd, fr, energy, pull = law(code, p, x, rate, int(strength[1, i]), t, value, model.curves)
         f *= scale
         o[0] -= f * bx
         o[1] -= f * by
@@ -134,7 +136,17 @@ def set_modes(model, strength, rel, rel_rate):  # type: ignore[no-untyped-def]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
             second = second_rate(model.member, i, r, acc)
-            strength[1, i] = law_start(code, model.law[k], length - model.member[4, i], rate, second)
+            x = length - model.member[4, i]
+            strength[1, i] = law_start(code, model.law[k], x, rate, second)
+            strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
+            if code == CRUSH and model.active[0, k] == 0:  # whatever it is like now, it has not been crushed
+                strength[1, i] = 0.0
+                strength[2, i] = 0.0
+    for j in range(model.contact_pair.shape[0]):
+        p = model.contact_pair[j]
+        along, height, _, rise = contact_pose(model.contact[j], rel[p])
+        second = second_rise(model.contact[j], rel[p], rel_rate[p])
+        strength[1, model.member.shape[1] + j] = contact_start(model.contact[j], along, height, rise, second)
 
 
 @inline
@@ -177,7 +189,8 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
         if length == 0.0:
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
-        f, _, _, energy, _ = law(code, p, length - member[4, i], rate, int(modes_of[i]), t, value, model.curves)
+        x = length - member[4, i] - strength[2, i]
+        f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, model.curves)
         out[i] += f * (bx * u[0] + by * u[1] + bt * u[2]) + weight * energy
 
 
@@ -225,8 +238,9 @@ def meeting(model, segment, t, strength, before, after):  # type: ignore[no-unty
             if not met and x * x + y * y > ZERO_LENGTH_SQUARED:
                 continue
             f, _, _, _, _ = law(
-                model.block[k, 3], model.law[k], -m[4, i], 0.0, int(strength[1, i]), t, value, model.curves
-            )
+                model.block[k, 3], model.law[k], -m[4, i] - strength[2, i], 0.0, int(strength[1, i]), t, value,
+                model.curves,
+            )  # fmt: skip
             if f * strength[0, i] != 0.0:
                 return i
     return -1

@@ -37,7 +37,7 @@ def differentiate(driver: "GeneralDriver", method: str, alpha: FloatArray, looke
             sweeps = SWEEPS if method == "iterative" else 0
             stopped = driver.entry.push(
                 *driver.steps_arguments(count), j, integral, sweeps, rows[j, r], driver.room, driver.room_ints,
-                driver.strength, driver.padded, gradients[j, r], driver.work,
+                driver.strength, driver.padded, gradients[j, r], driver.start_slopes(), driver.work,
             )  # fmt: skip
             if stopped >= 0:
                 message = FALLBACK.format(float(driver.states()[0][stopped]))
@@ -100,6 +100,6 @@ def histories(driver: "GeneralDriver", alpha: FloatArray, j: int) -> tuple[Statu
     lines = np.zeros((count + 1, len(alpha)))
     driver.entry.follow(
         *driver.steps_arguments(count), j, who, driver.room, driver.room_ints, driver.strength, driver.padded, lines,
-        driver.work,
+        driver.start_slopes(), driver.work,
     )  # fmt: skip
     return Status.OK, driver.states()[0][: count + 1].copy(), lines

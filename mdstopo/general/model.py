@@ -52,6 +52,7 @@ class GeneralModel(NamedTuple):
     place         (n + n_row,)      where each coordinate, then each row, stands in the banded matrix
     size          (3,)              n_row; half width of the band; whether anything depends on velocity
     response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point, its place at the start
+    contact_pair  (n_contact,)      the pair of edge and point; `contact` (n_contact, 11): see `mechanics.contact`
     varied        (n_varied, 4)     parameters that vary: block, place (`mechanics.laws.table`), which value, and
                                     whether it is a time that stands exactly at the start (the end); rising by value
     ============  ================  =====================================================================
@@ -87,6 +88,8 @@ class GeneralModel(NamedTuple):
     size: IndexArray
     response: IndexArray
     response_par: FloatArray
+    contact_pair: IndexArray
+    contact: FloatArray
     varied: IndexArray
 
 
@@ -104,7 +107,7 @@ def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
     sizes = [
         len(model.mass), len(model.pair), len(model.block), model.member.shape[1], len(model.curves),
         len(model.times) - 1, len(model.load_body), len(model.bushing_pair), len(model.driven), len(model.joint),
-        len(model.place), len(model.response), len(model.varied),
+        len(model.place), len(model.response), len(model.contact_pair), len(model.varied),
     ]  # fmt: skip
     ints = [np.asarray(sizes, dtype=np.int64), *(each.ravel() for each in model if each.dtype.kind == "i")]
     floats = [each.ravel() for each in model if each.dtype.kind == "f"]
@@ -126,8 +129,9 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     n_joint = ints[9]
     n_place = ints[10]
     n_resp = ints[11]
-    n_varied = ints[12]
-    i = 13
+    n_contact = ints[12]
+    n_varied = ints[13]
+    i = 14
     free = ints[i : i + n]
     i += n
     pair = ints[i : i + 2 * n_pair].reshape((n_pair, 2))
@@ -154,6 +158,8 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     i += 3
     response = ints[i : i + 6 * n_resp].reshape((n_resp, 6))
     i += 6 * n_resp
+    contact_pair = ints[i : i + n_contact]
+    i += n_contact
     varied = ints[i : i + 4 * n_varied].reshape((n_varied, 4))
     mass = floats[0:n]
     q0 = floats[n : 2 * n]
@@ -186,8 +192,10 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     joint_par = floats[f : f + 12 * n_joint].reshape((n_joint, 12))
     f += 12 * n_joint
     response_par = floats[f : f + 4 * n_resp].reshape((n_resp, 4))
+    f += 4 * n_resp
+    contact = floats[f : f + 11 * n_contact].reshape((n_contact, 11))
     return ModelView(
         free, mass, q0, v0, pair, reach, block, law, active, level, power, member, curves, times, force, load_body,
         load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row, place, size,
-        response, response_par, varied,
+        response, response_par, contact_pair, contact, varied,
     )  # fmt: skip

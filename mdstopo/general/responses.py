@@ -61,6 +61,7 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  
         m = model.block[k, 1] + own_i
         scale = strength[0, m]
         x, rate = member_rows(model, pair, m, q, v, own[0], own[1])
+        x -= strength[2, m]
         if model.block[k, 3] == INERTER:
             total += scale * inerter_force(model, k, m, q, v, a, own[0])
             for r in range(6):

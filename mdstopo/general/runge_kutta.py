@@ -8,7 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.events import block_of, first_sign, has_switches, smallest_margin, switch_of
+from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general, set_modes
@@ -37,7 +37,6 @@ from mdstopo.integrators.steps import (
 )
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.laws.table import law_grazes
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own
@@ -140,11 +139,9 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
             return events
         if events >= track.event.shape[0]:
             return -1
-        k = block_of(model, who)
         salt = track.salt[events]
-        new, beyond = switch_of(model, segment, strength, q, v, a, who, k, salt)
+        new, beyond, kind, by_set, grown = switch_any(model, segment, strength, rel, q, v, a, who, salt)
         old = int(strength[1, who])
-        kind = law_grazes(model.block[k, 3], model.law[k], old) if strength[0, who] != 0.0 else 0
         if beyond < graze and kind == 2:
             where[2] = who
         track.event[events, 0] = state
@@ -152,6 +149,10 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
         track.event[events, 2] = old
         track.event[events, 3] = new
         track.event[events, 4] = 1 if beyond < graze and kind > 0 else 0
+        track.kept[events, 0] = strength[2, who]
+        strength[2, who] += grown
+        track.kept[events, 1] = strength[2, who]
+        track.kept[events, 2] = by_set
         strength[1, who] = new
         events += 1
         strength[1, strength.shape[1] - 1] = events
@@ -184,6 +185,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     track.mass[0] = 0.0
     scale_general(model.block, model.power, alpha, strength)
     strength[1] = 0.0
+    strength[2] = 0.0
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     order = ORDERS[method]
@@ -254,6 +256,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 track.event[events, 2] = 0
                 track.event[events, 3] = int(strength[1, i])
                 track.event[events, 4] = 0
+                track.kept[events, 0] = 0.0
+                track.kept[events, 1] = strength[2, i]
+                track.kept[events, 2] = 0.0
                 track.salt[events] = 0.0
                 events += 1
         strength[1, strength.shape[1] - 1] = events
@@ -283,6 +288,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
                     track.salt[e] = 0.0  # the time is given
+                    track.kept[e, 2] = 0.0
         while t < end:
             if count >= limits[0]:
                 return STEP_LIMIT, count, events, t
@@ -372,7 +378,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, strength, near_who):
+                    if value < graze and matters(model, strength, rel, near_who):
                         where[2] = near_who
                 relative_pose(pair, left[0], left[1], before)
                 happens = margin < -rounding

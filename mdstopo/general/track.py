@@ -15,6 +15,7 @@ lam       (S, n_row)            multipliers of the joints
 K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters
 turn      (S, n)                slope of the turning loads
 salt      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
+kept      (E, 3)                the permanent set of its member before and after an event; slope of its time by it
 event     (E, 5) integers       the state at which it happened, member (padded), mode before and after; whether it
                                 only just happened, so that forces at it have no derivative
 ========  ====================  ======================================================================
@@ -28,7 +29,7 @@ from mdstopo.jit import kernel
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES = range(5)
 
-TRACK = ("t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "salt", "event")
+TRACK = ("t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "salt", "kept", "event")
 
 
 class Track:
@@ -45,7 +46,7 @@ def track_room(
 ) -> tuple[int, int]:
     """Lengths of the flat arrays of floats and integers that `carve_track` needs."""
     per_stage = 1 + 4 * n + n_row + 72 * n_pair
-    floats = (steps + 1) * (1 + 2 * n + 2 * n_row) + stages * per_stage + events * 3 * n
+    floats = (steps + 1) * (1 + 2 * n + 2 * n_row) + stages * per_stage + events * (3 * n + 3)
     return floats + 36 * n_pair * (stages if inertial else 1), 4 * (steps + 1) + 5 * events
 
 
@@ -81,9 +82,11 @@ def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
     f += n * stages
     salt = floats[f : f + 3 * n * events].reshape((events, 3, n))
     f += 3 * n * events
+    kept = floats[f : f + 3 * events].reshape((events, 3))
+    f += 3 * events
     rows = stages if limits[4] != 0 else 1
     mass = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
-    return Track(t, state, push, index, when, stage, lam, k, c, mass, turn, salt, event)
+    return Track(t, state, push, index, when, stage, lam, k, c, mass, turn, salt, kept, event)
 
 
 @kernel
@@ -130,15 +133,17 @@ def keep_state(track, k, t, q, v, mu, nu):  # type: ignore[no-untyped-def]
 
 @kernel
 def restore_modes(track, happened, strength):  # type: ignore[no-untyped-def]
-    """The modes of members as they were after so many events."""
+    """The modes and sets of members as they were after so many events."""
     e = strength_cursor(strength)
     while e > happened:
         e -= 1
         if track.event[e, 1] >= 0:
             strength[1, track.event[e, 1]] = track.event[e, 2]
+            strength[2, track.event[e, 1]] = track.kept[e, 0]
     while e < happened:
         if track.event[e, 1] >= 0:
             strength[1, track.event[e, 1]] = track.event[e, 3]
+            strength[2, track.event[e, 1]] = track.kept[e, 1]
         e += 1
     strength[1, strength.shape[1] - 1] = e
 

@@ -21,6 +21,7 @@ def natural_frequencies(driver: "GeneralDriver", alpha: FloatArray) -> FloatArra
     n = len(model.mass)
     stiffness, mass = np.zeros((n, n)), np.zeros((n, n))
     rows = np.zeros((int(model.size[0]), n))
+    driver.settle(alpha)
     driver.strength[:] = 0.0
     driver.take(alpha)
     linearise(driver.ints, driver.floats, driver.alpha.copy(), driver.strength, stiffness, mass, rows)

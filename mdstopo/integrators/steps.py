@@ -25,7 +25,7 @@ from mdstopo.jit import kernel
 from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)
-OK, NON_FINITE, STEP_LIMIT, STEP_TOO_SMALL, NEWTON_FAILED, NEEDS_ROOM, SINGULAR, CHATTERING = range(8)
+OK, NON_FINITE, STEP_LIMIT, STEP_TOO_SMALL, NEWTON_FAILED, NEEDS_ROOM, SINGULAR, CHATTERING, UNSETTLED = range(9)
 
 _STATUS = {
     OK: Status.OK,
@@ -35,6 +35,7 @@ _STATUS = {
     NEWTON_FAILED: Status.NEWTON_FAILED,
     SINGULAR: Status.SINGULAR,
     CHATTERING: Status.CHATTERING,
+    UNSETTLED: Status.NO_EQUILIBRIUM,
 }
 
 #: positions in the array of work counts: states at which forces were summed, those of them with tangents, accepted

@@ -10,6 +10,10 @@ def beyond_springs(case: Case) -> str:
     """What in the case only the general kernels compute, in words; empty where nothing is."""
     if case.joints:
         return "joints"
+    if case.solver.settle:
+        return "static settling"
+    if case.contacts:
+        return "contacts"
     if case.bushings:
         return "bushings"
     if any(load_case.motions for load_case in case.load_cases):

@@ -36,3 +36,5 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
         )
     if case.variables and solver.sensitivity not in BY_PARAMETERS:
         yield "solver.sensitivity", no_parameters(solver.sensitivity)
+    if case.variables and solver.settle:
+        yield "solver.settle", "a start at rest gives no derivatives by parameters of laws; leave design.variables out"

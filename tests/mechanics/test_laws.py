@@ -37,8 +37,8 @@ from mdstopo.scene.signals import breakpoints
 ROOT = Path(__file__).resolve().parents[2]
 OPEN, CLOSED, CLIPPED = gap.OPEN, gap.CLOSED, gap.CLIPPED
 LINEAR, UPPER, LOWER = actuator.LINEAR, actuator.UPPER, actuator.LOWER
-#: what is not a function of elongation and rate, and the module that tests it instead
-ELSEWHERE = {"inerter": "tests/general/test_inerter.py"}
+#: what is not a function of elongation and rate, or remembers, and the module that tests it instead
+ELSEWHERE = {"inerter": "tests/general/test_inerter.py", "crush": "tests/general/test_crush.py"}
 
 seeds = st.integers(0, 2**32 - 1)
 many = settings(max_examples=60, deadline=None, derandomize=True)
@@ -72,7 +72,7 @@ def _start(code, p, x, xd, xdd):
 
 @numba.njit
 def _grazes(code, p, mode):
-    return table.law_grazes(code, p, mode)
+    return table.law_grazes(code, p, 0.0, mode)
 
 
 @numba.njit

@@ -3,12 +3,23 @@
 A law gives f, f_x, f_xd, V, V_x from its parameters p (PARAMETERS,), elongation x = Delta, rate xd = dDelta/dt, its
 mode, the time t, the present `value` of a tabulated force, and the scene's `curves`. A law that switches is smooth
 within a mode; its margin is not negative as long as the mode holds. The inerter's force needs accelerations and is part
-of the mass (`general.forces`).
+of the mass (`general.forces`). A law that remembers has a permanent set, which its elongation comes without.
 """
 
 import numpy as np
 
-from mdstopo.case.laws import ActuatorLaw, CubicLaw, CurveLaw, GapLaw, InerterLaw, Law, PulseLaw, SpringLaw, TableLaw
+from mdstopo.case.laws import (
+    ActuatorLaw,
+    CrushLaw,
+    CubicLaw,
+    CurveLaw,
+    GapLaw,
+    InerterLaw,
+    Law,
+    PulseLaw,
+    SpringLaw,
+    TableLaw,
+)
 from mdstopo.jit import inline
 from mdstopo.mechanics.laws.actuator import (
     actuator_force,
@@ -18,6 +29,16 @@ from mdstopo.mechanics.laws.actuator import (
     actuator_next,
     actuator_slopes,
     actuator_start,
+)
+from mdstopo.mechanics.laws.crush import (
+    crush_first_set,
+    crush_force,
+    crush_grazes,
+    crush_margin,
+    crush_margin_slopes,
+    crush_next,
+    crush_set,
+    crush_start,
 )
 from mdstopo.mechanics.laws.cubic import cubic_force, cubic_slopes
 from mdstopo.mechanics.laws.curve import curve_data, curve_force
@@ -35,7 +56,7 @@ from mdstopo.mechanics.laws.linear import linear_force, linear_slopes
 from mdstopo.mechanics.laws.pulse import pulse_force, pulse_landings, pulse_slopes
 
 PARAMETERS = 8
-SPRING, GAP, CUBIC, CURVE, PULSE, TABLE, ACTUATOR = range(7)
+SPRING, GAP, CUBIC, CURVE, PULSE, TABLE, ACTUATOR, CRUSH = range(8)
 #: an inerter is no function of elongation and rate
 INERTER = -1
 CODES = {
@@ -46,6 +67,7 @@ CODES = {
     "pulse": PULSE,
     "table": TABLE,
     "actuator": ACTUATOR,
+    "crush": CRUSH,
     "inerter": INERTER,
 }
 #: the place of each parameter that may be a design variable: in the law's row, and beyond it what all laws share
@@ -57,6 +79,7 @@ PLACES = {
     "pulse": {"peak": 0, "rate": 1, "time": 2},
     "table": {},
     "actuator": {"proportional": 0, "derivative": 1, "target": 2, "limit": 3},
+    "crush": {},
     "inerter": {"inertance": 0},
 }
 FREE_LENGTH, ACTIVE_FROM, ACTIVE_UNTIL = range(PARAMETERS, PARAMETERS + 3)
@@ -80,6 +103,8 @@ def law(code, p, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
         return value, 0.0, 0.0, 0.0, 0.0
     if code == ACTUATOR:
         return actuator_force(p, x, xd, mode)
+    if code == CRUSH:
+        return crush_force(p, x, mode)
     return np.nan, np.nan, np.nan, np.nan, np.nan  # an inerter has no place here
 
 
@@ -118,7 +143,7 @@ def law_margin_slope(code, p, place, x, xd, mode):  # type: ignore[no-untyped-de
 @inline
 def law_switches(code, p):  # type: ignore[no-untyped-def]
     """Whether the law has more than one mode."""
-    return code == GAP or (code == ACTUATOR and p[3] > 0.0)
+    return code in (GAP, CRUSH) or (code == ACTUATOR and p[3] > 0.0)
 
 
 @inline
@@ -128,6 +153,8 @@ def law_margin(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
         return gap_margin(p, x, xd, mode)
     if code == ACTUATOR and p[3] > 0.0:
         return actuator_margin(p, x, xd, mode)
+    if code == CRUSH:
+        return crush_margin(p, x, xd, mode)
     return np.inf
 
 
@@ -138,6 +165,8 @@ def law_margin_slopes(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
         return gap_margin_slopes(p, x, xd, mode)
     if code == ACTUATOR and p[3] > 0.0:
         return actuator_margin_slopes(p, x, xd, mode)
+    if code == CRUSH:
+        return crush_margin_slopes(p, x, xd, mode)
     return 0.0, 0.0
 
 
@@ -146,6 +175,8 @@ def law_next(code, p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
     """The mode to go to where the margin is used up."""
     if code == GAP:
         return gap_next(p, x, xd, xdd, mode)
+    if code == CRUSH:
+        return crush_next(p, x, mode)
     return actuator_next(p, x, xd, mode)
 
 
@@ -156,12 +187,28 @@ def law_start(code, p, x, xd, xdd):  # type: ignore[no-untyped-def]
         return gap_start(p, x, xd, xdd)
     if code == ACTUATOR and p[3] > 0.0:
         return actuator_start(p, x, xd)
+    if code == CRUSH:
+        return crush_start(p, x, xd, xdd)
     return 0
 
 
 @inline
-def law_grazes(code, p, mode):  # type: ignore[no-untyped-def]
-    """What a margin that is only just used up (or not) does to derivatives: nothing 0, force 1, motion 2."""
+def law_set(code, p, x, old, new):  # type: ignore[no-untyped-def]
+    """By how much the permanent set of a member grows where one mode gives way to another."""
+    return crush_set(p, x, old, new) if code == CRUSH else 0.0
+
+
+@inline
+def law_first_set(code, p, x, mode):  # type: ignore[no-untyped-def]
+    """The permanent set of a member that begins in a mode."""
+    return crush_first_set(p, x, mode) if code == CRUSH else 0.0
+
+
+@inline
+def law_grazes(code, p, x, mode):  # type: ignore[no-untyped-def]
+    """What a margin that is only just used up (or not) at x does to derivatives: nothing 0, force 1, motion 2."""
+    if code == CRUSH:
+        return crush_grazes(p, x, mode)
     return gap_grazes(p, mode) if code == GAP else 0
 
 
@@ -188,6 +235,8 @@ def parameters(record: Law, curves: list[float]) -> list[float]:
         case ActuatorLaw():
             limit = 0.0 if record.limit is None else record.limit
             row = [record.proportional, record.derivative, record.target, limit]
+        case CrushLaw():
+            row = [record.stiffness, record.force, record.gap, 1.0 if record.side == "tension" else -1.0]
         case InerterLaw():
             row = [record.inertance]
         case _:

@@ -1,0 +1,65 @@
+"""Contacts of the points of one body with an edge of another."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.geometry import Frames, in_range
+from mdstopo.case.model import Contact, PointGrid
+from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.words import inside, shown
+
+
+def build_contacts(entries: Any, points: dict[str, PointGrid], frames: Frames, reading: Reading) -> tuple[Contact, ...]:
+    """The contacts that can be made."""
+    built = []
+    named: dict[str, int] = {}
+    for index, fields in enumerate(entries if isinstance(entries, list) else ()):
+        if fields is BAD:
+            continue
+        name = fields["name"]
+        if isinstance(name, str) and name in named:
+            message = f"the name {shown(name)} is given to contacts[{named[name]}] already"
+            reading.mistake(inside(fields.path, "name"), message)
+        elif isinstance(name, str):
+            named[name] = index
+        contact = _build(index, fields, points, frames, reading)
+        if contact is not None:
+            built.append(contact)
+    return tuple(built)
+
+
+def _build(
+    index: int, fields: Fields, points: dict[str, PointGrid], frames: Frames, reading: Reading
+) -> Contact | None:
+    edge, grid = fields["on"], points.get(fields["points"]) if isinstance(fields["points"], str) else None
+    if edge is BAD or grid is None or not fields.good() or edge["body"] not in frames.bodies:
+        return None
+    path = inside(fields.path, "on")
+    if edge["body"] == grid.body:
+        reading.mistake(path, f"the points are on {shown(grid.body)} as well; a contact needs two bodies")
+        return None
+    first, first_world = frames.point(edge["body"], edge["from"], edge["frame"])
+    second, second_world = frames.point(edge["body"], edge["to"], edge["frame"])
+    if not in_range(np.array([first, second, first_world, second_world]), path, reading):
+        return None
+    length = math.hypot(second[0] - first[0], second[1] - first[1])
+    if not length > 0.0:
+        reading.mistake(path, "both ends of the edge coincide; an edge needs a length")
+        return None
+    return Contact(
+        name=fields["name"] or str(index),
+        index=index,
+        body=grid.body,
+        points=grid.local,
+        edge_body=edge["body"],
+        edge_from=first,
+        edge_to=second,
+        stiffness=fields["stiffness"],
+        damping=fields["damping"],
+        friction=fields["friction"],
+        slip=fields["slip"],
+    )

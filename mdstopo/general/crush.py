@@ -1,0 +1,216 @@
+"""What the permanent sets of crushed members do to derivatives.
+
+A set p stays what it is from the event that ended the crushing to the next such event, and shifts the elongation:
+f* = s f(Delta - p), V = V(Delta - p). So over that time it collects, as a parameter would,
+
+    dG/dp = - s (f_Delta (b . u) + weight V_Delta),   u = -T z,
+
+from every stage with its virtual displacement z. At the event p = Delta(q(t_e)) - const with dDelta/dt = 0, so the time
+of the event adds nothing and dp = B dq. Before it the member carried its plateau, which no set changes. The time at
+which a member reaches its plateau, or loses contact, depends on its set as well: dt_e = -(s_q dq + s_v dv + s_p dp)/s'.
+
+Sets are counted through the blocks of the law, in their order: slots.
+"""
+
+import numpy as np
+
+from mdstopo.general.events import member_rows
+from mdstopo.general.members import direction
+from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
+from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.laws.crush import CRUSHING, ELASTIC
+from mdstopo.mechanics.laws.table import CRUSH, law
+
+
+@kernel
+def count_sets(model):  # type: ignore[no-untyped-def]
+    """How many members have a set; where there are none, nothing here is asked again."""
+    total = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 3] == CRUSH:
+            total += model.block[k, 5]
+    return total
+
+
+@kernel
+def slot_of(model, i):  # type: ignore[no-untyped-def]
+    """The slot of padded member i and its block, or -1, -1."""
+    slot = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 3] != CRUSH:
+            continue
+        if model.block[k, 1] <= i and i < model.block[k, 2]:
+            return slot + i - model.block[k, 1], k
+        slot += model.block[k, 5]
+    return -1, -1
+
+
+@kernel
+def set_slopes(model, k, i, strength, x, rate):  # type: ignore[no-untyped-def]
+    """Slopes of s f and of s V of member i of block k by its set; x: the elongation without it."""
+    _, by_x, _, _, pull = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), 0.0, 0.0, model.curves)
+    return -strength[0, i] * by_x, -strength[0, i] * pull
+
+
+@kernel
+def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no-untyped-def]
+    """out (slots,) += what the sets do to the forces at a state with virtual displacement z (n,), and to weight V."""
+    rel = np.empty((model.pair.shape[0], POSE))
+    u = np.empty(3)
+    relative_pose(model.pair, q, v, rel)
+    slot = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 3] != CRUSH:
+            continue
+        lo = model.block[k, 1]
+        p = model.block[k, 0]
+        r = rel[p]
+        pair_displacement(model.pair, rel, p, z, u)
+        energy = weight if model.block[k, 4] >= 0 else 0.0
+        for i in range(lo, lo + model.block[k, 5]):
+            if model.active[segment, k] != 0:
+                length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+                if length > 0.0:
+                    force, stored = set_slopes(model, k, i, strength, length - model.member[4, i] - strength[2, i], 0.0)
+                    out[slot] += energy * stored - force * (bx * u[0] + by * u[1] + bt * u[2])
+            slot += 1
+
+
+@kernel
+def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):  # type: ignore[no-untyped-def]
+    """out (slots,) += scale dg_j/dp at fixed motion of a member force, whose slopes are bars (3, n)."""
+    if model.response[j, 0] != MEMBER_FORCE:
+        return
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    slopes = np.empty((3, 6))
+    own = np.empty((2, 6))
+    group = model.response[j, 5]
+    _, pair = member_force(model, strength, segment, t, group, who, q, v, a, slopes, own)
+    along = 0.0  # the force may be none here: its sign is that of its slopes
+    for c in range(6):
+        along += slopes[0, c] * bars[0, 3 * model.pair[pair, c // 3] + c % 3]
+    sign = 1.0 if along >= 0.0 else -1.0
+    slot = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 3] != CRUSH:
+            continue
+        if model.block[k, 6] == group and model.active[segment, k] != 0 and who < model.block[k, 5]:
+            i = model.block[k, 1] + who
+            x, _ = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+            force, _ = set_slopes(model, k, i, strength, x - strength[2, i], 0.0)
+            out[slot + who] += scale * sign * force
+        slot += model.block[k, 5]
+
+
+@kernel
+def add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):  # type: ignore[no-untyped-def]
+    """out (slots,) += scale dg_j/dp at fixed motion of any response, whose slopes are bars (3, n)."""
+    if model.response[j, 0] == ENERGY:
+        add_sets(model, segment, strength, q, v, np.zeros(q.shape[0]), scale, out)
+    else:
+        add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out)
+
+
+@kernel
+def made_set(model, track, e):  # type: ignore[no-untyped-def]
+    """Slot and block of the member whose set event e has made, or -1, -1."""
+    if track.event[e, 3] != ELASTIC:
+        return -1, -1
+    old = track.event[e, 2]
+    slot, k = slot_of(model, track.event[e, 1])
+    if slot >= 0 and (old == CRUSHING or track.kept[e, 0] != track.kept[e, 1]):
+        return slot, k
+    return -1, -1
+
+
+@kernel
+def time_back(model, track, e, pulled, bar):  # type: ignore[no-untyped-def]
+    """bar (slots,) of the set that the time of event e depends on, which pulls `pulled` on that time's slopes."""
+    slot, _ = slot_of(model, track.event[e, 1])
+    if slot >= 0:
+        bar[slot] -= pulled * track.kept[e, 2]
+
+
+@kernel
+def time_forward(model, track, e, sets, i):  # type: ignore[no-untyped-def]
+    """What the change sets[:, i] of its member's set adds to the time of event e."""
+    slot, _ = slot_of(model, track.event[e, 1])
+    return -track.kept[e, 2] * sets[slot, i] if slot >= 0 else 0.0
+
+
+@kernel
+def sets_back(model, track, e, bar, lam_q):  # type: ignore[no-untyped-def]
+    """Behind event e the cotangent of the set that it made, bar (slots,), becomes one of the pose, lam_q (n,)."""
+    slot, k = made_set(model, track, e)
+    if slot < 0:
+        return
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    state = track.state[track.event[e, 0]]
+    member_rows(model, model.block[k, 0], track.event[e, 1], state[0], state[1], row, row_rate)
+    for r in range(6):
+        lam_q[3 * model.pair[model.block[k, 0], r // 3] + r % 3] += bar[slot] * row[r]
+    bar[slot] = 0.0
+
+
+@kernel
+def keep_start(model, track, lam_q, bar, start):  # type: ignore[no-untyped-def]
+    """start (n,) = the cotangents lam_q of the start's positions, with those of the sets that members begin with.
+
+    Nothing where start has no length.
+    """
+    if start.shape[0] == 0:
+        return
+    if bar.shape[0] > 0:
+        for e in range(track.index[0, 3]):
+            sets_back(model, track, e, bar, lam_q)
+    for d in range(start.shape[0]):
+        start[d] = lam_q[d]
+
+
+@kernel
+def sets_forward(model, track, e, column, sets):  # type: ignore[no-untyped-def]
+    """sets (slots, M_padded), the derivatives of the sets, behind event e; column as of `direct.through_step`."""
+    slot, k = made_set(model, track, e)
+    if slot < 0:
+        return
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    state = track.state[track.event[e, 0]]
+    member_rows(model, model.block[k, 0], track.event[e, 1], state[0], state[1], row, row_rate)
+    for i in range(column.shape[0]):
+        sets[slot, i] = 0.0
+        for r in range(6):
+            sets[slot, i] += row[r] * column[i, 3 * model.pair[model.block[k, 0], r // 3] + r % 3]
+
+
+@kernel
+def through_sets(model, strength, track, w, matrix, out):  # type: ignore[no-untyped-def]
+    """out (slots, 4 n + 1): what unit sets do at the end of step w, by its map (`direct.step_map`)."""
+    n = model.mass.shape[0]
+    segment = track.index[w, 2]
+    o = track.index[w, 0]
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    slot = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 3] != CRUSH:
+            continue
+        p = model.block[k, 0]
+        lo = model.block[k, 1]
+        for i in range(lo, lo + model.block[k, 5]):
+            out[slot] = 0.0
+            if model.active[segment, k] != 0:
+                for j in range(track.index[w + 1, 0] - o):
+                    stage = track.stage[o + j]
+                    x, rate = member_rows(model, p, i, stage[0], stage[1], row, row_rate)
+                    force, _ = set_slopes(model, k, i, strength, x - strength[2, i], rate)
+                    if force == 0.0:
+                        continue
+                    for r in range(6):
+                        b = (4 + j) * n + 3 * model.pair[p, r // 3] + r % 3
+                        for d in range(out.shape[1]):
+                            out[slot, d] -= force * row[r] * matrix[b, d]
+            slot += 1

@@ -1,0 +1,84 @@
+"""What Python asks of a scene at rest: forces without rates, their stiffness, each member's own."""
+
+import numpy as np
+
+from mdstopo.general.balance import joint_slopes, joint_state, make_desk
+from mdstopo.general.direct import own_force
+from mdstopo.general.forces import drive_state, general_forces
+from mdstopo.general.members import scale_general, set_modes
+from mdstopo.general.model import INERTER, unpack_general
+from mdstopo.jit import entry, kernel
+from mdstopo.mechanics.geometry import POSE, relative_pose
+
+
+@kernel
+def rest(model, alpha, strength, q, v):  # type: ignore[no-untyped-def]
+    """Strengths and modes of members at q (n,), where nothing moves: v (n,) = 0; what is driven is put in place."""
+    scale_general(model.block, model.power, alpha, strength)
+    drive_state(model, np.int64(0), model.times[0], q, v)
+    v[:] = 0.0
+    n_pair = model.pair.shape[0]
+    rel = np.empty((n_pair, POSE))
+    relative_pose(model.pair, q, v, rel)
+    set_modes(model, strength, rel, np.zeros((n_pair, 3)))
+
+
+@entry
+def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):  # type: ignore[no-untyped-def]
+    """force (n,) at rest at q (n,), stiffness (n, n) = -dF/dq + d(Phi_q^T lam)/dq, rows (n_row, n) = Phi_q, phi
+    (n_row,).
+
+    alpha (N,); lam (n_row,): multipliers of the joints. Damping, rates and inerters have no part in it.
+    """
+    model = unpack_general(ints, floats)
+    desk = make_desk(model)
+    n = model.mass.shape[0]
+    v = np.zeros(n)
+    rest(model, alpha, strength, q, v)
+    general_forces(
+        model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk.rel, desk.sums, desk.f, desk.k, desk.c,
+        desk.turn,
+    )  # fmt: skip
+    joint_state(model, q, v, desk)
+    joint_slopes(model, q, v, np.zeros(n), lam, desk)
+    for d in range(n):
+        force[d] = desk.f[d]
+        for c in range(n):
+            stiffness[d, c] = 0.0
+    for d in range(n):
+        stiffness[d, d - d % 3 + 2] -= desk.turn[d]
+    for p in range(model.pair.shape[0]):
+        for i in range(6):
+            for j in range(6):
+                row = 3 * model.pair[p, i // 3] + i % 3
+                stiffness[row, 3 * model.pair[p, j // 3] + j % 3] += desk.k[p, i, j]
+    rows[:] = 0.0
+    for j in range(model.joint.shape[0]):
+        for r in range(3):
+            own = model.row[j, r]
+            if own >= 0:
+                phi[own] = desk.phi[j, r]
+                for i in range(6):
+                    rows[own, 3 * model.joint[j, 1 + i // 3] + i % 3] += desk.jac[j, r, i]
+
+
+@entry
+def unit_forces(ints, floats, alpha, strength, q, out):  # type: ignore[no-untyped-def]
+    """out (M_padded, n) = dF/d(alpha^mu) of each design member at rest at q (n,): -f_i B_i^T."""
+    model = unpack_general(ints, floats)
+    n = model.mass.shape[0]
+    v = np.zeros(n)
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    rest(model, alpha, strength, q, v)
+    for i in range(out.shape[0]):
+        for d in range(n):
+            out[i, d] = 0.0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 4] < 0 or model.active[0, k] == 0 or model.block[k, 3] == INERTER:
+            continue
+        p = model.block[k, 0]
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            f = own_force(model, k, i, np.int64(0), model.times[0], strength, q, v, v, row, row_rate)
+            for r in range(6):
+                out[i, 3 * model.pair[p, r // 3] + r % 3] -= f * row[r]

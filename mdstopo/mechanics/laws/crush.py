@@ -1,0 +1,85 @@
+"""`crush`: elastic up to a plateau, constant there while it deforms further, elastic again on the way back.
+
+Parameters: k, F, gap, side (1 tension, -1 compression). The elongation x that comes in is the member's less its
+permanent set (`strength` row 2), so y = side x - gap is what is elastic: 0 <= y <= F / k, f = side k y. Modes: open
+(no contact, no force), elastic, and crushing, f = side F, which lasts as long as side x' > 0. While it crushes its set
+grows with its elongation; it is written down when crushing ends, where y is F / k again: nothing jumps.
+"""
+
+from mdstopo.jit import inline
+
+OPEN, ELASTIC, CRUSHING = range(3)
+#: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
+NEAR = 1e-12
+
+
+@inline
+def crush_force(p, x, mode):  # type: ignore[no-untyped-def]
+    """f, f_x, f_xd, V, V_x; V is what it gives back on the way back, f^2 / (2 k)."""
+    if mode == OPEN:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    if mode == CRUSHING:
+        return p[3] * p[1], 0.0, 0.0, 0.5 * p[1] * p[1] / p[0], 0.0
+    y = p[3] * x - p[2]
+    pull = p[0] * y
+    return p[3] * pull, p[0], 0.0, 0.5 * pull * y, p[3] * pull
+
+
+@inline
+def crush_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """How far the mode is from its end: y or what is left to the plateau in m, or the rate in m/s."""
+    if mode == CRUSHING:
+        return p[3] * xd
+    y = p[3] * x - p[2]
+    if mode == OPEN:
+        return -y
+    return min(y, p[1] / p[0] - y)
+
+
+@inline
+def crush_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
+    """Slopes of the margin by x and xd."""
+    if mode == CRUSHING:
+        return 0.0, p[3]
+    if mode == OPEN or p[3] * x - p[2] > 0.5 * p[1] / p[0]:
+        return -p[3], 0.0
+    return p[3], 0.0
+
+
+@inline
+def crush_next(p, x, mode):  # type: ignore[no-untyped-def]
+    """The mode to go to where this one's margin is negative; the force is continuous, so there is no second look."""
+    if mode != ELASTIC:
+        return ELASTIC
+    return CRUSHING if p[3] * x - p[2] > 0.5 * p[1] / p[0] else OPEN
+
+
+@inline
+def crush_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
+    """The mode at the start, by the elongation; at the gap or beyond the plateau its rate decides, then the second."""
+    y = p[3] * x - p[2]
+    near = NEAR * max(1.0, abs(p[2]))
+    ahead = p[3] * (xd if xd != 0.0 else xdd)
+    if y < -near or (y <= near and ahead < 0.0):
+        return OPEN
+    if y >= p[1] / p[0]:
+        return CRUSHING if ahead >= 0.0 else ELASTIC
+    return ELASTIC
+
+
+@inline
+def crush_set(p, x, old, new):  # type: ignore[no-untyped-def]
+    """By how much the permanent set grows where mode `old` gives way to `new`: when crushing ends, y becomes F / k."""
+    return p[3] * (p[3] * x - p[2] - p[1] / p[0]) if old == CRUSHING and new == ELASTIC else 0.0
+
+
+@inline
+def crush_first_set(p, x, mode):  # type: ignore[no-untyped-def]
+    """The permanent set of a member that begins in `mode` beyond the plateau and moves back: it has been crushed."""
+    return max(p[3] * x - p[2] - p[1] / p[0], 0.0) * p[3] if mode == ELASTIC else 0.0
+
+
+@inline
+def crush_grazes(p, x, mode):  # type: ignore[no-untyped-def]
+    """As `gap_grazes`: a plateau that is only just reached leaves a set on one side and none on the other (2)."""
+    return 2 if mode == ELASTIC and p[3] * x - p[2] > 0.5 * p[1] / p[0] else 0

@@ -1,0 +1,289 @@
+"""Points against edges: closed forms of sliding, momentum, energy, ends of edges, exact gradients, refusals."""
+
+import numba
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import mdstopo
+from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.general.contact import add_contacts
+from mdstopo.general.model import pack_general, unpack_general
+from mdstopo.mechanics.contact import CLOSED
+from mdstopo.status import Status
+from tests.general.support import design_of, load, simulate_text, slopes
+
+G, ANGLE, K = 9.8, 0.4, 2.0e5
+# a block that does not turn, on two feet, on a slope that falls to the right; it begins at its depth at rest
+SLOPE = """
+format: 1
+gravity: [0, -9.8]
+time: {{end: {end}}}
+bodies:
+  block: {{mass: 10, inertia: 1, position: [{x}, {y}], angle: -0.4, velocity: [{vx}, {vy}]}}
+motions: [{{body: block, angle: {{velocity: 0}}}}]
+points: {{feet: {{body: block, frame: body, grid: {{list: [[-0.2, -0.1], [0.2, -0.1]]}}}}}}
+contacts:
+  - points: feet
+    on: {{body: ground, from: [{left}, {high}], to: [{right}, {low}]}}
+    stiffness: 2.0e+5
+    damping: {damping}
+    friction: {friction}
+    slip: 0.05
+solver: {{tolerance: 1.0e-11}}
+"""
+
+
+def slope(end=1.0, friction=0.2, speed=0.0, lift=0.0, damping=0.0, length=50.0):
+    """The block on the slope; lift: height of its feet above where they carry it at rest."""
+    down, normal = np.array([np.cos(ANGLE), -np.sin(ANGLE)]), np.array([np.sin(ANGLE), np.cos(ANGLE)])
+    sunk = 10.0 * G * np.cos(ANGLE) / (2.0 * K)
+    at = (0.1 - sunk + lift) * normal
+    v = speed * down
+    right, left = length * down, -length * down
+    return SLOPE.format(
+        end=end, x=at[0], y=at[1], vx=v[0], vy=v[1], right=right[0], low=right[1], left=left[0], high=left[1],
+        friction=friction, damping=damping,
+    )  # fmt: skip
+
+
+def along(motion, t):
+    seen = motion.at(t)
+    down = np.array([np.cos(ANGLE), -np.sin(ANGLE)])
+    start = motion.q[0, :2]
+    return (seen.q[:, :2] - start) @ down, seen.v[:, :2] @ down
+
+
+@pytest.mark.parametrize(("friction", "speed"), [(0.2, 0.0), (0.2, 1.5), (0.6, 2.0)])
+def test_a_block_slides_down_a_slope_as_its_one_equation_says(friction, speed):
+    """N stays m g cos: m s'' = m g sin - mu N tanh(s' / slip), solved apart; faster than slip it is Coulomb's law."""
+    motion = simulate_text(slope(friction=friction, speed=speed))
+    assert motion.status.ok
+
+    def rate(_, y):
+        return y[1], G * np.sin(ANGLE) - friction * G * np.cos(ANGLE) * np.tanh(y[1] / 0.05)
+
+    t = np.linspace(0.0, 1.0, 21)
+    exact = solve_ivp(rate, (0.0, 1.0), (0.0, speed), method="DOP853", rtol=1e-12, atol=1e-14, t_eval=t).y
+    distance, velocity = along(motion, t)
+    assert np.abs(distance - exact[0]).max() <= 1e-8
+    assert np.abs(velocity - exact[1]).max() <= 1e-8
+    if speed > 0.0 and friction == 0.2:
+        coulomb = speed * t + 0.5 * t**2 * G * (np.sin(ANGLE) - friction * np.cos(ANGLE))
+        assert np.abs(distance - coulomb).max() <= 1e-6
+
+
+def test_below_the_angle_of_friction_a_block_creeps_at_a_known_speed():
+    motion = simulate_text(slope(friction=0.6, end=3.0))
+    creep = 0.05 * np.arctanh(np.tan(ANGLE) / 0.6)
+    assert along(motion, [3.0])[1][0] == pytest.approx(creep, rel=1e-8)
+
+
+@pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
+def test_a_block_that_falls_on_a_slope_without_loss_keeps_its_energy(integrator):
+    step = {"step": 0.0002} if integrator == "generalized_alpha" else {}
+    motion = simulate_text(slope(friction=0.0, lift=0.05, end=0.5), integrator=integrator, **step)
+    normal = np.array([np.sin(ANGLE), np.cos(ANGLE)])
+    depth = np.maximum(0.1 - motion.q[:, :2] @ normal, 0.0)
+    energy = 5.0 * (motion.v[:, :2] ** 2).sum(axis=1) + 98.0 * motion.q[:, 1] + K * depth**2
+    assert depth.max() > 1e-3
+    assert depth.min() == 0.0
+    bound = 1e-8 if integrator == "runge_kutta" else 2e-2
+    assert np.abs(energy - energy[0]).max() <= bound * (energy[0] - 98.0 * motion.q[:, 1].min())
+
+
+HIT = """
+format: 1
+time: {{end: 0.4}}
+bodies:
+  a: {{mass: 2, inertia: 0.3, position: [0, 0], velocity: [3, 0.5], angular_velocity: 2}}
+  b: {{mass: 3, inertia: 0.5, position: [1.05, 0.1], velocity: [-1, 0], angular_velocity: -1, angle: 0.2}}
+points: {{nose: {{body: a, grid: {{list: [[0.5, -0.1], [0.5, 0.1]]}}}}}}
+contacts:
+  - {{points: nose, on: {{body: b, frame: body, from: [-0.5, -0.6], to: [-0.5, 0.6]}}, stiffness: 40000,
+     damping: {damping}, friction: {friction}, slip: 0.02}}
+solver: {{tolerance: 1.0e-10}}
+"""
+
+
+@pytest.mark.parametrize(("damping", "friction"), [(0, 0), (60, 0.4)])
+def test_a_collision_keeps_momentum_and_never_gains_energy(damping, friction):
+    motion = simulate_text(HIT.format(damping=damping, friction=friction))
+    mass, inertia = np.array([2.0, 3.0]), np.array([0.3, 0.5])
+    q, v = motion.q.reshape(-1, 2, 3), motion.v.reshape(-1, 2, 3)
+    linear = np.einsum("b,tbi->ti", mass, v[:, :, :2])
+    spin = (mass * (q[:, :, 0] * v[:, :, 1] - q[:, :, 1] * v[:, :, 0]) + inertia * v[:, :, 2]).sum(axis=1)
+    energy = 0.5 * (mass * (v[:, :, :2] ** 2).sum(axis=2) + inertia * v[:, :, 2] ** 2).sum(axis=1)
+    assert np.abs(v[-1] - v[0]).max() > 0.5
+    assert np.abs(linear - linear[0]).max() <= 1e-12 * np.abs(linear).max()
+    assert np.abs(spin - spin[0]).max() <= 1e-12 * np.abs(spin).max()
+    if friction == 0:
+        assert energy[-1] == pytest.approx(energy[0], rel=1e-8)
+    else:
+        assert energy[-1] < 0.95 * energy[0]
+
+
+def test_a_point_that_slides_over_the_end_of_its_edge_falls():
+    text = slope(friction=0.1, speed=2.0, length=0.5).replace("[[-0.2, -0.1], [0.2, -0.1]]", "[[0.2, -0.1]]")
+    motion = simulate_text(text.replace("velocity: 0}", "velocity: 0}"))
+    assert motion.status.ok
+    passed = along(motion, motion.t)[0] > 0.3
+    assert np.abs(motion.a[passed][1:, 1] + G).max() <= 1e-9
+    assert np.abs(motion.a[~passed][:, 1] + G).max() > 1.0
+
+
+def test_a_point_that_passes_beside_an_edge_is_not_caught_from_behind():
+    text = """
+format: 1
+time: {end: 1}
+bodies: {ball: {mass: 1, inertia: 1, position: [-1, -0.2], velocity: [2, 0]}}
+points: {centre: {body: ball, frame: body, grid: {list: [[0, 0]]}}}
+contacts: [{points: centre, on: {body: ground, from: [-0.5, 0], to: [0.5, 0]}, stiffness: 1000, damping: 1}]
+"""
+    beside = simulate_text(text)
+    assert beside.v[-1, :2] == pytest.approx([2.0, 0.0])
+    # through the edge from its free side it is caught
+    above = simulate_text(
+        text.replace("position: [-1, -0.2], velocity: [2, 0]", "position: [0, 0.2], velocity: [0, -2]")
+    )
+    assert above.v[-1, 1] > 1.5
+
+
+def test_a_bounce_within_one_step_is_not_missed():
+    text = """
+format: 1
+time: {end: 10}
+bodies: {ball: {mass: 1, inertia: 1, position: [0, 1], velocity: [0.3, -2]}}
+points: {centre: {body: ball, frame: body, grid: {list: [[0, 0]]}}}
+contacts: [{points: centre, on: {body: ground, from: [-9, 0], to: [9, 0]}, stiffness: 1.0e+5}]
+"""
+    motion = simulate_text(text)
+    assert motion.v[-1, :2] == pytest.approx([0.3, 2.0], abs=1e-7)
+
+
+def test_with_settling_a_block_begins_at_its_depth():
+    text = slope(friction=0.3, lift=0.01).replace("tolerance: 1.0e-11", "tolerance: 1.0e-9, settle: true")
+    text = text.replace("angle: {velocity: 0}", "angle: {velocity: 0}, x: {velocity: 0}")
+    motion = simulate_text(text)
+    assert motion.status.ok
+    # held in x: what it weighs is carried by the vertical part of the normal force
+    depth = 0.1 - motion.q[0, :2] @ np.array([np.sin(ANGLE), np.cos(ANGLE)])
+    assert 2.0 * K * depth * np.cos(ANGLE) == pytest.approx(98.0, rel=1e-9)
+
+
+# --- gradients
+
+
+@numba.njit
+def _add(ints, floats, strength, q, v, tangent, f, k, c):
+    add_contacts(unpack_general(ints, floats), strength, q, v, tangent, f, k, c)
+
+
+def test_tangents_are_the_slopes_of_the_forces():
+    scene = Evaluator(read_case(HIT.format(damping=60, friction=0.4))).scenes["default"]
+    ints, floats = pack_general(scene.model)
+    strength = np.zeros((3, 3))
+    strength[1, :2] = CLOSED
+    rng = np.random.default_rng(3)
+    q, v = scene.model.q0 + 0.05 * rng.normal(size=9), 0.02 * rng.normal(size=9)
+    q[:3], v[6:] = [0.2, 0.05, 0.1], 0.0  # both points are inside
+
+    def at(q, v, tangent=False):
+        f, k, c = np.zeros(9), np.zeros((1, 6, 6)), np.zeros((1, 6, 6))
+        _add(ints, floats, strength, q, v, tangent, f, k, c)
+        return f, k[0], c[0]
+
+    _, stiffness, damping = at(q, v, True)
+    places = [3 * int(body) + i for body in scene.model.pair[0] for i in range(3)]
+    h = 1e-6
+    for column, d in enumerate(places):
+        e = np.zeros(9)
+        e[d] = h
+        by_q = -(at(q + e, v)[0] - at(q - e, v)[0])[places] / (2.0 * h)
+        by_v = -(at(q, v + e)[0] - at(q, v - e)[0])[places] / (2.0 * h)
+        assert stiffness[:, column] == pytest.approx(by_q, rel=1e-6, abs=1e-6 * np.abs(stiffness).max())
+        assert damping[:, column] == pytest.approx(by_v, rel=1e-6, abs=1e-6 * np.abs(damping).max())
+
+
+def test_the_adjoint_is_the_derivative_of_what_is_computed():
+    case = load("crate", tolerance=1e-11)
+    alpha = design_of(case)
+    found = mdstopo.evaluate(case, alpha)
+    assert found.status.ok, found.message
+    rng = np.random.default_rng(1)
+    for _ in range(2):
+        direction = rng.normal(size=case.n_design) * alpha
+        for objective, slope_of in slopes(case, alpha, direction, 3e-6).items():
+            gradient = found.gradients[objective]
+            assert abs(slope_of - gradient @ direction) <= 1e-6 * np.abs(gradient * direction).max(), objective
+
+
+@pytest.mark.parametrize("solver", [{"tolerance": 1e-10}, {"integrator": "generalized_alpha", "step": 0.001}])
+def test_direct_and_adjoint_agree(solver):
+    case = load("crate", **solver)
+    alpha = design_of(case)
+    adjoint, direct = (mdstopo.evaluate(case, alpha, method=method) for method in ("adjoint", "direct"))
+    for objective, gradient in adjoint.gradients.items():
+        assert np.abs(direct.gradients[objective] - gradient).max() <= 1e-9 * np.abs(gradient).max(), objective
+
+
+def test_generalized_alpha_comes_to_the_same_motion():
+    exact = mdstopo.evaluate(load("crate", tolerance=1e-11), design_of(load("crate")), gradient=False).objectives
+    errors = []
+    for step in (0.001, 0.00025):
+        case = load("crate", integrator="generalized_alpha", step=step)
+        found = mdstopo.evaluate(case, design_of(case), gradient=False).objectives
+        errors.append(max(abs(found[name] - value) / abs(value) for name, value in exact.items()))
+    assert errors[0] < 0.05
+    assert errors[1] < errors[0] / 3.0
+
+
+def test_a_damped_touch_that_only_just_happens_is_told():
+    text = """
+format: 1
+time: {{end: 2}}
+bodies: {{ball: {{mass: 1, inertia: 1, position: [0, 1], velocity: [0, -1]}}}}
+motions: [{{body: ball, x: {{velocity: 0}}, angle: {{velocity: 0}}}}]
+points: {{centre: {{body: ball, frame: body, grid: {{list: [[0, 0]]}}}}}}
+contacts: [{{points: centre, on: {{body: ground, from: [-1, {y}], to: [1, {y}]}}, stiffness: 400, damping: 5}}]
+members:
+  spring: {{from: {{body: ground, at: [0, 3]}}, to: {{body: ball, at: [0, 1]}}, law: {{type: spring, stiffness: 25}}}}
+design: {{initial: 1}}
+objectives: {{V: {{response: {{velocity: {{body: ball}}}}, over_time: final}}}}
+solver: {{tolerance: 1.0e-10}}
+"""
+    just = mdstopo.evaluate(read_case(text.format(y=0.8 + 1e-12)), np.ones(1))
+    assert just.status is Status.GRAZING
+    assert "point 0 of contact 0, of ball on ground" in just.message
+    assert mdstopo.evaluate(read_case(text.format(y=0.82)), np.ones(1)).status.ok
+
+
+# --- mistakes
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("body: b, frame: body", "body: a, frame: body", r"contacts\[0\]\.on: the points are on 'a' as well"),
+        ("to: [-0.5, 0.6]", "to: [-0.5, -0.6]", r"contacts\[0\]\.on: both ends of the edge coincide"),
+        ("points: nose", "points: noes", "no point grid is called 'noes', did you mean 'nose'"),
+        ("stiffness: 40000", "stiffness: 0", r"contacts\[0\]\.stiffness"),
+        ("slip: 0.02", "slip: 0", r"contacts\[0\]\.slip"),
+        ("friction: 0.4", "friction: -1", r"contacts\[0\]\.friction"),
+        ("friction: 0.4", "grip: 1", r"contacts\[0\]\.grip"),
+    ],
+)
+def test_mistakes_are_refused_at_their_place(old, new, message):
+    text = HIT.format(damping=60, friction=0.4)
+    assert old in text
+    with pytest.raises(CaseError, match=message):
+        read_case(text.replace(old, new, 1))
+
+
+def test_two_contacts_of_one_name_are_a_mistake():
+    text = HIT.format(damping=60, friction=0.4).replace("- {points", "- {name: c, points")
+    row = text[text.index("  - {name") : text.index("solver")]
+    with pytest.raises(CaseError, match=r"contacts\[1\]\.name: the name 'c' is given to contacts\[0\] already"):
+        read_case(text.replace(row, row + row))

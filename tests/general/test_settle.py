@@ -1,0 +1,168 @@
+"""A start at rest: the equilibrium itself, its place in the gradients, and cases that have none."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.optimize import brentq
+
+import mdstopo
+from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
+from mdstopo.cli.simulate import command as simulate_command
+from mdstopo.engine import Evaluator
+from mdstopo.status import Status
+from tests.general.support import design_of, load, slopes
+
+HANGS = """
+format: 1
+gravity: [0, -10]
+time: {end: 0.3}
+bodies: {lamp: {mass: 2, inertia: 0.1, position: [0, -1]}}
+joints: [{name: guide, type: prismatic, bodies: [ground, lamp], at: [0, -1], axis: [0, 1]}]
+members:
+  cord:
+    from: {body: ground, at: [0, 0]}
+    to: {body: lamp, at: [0, -0.9]}
+    law: {type: spring, stiffness: 500, damping: 3}
+design: {initial: 0.8}
+objectives:
+  E: {response: energy, over_time: max}
+  y: {response: {displacement: {body: lamp, component: y}}, over_time: final}
+combine: {weights: {E: 1, y: 1}}
+solver: {settle: true, tolerance: 1.0e-10}
+"""
+
+
+def test_a_hanging_mass_begins_where_its_cord_carries_it_and_stays_there():
+    case = read_case(HANGS)
+    sag = 2.0 * 10.0 / (0.8 * 500.0)
+    motion = mdstopo.simulate(case)
+    assert motion.status.ok
+    assert motion.q[0, 1] == pytest.approx(-1.0 - sag, rel=1e-12)
+    assert np.abs(motion.q - motion.q[0]).max() <= 1e-12
+    assert np.abs(motion.a).max() <= 1e-9
+    found = mdstopo.evaluate(case)
+    # k (m g / k)^2 / 2 with k = 500 alpha; displacements count from the stated place
+    assert found.objectives["E"] == pytest.approx(0.5 * 20.0**2 / 400.0, rel=1e-10)
+    assert found.gradients["E"][0] == pytest.approx(-0.5 * 20.0**2 / 500.0 / 0.8**2, rel=1e-8)
+    assert found.objectives["y"] == pytest.approx(-sag, rel=1e-10)
+    assert found.gradients["y"][0] == pytest.approx(sag / 0.8, rel=1e-8)
+
+
+def test_a_lever_settles_at_the_root_of_its_moment():
+    """A bar on a pin with an off-centre weight, held by a long spring: one equation in the angle, solved apart."""
+    text = """
+format: 1
+gravity: [0, -9.8]
+time: {end: 0.1}
+bodies: {bar: {mass: 3, inertia: 0.5, position: [0.6, 0]}}
+joints: [{type: revolute, bodies: [ground, bar], at: [0, 0]}]
+members: {stay: {from: {body: ground, at: [0, 1]}, to: {body: bar, at: [1, 0]}, law: {type: spring, stiffness: 70}}}
+solver: {settle: true}
+"""
+    motion = mdstopo.simulate(read_case(text))
+
+    def moment(angle):
+        tip = np.array([np.cos(angle), np.sin(angle)])
+        span = np.array([0.0, 1.0]) - tip
+        length = np.hypot(*span)
+        pull = 70.0 * (length - np.sqrt(2.0)) * span / length
+        return tip[0] * pull[1] - tip[1] * pull[0] - 3.0 * 9.8 * 0.6 * np.cos(angle)
+
+    assert motion.q[0, 2] == pytest.approx(brentq(moment, -1.4, 0.0, xtol=1e-14), abs=1e-10)
+    assert np.abs(motion.a).max() <= 1e-8
+
+
+@pytest.mark.parametrize(
+    ("solver", "bound"),
+    [({"tolerance": 1e-11}, 1e-6), ({"integrator": "generalized_alpha", "step": 0.002, "tolerance": 1e-10}, 1e-2)],
+    ids=["runge_kutta", "generalized_alpha"],
+)
+def test_gradients_go_through_the_equilibrium(solver, bound):
+    case = load("cradle", **solver)
+    alpha = design_of(case)
+    found, direct = mdstopo.evaluate(case, alpha), mdstopo.evaluate(case, alpha, method="direct")
+    assert found.status.ok, found.message
+    direction = np.random.default_rng(1).normal(size=case.n_design) * alpha
+    for name, slope in slopes(case, alpha, direction, 1e-5).items():
+        gradient = found.gradients[name]
+        assert abs(slope - gradient @ direction) <= bound * np.abs(gradient * direction).max(), name
+        assert np.abs(direct.gradients[name] - gradient).max() <= 1e-9 * np.abs(gradient).max(), name
+
+
+def test_without_the_term_at_the_start_gradients_would_be_wrong():
+    """What the scene is for: its start does depend on the design."""
+    case = load("cradle")
+    alpha = design_of(case)
+    evaluator = Evaluator(case)
+    first, second = (evaluator.settled(factor * alpha, "default") for factor in (1.0, 1.01))
+    assert first is not None
+    assert second is not None
+    assert np.abs(first.q - second.q).max() > 1e-5
+    assert 1e-3 < first.moved < 0.5
+    assert first.moved_body in ("cradle", "load", "arm")
+
+
+def test_a_design_settles_in_the_same_place_whatever_was_evaluated_before():
+    case = load("cradle")
+    alpha = design_of(case)
+    evaluator = Evaluator(case)
+    before = evaluator.evaluate(alpha)
+    evaluator.evaluate(0.7 * alpha)
+    after = evaluator.evaluate(alpha)
+    for name, value in before.objectives.items():
+        assert after.objectives[name] == value
+        assert np.array_equal(after.gradients[name], before.gradients[name])
+
+
+def test_a_body_in_free_fall_is_refused_by_name():
+    text = HANGS.replace("bodies: {", "bodies: {stone: {mass: 1, inertia: 1, position: [3, 0]}, ")
+    with pytest.raises(CaseError, match=r"solver\.settle: body stone finds no static equilibrium"):
+        mdstopo.simulate(read_case(text))
+
+
+def test_a_design_that_cannot_hold_its_load_ends_the_evaluation_with_the_body_named():
+    found = mdstopo.evaluate(read_case(HANGS), np.array([1e-4]))
+    assert found.status is Status.NO_EQUILIBRIUM
+    assert "body lamp" in found.message
+
+
+def test_a_body_that_nothing_keeps_from_turning_is_refused():
+    text = """
+format: 1
+time: {end: 0.1}
+bodies: {wheel: {mass: 1, inertia: 1, position: [0, 0]}}
+joints: [{type: revolute, bodies: [ground, wheel], at: [0, 0]}]
+solver: {settle: true}
+"""
+    with pytest.raises(CaseError, match="body wheel is free to turn"):
+        mdstopo.simulate(read_case(text))
+
+
+def test_velocities_that_do_not_fit_where_the_scene_settles_are_refused():
+    text = """
+format: 1
+gravity: [0, -10]
+time: {end: 0.1}
+bodies: {bar: {mass: 3, inertia: 0.5, position: [0.6, 0], velocity: [0, 0.6], angular_velocity: 1}}
+joints: [{name: pin, type: revolute, bodies: [ground, bar], at: [0, 0]}]
+members: {stay: {from: {body: ground, at: [0, 1]}, to: {body: bar, at: [1, 0]}, law: {type: spring, stiffness: 70}}}
+solver: {settle: true}
+"""
+    with pytest.raises(CaseError, match="where the scene settles, the start velocities tear joint pin"):
+        mdstopo.simulate(read_case(text))
+
+
+def test_the_command_says_how_far_the_start_has_moved(tmp_path):
+    file = tmp_path / "lamp.yaml"
+    file.write_text(HANGS)
+    result = CliRunner().invoke(simulate_command, [str(file), "--json", "--out", str(tmp_path / "lamp.h5")])
+    document = json.loads(result.stdout)
+    assert document["load_cases"]["default"]["settled"]["moved"] == pytest.approx(0.05, rel=1e-9)
+
+
+def test_frequencies_are_those_about_the_equilibrium():
+    case = read_case(HANGS)
+    assert Evaluator(case).natural_frequencies(np.array([0.8]), "default") == pytest.approx([np.sqrt(400.0 / 2.0)])
