@@ -34,8 +34,8 @@ def _listen(source: IO[bytes], inbox: "queue.Queue[Any]") -> None:
     try:
         while True:
             inbox.put(pickle.load(source))
-    except EOFError:
-        os._exit(0)  # the parent wants no more, or is gone: in the middle of a piece, too
+    except (EOFError, OSError, pickle.UnpicklingError):
+        os._exit(0)  # the parent wants no more, or is gone: in the middle of a piece, or of a message, too
 
 
 if __name__ == "__main__":

@@ -33,8 +33,8 @@ def main() -> None:
     while True:
         try:
             kind, *request = pickle.load(source)
-        except EOFError:
-            return  # the parent wants no more, or is gone
+        except (EOFError, OSError, pickle.UnpicklingError):
+            return  # the parent wants no more, or is gone, in the middle of a message perhaps
         if kind == "parts":
             names, design, gradient, sensitivity, wanted = request
             chosen = ensemble.looking_at(names)
