@@ -47,7 +47,7 @@ def is_wide(state: State, chosen: int, linear: LinearRows, settings: Settings) -
     """Whether `propose` can make the next step of a state, of which `chosen` rows compete."""
     return (
         len(state.alpha) >= MANY
-        and chosen == 1 == len(linear)
+        and chosen + len(state.cuts) == 1 == len(linear)
         and not len(state.constraint_rows)
         and state.convex > 0.0
         and settings.number("power") != 0.0
