@@ -9,7 +9,7 @@ import pytest
 import mdstopo
 from mdstopo.cli.gradient_numbers import differences
 from mdstopo.evaluators import evaluator_of
-from mdstopo.robust.measures import ROWS
+from mdstopo.optimizer.scalarisation import ROWS
 from tests.robust.scenes import read, uncertain
 
 REACH = {"response": {"displacement": {"body": "torso", "relative_to": "vehicle"}}, "over_time": "max"}
