@@ -7,10 +7,10 @@ with z from the transposed system and (g_q, g_lam). Free bodies make it singular
 
 import numpy as np
 
-from mdstopo.general.adjoint import add_design, explicit_part
 from mdstopo.general.balance import balance, joint_slopes, make_desk
 from mdstopo.general.duties import point_of
 from mdstopo.general.forces import general_forces
+from mdstopo.general.gather import add_design, explicit_part
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.responses import ENERGY, response

@@ -197,6 +197,8 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
                 break
             step = -rate * (time - x0) / (rate - d0) if rate != d0 else 0.0
             turns = (visit > 0 or not guessed[nearer]) and (rate - d0) * (time - x0) < 0.0
+            if turns and abs(step) <= 1e-14 * span:
+                break  # before rounding says that the root lies outside the bracket
             x0 = time
             d0 = rate
             following = time + step

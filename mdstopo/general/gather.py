@@ -1,0 +1,98 @@
+"""What the derivatives by the design gather at one state: from every member's force, and from what is looked at."""
+
+import numpy as np
+
+from mdstopo.general.forces import inerter_force
+from mdstopo.general.members import block_design
+from mdstopo.general.model import INERTER
+from mdstopo.general.parameters import add_force_parameters, add_parameters
+from mdstopo.general.responses import MEMBER_FORCE
+from mdstopo.integrators.steps import DESIGN
+from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.laws.table import law
+
+
+@kernel
+def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) -= f_i (b_i . T z) at unit strength, += weight V_i, of all design members at one state.
+
+    Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
+    """
+    n_pair = model.pair.shape[0]
+    work[DESIGN] += 1
+    rel = np.empty((n_pair, POSE))
+    u = np.empty((n_pair, 3))
+    row = np.empty(6)
+    relative_pose(model.pair, q, v, rel)
+    for p in range(n_pair):
+        _virtual(model.pair, rel, p, z, u[p])
+    for k in range(model.block.shape[0]):
+        if model.block[k, 4] < 0 or model.active[segment, k] == 0:
+            continue
+        p = model.block[k, 0]
+        if model.block[k, 3] != INERTER:
+            block_design(model, k, segment, t, strength, strength[1], rel[p], u[p], weight, out)
+            continue
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            f = inerter_force(model, k, i, q, v, a, row)
+            value = 0.0
+            for r in range(6):
+                value += row[r] * z[3 * model.pair[p, r // 3] + r % 3]
+            out[i] -= f * value
+    if model.varied.shape[0] > 0:
+        add_parameters(model, segment, t, strength, q, v, a, z, weight, out)
+
+
+@kernel
+def _virtual(pair, rel, p, z, out):  # type: ignore[no-untyped-def]
+    """out (3,) = -T z."""
+    pair_displacement(pair, rel, p, z, out)
+    for i in range(3):
+        out[i] = -out[i]
+
+
+@kernel
+def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += scale dg_j/d(alpha^mu) at fixed motion of a member force."""
+    if model.response[j, 0] != MEMBER_FORCE:
+        return
+    row = np.empty(6)
+    rel = np.empty((model.pair.shape[0], POSE))
+    relative_pose(model.pair, q, v, rel)
+    total = 0.0
+    for part in range(2):  # the sum of its laws gives the sign, then each law its part
+        sign = 1.0 if total >= 0.0 else -1.0
+        for k in range(model.block.shape[0]):
+            if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
+                continue
+            if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
+                continue
+            i = model.block[k, 1] + who - model.block[k, 7]
+            if model.block[k, 3] == INERTER:
+                f = inerter_force(model, k, i, q, v, a, row)
+            else:
+                f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], strength)
+            if part == 0:
+                total += strength[0, i] * f
+            else:
+                out[i] += scale * sign * f
+    if model.varied.shape[0] > 0:
+        sign = 1.0 if total >= 0.0 else -1.0
+        add_force_parameters(model, segment, model.response[j, 5], who, t, strength, q, v, a, scale * sign, out)
+
+
+@kernel
+def _unit_force(model, k, i, segment, t, r, strength):  # type: ignore[no-untyped-def]
+    c = r[2]
+    s = r[3]
+    ax = c * model.member[2, i] - s * model.member[3, i]
+    ay = s * model.member[2, i] + c * model.member[3, i]
+    x = r[0] + ax - model.member[0, i]
+    y = r[1] + ay - model.member[1, i]
+    length = np.sqrt(x * x + y * y)
+    rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
+    value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
+    stretch = length - model.member[4, i] - strength[2, i]
+    f, _, _, _, _ = law(model.block[k, 3], model.law[k], stretch, rate, int(strength[1, i]), t, value, model.curves)
+    return f
