@@ -16,6 +16,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.keep import chosen, places, restricted
 from mdstopo.finalize.laws import SCALED, sized
+from mdstopo.finalize.session import finalize, ready
 from mdstopo.finalize.text import text_of
 
 SPRINGS = """\
@@ -276,7 +277,9 @@ def test_a_result_becomes_a_case_that_repeats_it(capsys: pytest.CaptureFixture[s
             assert file[f"trajectories/{name}/q"][-1] == pytest.approx(motion.q[-1], rel=1e-9, abs=1e-11)
             assert file[f"trajectories/{name}/v"][-1] == pytest.approx(motion.v[-1], rel=1e-9, abs=1e-11)
     assert call(capsys, "gradient", "made/final.yaml", "--out", "gradient.h5", "--quiet")[0] == 0
-    assert call(capsys, "run", "made/final.yaml", "--out", "again.h5", "--quiet")[0] == 0
+    status, out, _ = call(capsys, "run", "made/final.yaml", "--out", "again.h5")
+    assert status == 0
+    assert "7 present, 0 grey, 0 absent of 7" in out
 
 
 def test_a_threshold_keeps_what_reaches_it_and_the_table_says_all(capsys: pytest.CaptureFixture[str]) -> None:
@@ -385,3 +388,36 @@ def test_bounds_of_the_full_case_stay_for_the_members_kept() -> None:
     assert np.array_equal(reduced.constraints[0].coefficients, case.constraints[0].coefficients[[1, 2, 15]])
     assert reduced.members[0].p_world == pytest.approx(case.members[0].p_world[[1, 2]])
     assert reduced.members[0].q_world == pytest.approx(case.members[0].q_world[[1, 2]])
+
+
+def test_a_choice_among_equal_alphas_is_told(capsys: pytest.CaptureFixture[str], results: dict[str, bytes]) -> None:
+    Path("run.h5").write_bytes(results["run"])
+    with h5py.File("run.h5", "r+") as file:
+        file["design/alpha"][:] = [*([1.0] * 6), *([0.5] * 15)]
+    _, _, err = call(capsys, "finalize", "run.h5", "--keep", "4")
+    assert "2 more members have the alpha of the smallest one kept" in err
+    assert [g.name for g in load_case("run.final.yaml").design_groups] == [f"belts_{i}" for i in range(4)]
+    _, _, err = call(capsys, "finalize", "run.h5", "--keep", "6", "--overwrite")
+    assert "more members" not in err
+
+
+def test_a_fixed_step_is_verified_with_a_shorter_one(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--set", "solver={integrator: generalized_alpha, step: 1e-3}", "--set", "optimizer.max_iterations=1"]
+    assert call(capsys, "run", "in/probe.yaml", "--out", "probe.h5", "--quiet", *words)[0] == 0
+    status, out, _ = call(capsys, "finalize", "probe.h5", "--keep", "6", "--json")
+    told = json.loads(out)
+    assert status == 0
+    assert told["verified_with"] == "step 0.0001 s"
+    coarse, fine = (told["designs"][i]["objectives"]["G2"] for i in (2, 3))
+    assert 1e-9 < abs(coarse / fine - 1.0) < 1e-2
+    assert load_case("probe.final.yaml").solver.step == 1e-3
+
+
+def test_an_interrupted_run_writes_no_case(tmp_path: Path) -> None:
+    case = load_case("in/probe.yaml", {"optimizer": "{max_iterations: 1000, tolerance: 0, move_limit: 1.0e-4}"})
+    alpha = np.full(case.n_design, 0.4)
+    kept, reduced = ready(case, alpha, 8, None)
+    asked = iter([False] * 5)
+    done = finalize(case, alpha, kept, reduced, place=tmp_path / "x.yaml", stop_requested=lambda: next(asked, True))
+    assert done.outcome.status == "interrupted"
+    assert (done.text, done.columns) == ("", ())
