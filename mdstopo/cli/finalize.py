@@ -60,6 +60,9 @@ def command(
     if place.exists() and not (overwrite and place.is_file()):
         raise StoreError(f"{place} exists already; it is left as it is")
     case, alpha = opened(view, overrides)
+    for taken in (result_path, case.path):
+        if taken is not None and place.exists() and taken.exists() and place.samefile(taken):
+            raise StoreError(f"{place}: this is what the new case is made from; choose another place with --out")
     kept, reduced = ready(case, alpha, keep, threshold)
     if not view.finished:
         output.notice(f"{result_path}: the run is not finished ({view.status}); its best design so far is taken")

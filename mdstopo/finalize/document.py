@@ -48,9 +48,10 @@ def final_content(
     there. alpha (K,): their sizes; those of size 0 are left out.
     """
     names = _names(case, places, alpha)
-    groups = {
-        group: [names[i] for i in range(len(places)) if places[i][0] == group and names[i]] for group, _ in places
-    }
+    groups: dict[str, list[str]] = {group: [] for group, _ in places}
+    for (group, _), name in zip(places, names, strict=True):
+        if name:
+            groups[group].append(name)
     told: list[str] = []
     members = _members(content, case, names, alpha)
     final: Plain = {}

@@ -316,6 +316,7 @@ def test_a_threshold_keeps_what_reaches_it_and_the_table_says_all(capsys: pytest
         (["--threshold", "nan"], "nan is no alpha"),
         (["--threshold", "2"], "no member has alpha of 2 or more"),
         (["--keep", "2"], "constraints[0].equals: found the bound 2.4"),
+        (["--keep", "5", "--overwrite", "--out", "run.h5"], "this is what the new case is made from"),
         (["--keep", "3", "--set", "points.edge.grid.rectangle.count=5"], "the design has 21 values"),
         (["--keep", "3", "--set", "design.shared=[belts]"], "design.shared cannot be finalized"),
         (["--keep", "3", "--set", "design.mirrored=[[belts, belts]]"], "belts"),
