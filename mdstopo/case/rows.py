@@ -210,6 +210,12 @@ def _cell(text: str) -> float | None:
     return to_float(value)
 
 
+def rows_in(text: str) -> list[list[float]]:
+    """The rows of an included file that has been read without a mistake: its numbers, without the header line."""
+    rows = [[_cell(cell) for cell in _cells(line)] for line in text.removeprefix("\ufeff").splitlines()]
+    return [[cell for cell in row if cell is not None] for row in rows if any(cell is not None for cell in row)]
+
+
 @frozen
 class Signals(Value):
     """Quantities over time: constants, or a table of time.

@@ -7,6 +7,7 @@ COMMANDS: dict[str, str] = {
     "check": "Read a case and say what is in it, without running it.",
     "simulate": "Compute the motion of one design.",
     "gradient": "Compare sensitivity methods on one design.",
+    "finalize": "Keep the members of a result that count, size them anew, write their case.",
     "show": "Say in words what a result file holds.",
     "plot": "Draw what a result file holds.",
     "report": "Write one HTML page that shows a result in motion.",

@@ -169,7 +169,8 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
             word = {"limit": "at most", "equals": "equal to", "at_least": "at least"}[row.sense]
             lines.append((f"volume of {', '.join(row.groups)}", f"{number(used, 9)}, {word} {number(row.bound, 9)}"))
     width = case.upper - case.lower
-    share = np.divide(outcome.alpha - case.lower, width, out=np.zeros(case.n_design), where=width > 0.0)
+    # A member whose bounds are equal is as much there as they say.
+    share = np.divide(outcome.alpha - case.lower, width, out=np.array(outcome.alpha), where=width > 0.0)
     grey = int(np.count_nonzero((share > _GREY[0]) & (share < _GREY[1])))
     full = int(np.count_nonzero(share >= _GREY[1]))
     if case.n_design:

@@ -1,0 +1,188 @@
+"""`mdstopo finalize`: the members of a design that are worth having, as a case of their own."""
+
+import math
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from mdstopo.cli.interrupt import Interrupts
+from mdstopo.cli.options import EXIT, FILE, output_options, result_argument, set_option
+from mdstopo.cli.output import Output, number
+from mdstopo.cli.progress import display
+
+if TYPE_CHECKING:
+    from mdstopo.case.model import Case
+    from mdstopo.finalize.session import Finalized
+
+_SIGNS = {"limit": "<=", "equals": "=", "at_least": ">="}
+
+
+@click.command("finalize")
+@result_argument
+@click.option("--keep", type=click.IntRange(1), metavar="K", help="Keep the K members with the largest alpha.")
+@click.option("--threshold", type=click.FloatRange(0.0), metavar="A", help="Keep the members with alpha >= A.")
+@click.option("--out", type=FILE, metavar="CASE", help="Where to write the case (default: RESULT's name.final.yaml).")
+@click.option("--overwrite", is_flag=True, help="Replace the case file that is there.")
+@set_option
+@output_options
+def command(
+    result_path: Path,
+    keep: int | None,
+    threshold: float | None,
+    out: Path | None,
+    overwrite: bool,
+    overrides: dict[str, str],
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Keep the members of a result of `run` that count, size them anew, verify them, write them as a case.
+
+    Say --keep or --threshold. The sizes are optimised again from those in the result, with only these members; the
+    outcome is computed with a hundredth of the solver's tolerance. In the case that is written each member is a group
+    of its own with its size in its law: `mdstopo simulate` computes its motion without any design.
+    """
+    if (keep is None) == (threshold is None):
+        raise click.UsageError("say --keep or --threshold, one of them")
+    if threshold is not None and not math.isfinite(threshold):
+        raise click.BadParameter(f"{threshold} is no alpha", param_hint="--threshold")
+    from mdstopo.finalize.session import finalize, opened, ready, tied
+    from mdstopo.store.atomic import replace_file
+    from mdstopo.store.errors import StoreError
+    from mdstopo.store.reader import read_result
+
+    output = Output(json=as_json, quiet=quiet)
+    interrupts = Interrupts(quiet)
+    view = read_result(result_path, leave_out=("trajectories", "sensitivities", "optimizer", "iterations"))
+    place = out or result_path.with_suffix(".final.yaml")
+    if place.exists() and not (overwrite and place.is_file()):
+        raise StoreError(f"{place} exists already; it is left as it is")
+    case, alpha = opened(view, overrides)
+    for taken in (result_path, case.path):
+        if taken is not None and place.exists() and taken.exists() and place.samefile(taken):
+            raise StoreError(f"{place}: this is what the new case is made from; choose another place with --out")
+    kept, reduced = ready(case, alpha, keep, threshold)
+    if not view.finished:
+        output.notice(f"{result_path}: the run is not finished ({view.status}); its best design so far is taken")
+    if others := tied(alpha, kept):
+        output.notice(
+            f"{others} more members have the alpha of the smallest one kept: of equal ones the first are kept"
+        )
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StoreError(f"{place}: cannot be written: {error.strerror}") from error
+    with display(quiet) as show:
+        done = finalize(
+            case,
+            alpha,
+            kept,
+            reduced,
+            place=place,
+            head=_head(case, len(kept)),
+            on_iteration=show,
+            stop_requested=interrupts.stop_requested,
+            notify=output.notice,
+        )
+    if done.text:
+        replace_file(place, done.text.encode())
+    _say(output, done, place)
+    output.document(_document(done, place))
+    for warning in (*done.outcome.warnings, *(each for each in map(_trouble, done.columns) if each), *done.told):
+        output.notice(f"warning: {warning}")
+    if not done.text:
+        output.notice(f"{place} is not written: {_why(done)}")
+    return EXIT[done.outcome.status] or (0 if done.text else 1)
+
+
+def _head(case: "Case", count: int) -> str:
+    """Where a case comes from, as comments."""
+    command_line = shlex.join(["mdstopo", *sys.argv[1:]]).replace("\n", " ")
+    return (
+        f"# {count} of the {case.n_design:,} members of {case.name}, sized: {command_line}\n"
+        "# Each is a group, and its law and cost are those of its size: alpha is 1.\n"
+    )
+
+
+def _say(output: Output, done: "Finalized", place: Path) -> None:
+    outcome = done.outcome
+    output.say(f"{done.case.title or done.case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
+    if done.columns:
+        rows = [["", *(column.title for column in done.columns)]]
+        found = [column.found for column in done.columns]
+        names = [objective.name for objective in done.case.objectives]
+        rows += [[name, *(number(each.objectives[name], 9) for each in found)] for name in names]
+        for i, row in enumerate(done.case.constraints):
+            values = (number(float(each.constraints[i]) + row.bound, 9) for each in found)
+            rows.append([_constraint(done.case, i), *values])
+        rows.append(["members", *(str(column.members) for column in done.columns)])
+        output.table(rows)
+    rows = [["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"]]
+    if done.tighter:
+        rows.append(["verified with", done.tighter])
+    if done.difference is not None:
+        rows.append(["the case repeats", f"objectives within {number(done.difference, 2)} of themselves"])
+    if done.text:
+        rows.append(["case", str(place)])
+    output.table(rows)
+
+
+def _constraint(case: "Case", i: int) -> str:
+    """A constraint and its bound in words."""
+    from mdstopo.case.model import VolumeRow
+    from mdstopo.case.units import words
+
+    row = case.constraints[i]
+    if isinstance(row, VolumeRow):
+        what = f"volume of {', '.join(row.groups)}"
+    else:
+        what = f"{row.over_time} {words(row.response)}"
+        what += f", {row.load_case}" if len(case.load_cases) > 1 else ""
+    return f"{what} {_SIGNS[row.sense]} {number(row.bound, 9)}"
+
+
+def _trouble(column: Any) -> str:
+    """What is wrong with the motion of a design, or nothing."""
+    found = column.found
+    return "" if found.status.ok else f"{column.title}: {found.status.value}: {getattr(found, 'message', '')}"
+
+
+def _why(done: "Finalized") -> str:
+    if not done.columns:
+        return "the run was interrupted"
+    if any(not column.found.status.usable for column in done.columns[-2:]):
+        return "the motion of its design cannot be computed"
+    return "all members have alpha = 0"
+
+
+def _document(done: "Finalized", place: Path) -> dict[str, Any]:
+    return {
+        "command": "finalize",
+        "case": done.case.name,
+        "status": str(done.outcome.status),
+        "reason": done.outcome.reason,
+        "designs": [
+            {
+                "name": column.title,
+                "members": column.members,
+                "status": column.found.status.value,
+                "objectives": column.found.objectives,
+                "constraints": column.found.constraints,
+            }
+            for column in done.columns
+        ],
+        "kept": [
+            {"group": group, "member": member, "alpha_before": before, "alpha": after}
+            for (group, member), before, after in zip(
+                done.places, done.before.tolist(), done.alpha.tolist(), strict=True
+            )
+        ],
+        "iterations": done.outcome.iterations,
+        "evaluations": done.outcome.evaluations,
+        "verified_with": done.tighter or None,
+        "difference": done.difference,
+        "warnings": [*done.outcome.warnings, *done.told],
+        "path": str(place) if done.text else None,
+    }

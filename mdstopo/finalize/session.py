@@ -1,0 +1,183 @@
+"""From a result to its final case, each step a verb: keep, size, verify, write, read again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import read_case
+from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.keep import check, check_restricted, chosen, places, restricted
+from mdstopo.finalize.text import text_of
+from mdstopo.scene.refusals import refusals
+from mdstopo.session.callbacks import ignore, never
+from mdstopo.session.combining import even, problem_of
+from mdstopo.session.engine import Evaluation, make_engine
+from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.run import run_session
+from mdstopo.session.starts import first_design
+from mdstopo.status import RunStatus
+from mdstopo.store.errors import StoreError
+from mdstopo.store.reader import ResultView
+from mdstopo.store.stored_case import case_of
+
+TIGHTER = 100.0
+"""By how much the tolerance of the verification is below the case's."""
+TIGHTEST = 1e-13
+"""Tolerances below it are lost in rounding."""
+SHORTER = 10.0
+"""The same for fixed steps: errors of second order fall a hundredfold."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One design, evaluated: its name in the table, how many members it has, and what was found."""
+
+    title: str
+    members: int
+    found: Evaluation
+
+
+@dataclass(frozen=True)
+class Finalized:
+    """What became of a result.
+
+    case: the full one; reduced: with only the members kept. kept (K,): their places among the design members, places:
+    in their groups. before, alpha (K,): their alphas in the result and now. columns: full design, kept, re-optimised,
+    verified. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words. text: the final
+    case, empty where there is none; told: what it cannot say. difference: largest relative one between its objectives
+    and those of the re-optimised design, None where it has none.
+    """
+
+    case: Case
+    reduced: Case
+    kept: IndexArray
+    places: list[tuple[str, int]]
+    before: FloatArray
+    alpha: FloatArray
+    columns: tuple[Column, ...]
+    outcome: Outcome
+    tighter: str
+    text: str
+    told: list[str]
+    difference: float | None
+
+
+def opened(view: ResultView, changes: Mapping[str, str]) -> tuple[Case, FloatArray]:
+    """The case of a run, with further keys set, and its best design (N,). Raises CaseError and StoreError."""
+    if view.kind != "run":
+        raise StoreError(f"{view.path}: a result of `{view.kind}`; finalize takes one of `run`")
+    case = case_of(view, changes)
+    for name, digest in case.files.items():
+        if view.texts.get(f"files/{name}", digest) != digest:
+            raise StoreError(f"{view.path}: the file {name} is no longer the one that the run read")
+    if "design/alpha" not in view.arrays:
+        raise StoreError(f"{view.path}: the run has no design yet")
+    return case, np.squeeze(view.alpha) if view.alpha.ndim > 1 else view.alpha
+
+
+def ready(case: Case, alpha: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:
+    """The members to keep and the case with only these; everything that can be refused is refused here.
+
+    alpha (N,): the design. Raises CaseError and StoreError.
+    """
+    check(case)
+    if not case.is_optimizable:
+        raise StoreError(f"{case.path or case.name}: the case has no objectives to size members for")
+    if alpha.shape != (case.n_design,):
+        raise StoreError(
+            f"{case.path or case.name}: the design has {alpha.size} values; "
+            f"the case has {case.n_design} design variables"
+        )
+    kept = chosen(alpha, keep, threshold)
+    if not len(kept):
+        raise StoreError(f"no member has alpha of {threshold:g} or more; the largest is {alpha.max():.6g}")
+    reduced = restricted(case, kept)
+    check_restricted(reduced)
+    content_of(case)
+    return kept, reduced
+
+
+def tied(alpha: FloatArray, kept: IndexArray) -> int:
+    """How many members that are not kept have as large an alpha as the smallest that is."""
+    least = alpha[kept].min()
+    return int(np.count_nonzero(alpha >= least)) - len(kept)
+
+
+def finalize(
+    case: Case,
+    alpha: FloatArray,
+    kept: IndexArray,
+    reduced: Case,
+    *,
+    place: Path,
+    head: str = "",
+    on_iteration: Callable[[Progress], None] = ignore,
+    stop_requested: Callable[[], bool] = never,
+    notify: Callable[[str], None] = ignore,
+) -> Finalized:
+    """Re-optimise the sizes of the members kept, verify them, and make the text of the final case.
+
+    case, reduced, kept: as `ready` gave them; alpha (N,): the design. place: where the text is going to stand. head:
+    its first lines, comments. The text is empty where the run was interrupted or its design cannot be computed.
+    """
+    before = alpha[kept]
+    outcome = run_session(
+        reduced, initial=before, on_iteration=on_iteration, stop_requested=stop_requested, notify=notify
+    )
+    engine = make_engine(reduced)
+    sizes = first_design(reduced, problem_of(engine, even(reduced)), outcome.alpha)[1]
+    own = places(case, kept)
+    if outcome.status is RunStatus.INTERRUPTED:
+        return Finalized(case, reduced, kept, own, before, sizes, (), outcome, "", "", [], None)
+    tighter, words = _tighter(reduced)
+    count = len(kept)
+    columns = (
+        Column("full design", case.n_design, make_engine(case).evaluate(alpha, gradient=False)),
+        Column("kept as they were", count, engine.evaluate(before, gradient=False)),
+        Column("re-optimised", count, engine.evaluate(sizes, gradient=False)),
+        Column("verified", count, make_engine(tighter).evaluate(sizes, gradient=False)),
+    )
+    text, difference = "", None
+    told: list[str] = []
+    there = bool(np.any(sizes**reduced.power > 0.0))
+    if there and columns[-1].found.status.usable and columns[-2].found.status.usable:
+        content, told = final_content(content_of(case), reduced, own, sizes)
+        text = head + text_of(content)
+        difference = _difference(_read(text, place), columns[-2].found)
+    return Finalized(case, reduced, kept, own, before, sizes, columns, outcome, words, text, told, difference)
+
+
+def _tighter(case: Case) -> tuple[Case, str]:
+    """The case with a hundredth of its errors, and how."""
+    solver = case.solver
+    if solver.step is not None:
+        step = solver.step / SHORTER
+        return replace(case, solver=replace(solver, step=step)), f"step {step:g} s"
+    tolerance = max(solver.tolerance / TIGHTER, min(solver.tolerance, TIGHTEST))
+    return replace(case, solver=replace(solver, tolerance=tolerance)), f"tolerance {tolerance:g}"
+
+
+def _read(text: str, place: Path) -> Case:
+    """The final case as a user will read it. Raises CaseError where it is none."""
+    case = read_case(text, path=place)
+    refused = refusals(case)
+    if refused:
+        raise CaseError(refused, str(place))
+    return case
+
+
+def _difference(case: Case, found: Evaluation) -> float | None:
+    """The largest relative difference between the objectives of a case at its own design and those found."""
+    if not case.objectives:
+        return None
+    again = make_engine(case).evaluate(case.start, gradient=False).objectives
+    pairs = np.array([[value, found.objectives[name]] for name, value in again.items()])
+    size = np.maximum(np.abs(pairs).max(axis=1), np.finfo(np.float64).tiny)
+    return float((np.abs(pairs[:, 0] - pairs[:, 1]) / size).max())
