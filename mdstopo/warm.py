@@ -7,6 +7,7 @@ missing is compiled here when it is called.
 """
 
 import contextlib
+import gc
 import subprocess
 import sys
 from pathlib import Path
@@ -94,4 +95,5 @@ def _tiny(integrator: str) -> "Case":
 
 
 if __name__ == "__main__":
+    gc.disable()  # as in `session.ready`
     compile_looking(sys.argv[1])

@@ -107,10 +107,12 @@ def _marker(case: Case) -> Path:
 
 
 def _main() -> None:
+    import gc
     import signal
 
     from mdstopo.session.combining import even, problem_of
 
+    gc.disable()  # what the compiler makes lives on: looking through it again and again takes a tenth of the time
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
     engine = make_engine(case)
