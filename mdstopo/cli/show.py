@@ -86,7 +86,10 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     columns = view.under("iterations")
     names = objective_names(view)
     total = len(columns["combined"])
-    output.say(f"{total - 1} iterations, {int(columns['evaluations'][-1])} evaluations")
+    # each stage begins with a row that is no iteration
+    stages = int(columns["stage"][-1]) + 1 if "stage" in columns else 1
+    within = f" in {stages} stages" if stages > 1 else ""
+    output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
     rows = [["iterate", *names, "constraint", "change", "evaluations", "time"]]
     for k in condensed(total):
         worst = columns["constraints"][k].max(initial=float("-inf")) if columns["constraints"].size else float("nan")

@@ -220,6 +220,10 @@ def test_commands_tell_the_stages_and_refuse_with_status_2(tmp_path):
     told = call("check", str(place))
     assert "2 stages of a run, by design.power" in told.stdout, told.stderr
     assert json.loads(call("check", "--json", str(place)).stdout)["stages"] == [{"web": 1.0}, {"web": 3.0}]
+    made = str(tmp_path / "web.h5")
+    done = json.loads(call("run", "--json", str(place), "--out", made).stdout)
+    counted = f"{done['iterations']} iterations in 2 stages, {done['evaluations']} evaluations"
+    assert counted in call("show", made).stdout
     refused = call("check", str(place), "--set", "design.power=[3, 1]")
     assert refused.returncode == 2
     assert "design.power[1]" in refused.stderr
