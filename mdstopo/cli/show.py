@@ -11,6 +11,8 @@ from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.uncertain import say_result
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -86,8 +88,7 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     columns = view.under("iterations")
     names = objective_names(view)
     total = len(columns["combined"])
-    # each stage begins with a row that is no iteration
-    stages = int(columns["stage"][-1]) + 1 if "stage" in columns else 1
+    stages = _stages(columns)
     within = f" in {stages} stages" if stages > 1 else ""
     output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
     rows = [["iterate", *names, "constraint", "change", "evaluations", "time"]]
@@ -104,6 +105,11 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
             ]
         )
     output.table(rows)
+
+
+def _stages(columns: "Mapping[str, NDArray[Any]]") -> int:
+    """How many stages there are so far: each begins with a row that is no iteration."""
+    return int(columns["stage"][-1]) + 1 if "stage" in columns else 1
 
 
 def _say_starts(output: Output, view: "ResultView") -> None:
@@ -202,7 +208,7 @@ def _document(view: "ResultView") -> dict[str, Any]:
         }
     if view.kind == "run" and "iterations/combined" in view.arrays:
         columns = view.under("iterations")
-        content["iterations"] = len(columns["combined"]) - 1
+        content["iterations"] = len(columns["combined"]) - _stages(columns)
         content["evaluations"] = int(columns["evaluations"][-1])
         content["objectives"] = {name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))}
     if variables := view.under("design/variables"):

@@ -224,6 +224,7 @@ def test_commands_tell_the_stages_and_refuse_with_status_2(tmp_path):
     done = json.loads(call("run", "--json", str(place), "--out", made).stdout)
     counted = f"{done['iterations']} iterations in 2 stages, {done['evaluations']} evaluations"
     assert counted in call("show", made).stdout
+    assert json.loads(call("show", "--json", made).stdout)["iterations"] == done["iterations"]
     refused = call("check", str(place), "--set", "design.power=[3, 1]")
     assert refused.returncode == 2
     assert "design.power[1]" in refused.stderr
