@@ -14,6 +14,7 @@ from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema import SENSES
+from mdstopo.case.stages import check_powers, lowest, powers_of
 from mdstopo.case.variables import prices
 from mdstopo.case.volume import check_feasible
 from mdstopo.case.words import inside, listed, number_text, shown
@@ -42,11 +43,13 @@ def apply_design(top: Fields, groups: dict[str, MemberGroup], reading: Reading) 
                 path = inside(inside(design.path, key), name)
                 reading.mistake(path, f"{shown(name)} has `design: false`: its alpha is 1 and no variable")
                 good = False
+    good &= check_powers(design, top, reading)
     numbers = {}
     for name, fields in sections.items():
         if fields is BAD or fields["design"] is not True:
             continue
         values = {key: _for_group(design[key], name, key) for key in DESIGN_KEYS}
+        values |= powers_of(values["power"])
         numbers[name] = values
         good &= _check_numbers(values, name, design, reading)
     if not good:
@@ -62,7 +65,8 @@ def _for_group(stated: Any, group: str, key: str) -> Any:
 
 def _check_numbers(values: dict[str, Any], group: str, design: Fields, reading: Reading) -> bool:
     """Whether bounds, start and power of one group go together; notes what does not."""
-    initial, lower, upper, power = (values[key] for key in DESIGN_KEYS)
+    initial, lower, upper = (values[key] for key in DESIGN_KEYS[:-1])
+    power = lowest(values)
 
     def tell(key: str, message: str) -> None:
         path = inside(design.path, key)

@@ -55,6 +55,7 @@ class MemberGroup(Value):
     from_index, to_index (M,): which of them each member joins. length (M,): initial lengths in m, > 0.
     laws: forces that add. cost (M,): V_i. design: whether members are design variables; where not, alpha = 1.
     initial, lower, upper, power: the design's numbers for this group (power is mu of Eq. 12).
+    powers: where an optimisation goes from one power to the next: all of them, the last one being `power`.
     """
 
     name: str
@@ -74,6 +75,7 @@ class MemberGroup(Value):
     lower: float = 0.001
     upper: float = 1.0
     power: float = 1.0
+    powers: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("from_local", "to_local", "from_world", "to_world", "length", "cost"):

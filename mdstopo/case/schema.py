@@ -42,6 +42,20 @@ def _design(name: str, number: Number, doc: str, default: float) -> Key:
     return Key(name, kind, doc + "; a number or {group: number}", default=default)
 
 
+_POWERS = ListOf(POSITIVE, 1, "powers")
+_OF_A_GROUP = ByShape("a number or a list of numbers", scalar=POSITIVE, sequence=_POWERS)
+_POWER = Key(
+    "power",
+    ByShape(
+        "a number, a list of numbers or {group: number or list}",
+        scalar=POSITIVE,
+        sequence=_POWERS,
+        mapping=ByName("member group", _OF_A_GROUP, "number or list"),
+    ),
+    "mu of Eq. 12: a member's force is alpha^mu times its law's; a number, a list or {group: number or list}. `run` "
+    "goes through a list, which rises, from one optimum to the next; everything else takes its last",
+    default=1.0,
+)
 _VARIABLE = Record(
     "a design variable",
     (
@@ -85,7 +99,7 @@ DESIGN = Record(
         _design("initial", Number(minimum=0, maximum=1), "start of the design variables, within the bounds", 0.1),
         _design("lower", Number(minimum=0, maximum=1), "lower bound; above 0 where the power is below 1", 0.001),
         _design("upper", Number(minimum=0, maximum=1), "upper bound", 1.0),
-        _design("power", POSITIVE, "mu of Eq. 12: a member's force is alpha^mu times its law's", 1.0),
+        _POWER,
         Key("shared", ListOf(GROUP, what="member groups"), "groups whose members all have one alpha", default=()),
         Key(
             "mirrored",

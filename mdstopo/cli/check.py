@@ -42,6 +42,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     _say_joints(output, case)
     _say_members(output, case)
     _say_variables(output, case)
+    stages = _say_stages(output, case)
     sums = totals(case)
     output.say("totals")
     output.table([[name, f"{number(value)} {unit}".rstrip()] for name, value, unit in sums])
@@ -57,6 +58,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "members": case.n_members,
         "design_variables": case.n_design,
         "variables": {each.name: {"values": each.count, "initial": each.initial} for each in case.variables},
+        **({"stages": stages} if stages else {}),
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
         "objectives": [objective.name for objective in case.objectives],
         "optimizable": case.is_optimizable and not refused,
@@ -129,6 +131,20 @@ def _say_members(output: Output, case: "Case") -> None:
             ]
         )
     output.table(rows)
+
+
+def _say_stages(output: Output, case: "Case") -> list[dict[str, float]]:
+    """The powers of each stage that a run goes through, by group; nothing where there is one."""
+    from mdstopo.case.stages import stage_case, stage_count
+
+    count = stage_count(case)
+    if count == 1:
+        return []
+    stages = [{group.name: group.power for group in stage_case(case, k).design_groups} for k in range(count)]
+    output.say(f"{count} stages of a run, by design.power")
+    rows = [[str(k + 1), *(number(power) for power in powers.values())] for k, powers in enumerate(stages)]
+    output.table([["stage", *stages[0]], *rows])
+    return stages
 
 
 def _say_variables(output: Output, case: "Case") -> None:

@@ -11,6 +11,8 @@ from mdstopo.cli.output import Output, duration, number
 from mdstopo.cli.uncertain import say_result
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -86,7 +88,9 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     columns = view.under("iterations")
     names = objective_names(view)
     total = len(columns["combined"])
-    output.say(f"{total - 1} iterations, {int(columns['evaluations'][-1])} evaluations")
+    stages = _stages(columns)
+    within = f" in {stages} stages" if stages > 1 else ""
+    output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
     rows = [["iterate", *names, "constraint", "change", "evaluations", "time"]]
     for k in condensed(total):
         worst = columns["constraints"][k].max(initial=float("-inf")) if columns["constraints"].size else float("nan")
@@ -101,6 +105,11 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
             ]
         )
     output.table(rows)
+
+
+def _stages(columns: "Mapping[str, NDArray[Any]]") -> int:
+    """How many stages there are so far: each begins with a row that is no iteration."""
+    return int(columns["stage"][-1]) + 1 if "stage" in columns else 1
 
 
 def _say_starts(output: Output, view: "ResultView") -> None:
@@ -199,7 +208,7 @@ def _document(view: "ResultView") -> dict[str, Any]:
         }
     if view.kind == "run" and "iterations/combined" in view.arrays:
         columns = view.under("iterations")
-        content["iterations"] = len(columns["combined"]) - 1
+        content["iterations"] = len(columns["combined"]) - _stages(columns)
         content["evaluations"] = int(columns["evaluations"][-1])
         content["objectives"] = {name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))}
     if variables := view.under("design/variables"):

@@ -24,14 +24,14 @@ def chosen(alpha: FloatArray, keep: int | None, threshold: float | None) -> Inde
 def restricted(case: Case, kept: IndexArray) -> Case:
     """The case with only the design members at `kept` (K,), rising; groups that lose all of theirs are gone.
 
-    Bounds of volume rows stay the numbers that they are. It has one start.
+    Bounds of volume rows stay the numbers that they are. It has one start, and of several powers the last.
     """
     groups = []
     for group, own in _with_own(case, kept):
         if not group.design:
             groups.append(group)
         elif len(own):
-            groups.append(_part(group, own))
+            groups.append(replace(_part(group, own), powers=()))
     names = {group.name for group in groups}
     rows = tuple(
         replace(row, groups=tuple(n for n in row.groups if n in names), coefficients=row.coefficients[kept])

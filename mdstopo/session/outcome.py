@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.state import State
+from mdstopo.session.stages import iterations_of
 from mdstopo.status import RunStatus
 
 if TYPE_CHECKING:
@@ -22,9 +23,9 @@ Floats = NDArray[np.float64]
 class Progress:
     """One iteration of one start.
 
-    start, starts: which of how many, from 0. objective: U at this design (NaN where its evaluation failed);
-    best: the lowest so far; violation: largest excess over a constraint, in the constraint's unit; change:
-    largest |change of alpha|; evaluations: of this start so far.
+    start, starts: which of how many, from 0. iteration: of all stages of this start, as max_iterations. objective: U at
+    this design (NaN where its evaluation failed); best: the lowest so far in this stage; violation: largest excess over
+    a constraint, in the constraint's unit; change: largest |change of alpha|; evaluations: of this start so far.
     """
 
     start: int
@@ -45,7 +46,7 @@ class Progress:
         return cls(
             start=start,
             starts=starts,
-            iteration=state.iteration,
+            iteration=iterations_of(state),
             max_iterations=max_iterations,
             objective=float(history.objective[-1]),
             best=float(state.best_objective),
@@ -60,13 +61,13 @@ class Outcome:
     """A run that has ended, or was stopped.
 
     alpha (N,): the best design. objectives: raw G there, by name. initial_objectives: at the best start's
-    first design. peaks: (time, value) of all that compete at the best design, highest first; empty for a run
-    that was stopped. constraints (n_con,): h_j - h_0j there. combined, utopia, maxima: U of several objectives and what
-    it is made with, else None. history: columns by the names of the file's `iterations/...`, K + 1 rows. states: each
-    start's last state, None where it has not begun; best_start: whose result this is. evaluations,
-    iterations: of all starts. seconds: wall time of the iterations in this process; compile_seconds: of
-    getting ready, loading or compiling kernels. conclusion: nominal and robust values and the fresh sample's, of an
-    uncertain case. variables: the best design's values, by name, in the parameters' units.
+    first design, of the last stage where there are several. peaks: (time, value) of all that compete at the best
+    design, highest first; empty for a run that was stopped. constraints (n_con,): h_j - h_0j there. combined, utopia,
+    maxima: U of several objectives and what it is made with, else None. history: columns by the names of the file's
+    `iterations/...`, K + 1 rows. states: each start's last state, None where it has not begun; best_start: whose result
+    this is. evaluations, iterations: of all starts. seconds: wall time of the iterations in this process;
+    compile_seconds: of getting ready, loading or compiling kernels. conclusion: nominal and robust values and the fresh
+    sample's, of an uncertain case. variables: the best design's values, by name, in the parameters' units.
     """
 
     case: Case

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case, VolumeRow
 from mdstopo.optimizer.starts import best_run
 from mdstopo.optimizer.state import State
+from mdstopo.session.stages import first_row, furthest, is_done
 from mdstopo.store.contents import Datasets, design_part
 from mdstopo.store.errors import DamagedError
 from mdstopo.store.reader import ResultView
@@ -20,7 +21,7 @@ def best_of(case: Case, states: Sequence[State | None]) -> int | None:
     """Index of the start whose result counts; None where none has begun."""
     if all(state is None for state in states):
         return None
-    return best_run(states, case.optimizer.tolerance)
+    return best_run(furthest(list(states)), case.optimizer.tolerance)
 
 
 def iteration_columns(case: Case, state: State, before: int = 0, final: Floats | None = None) -> dict[str, Array]:
@@ -40,7 +41,8 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
     objectives = np.array(columns.get("info/objectives", unknown), dtype=np.float64).reshape(rows, -1)
     for row, values in zip((best_row(state), rows - 1), final if final is not None else (), strict=False):
         objectives[row] = np.where(np.isnan(objectives[row]), values, objectives[row])
-    return {
+    stages = {"stage": columns["info/stage"].astype(np.int64)} if "info/stage" in columns else {}
+    return stages | {
         "objectives": objectives,
         "peak_time": columns.get("info/peak_time", unknown).reshape(rows, -1),
         "constraints": constraints,
@@ -55,9 +57,10 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
 
 def best_row(state: State) -> int:
     """The iterate that is the best design."""
-    objective = np.array(state.history.objective)
+    first = first_row(state)
+    objective = np.array(state.history.objective[first:])
     found = np.flatnonzero(objective == state.best_objective)
-    return int(found[0]) if len(found) else 0
+    return first + (int(found[0]) if len(found) else 0)
 
 
 def run_part(case: Case, states: Sequence[State | None], before: int = 0, final: Floats | None = None) -> Datasets:
@@ -86,7 +89,7 @@ def _starts_part(case: Case, states: Sequence[State | None]) -> Datasets:
     designs = np.full((len(states), space.length), np.nan)
     words = []
     for index, state in enumerate(states):
-        words.append("running" if state is None else str(state.status))
+        words.append("running" if state is None or not is_done(case, state) else str(state.status))
         if state is not None:
             objectives[index] = iteration_columns(case, state)["objectives"][best_row(state)]
             designs[index] = space.expand(state.best_alpha)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.case.stages import stage_count
 from mdstopo.front.tasks import StoppedError
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
@@ -24,7 +25,8 @@ from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
-from mdstopo.session.starts import NOTHING_VARIES, is_moved, replaced, run_start, unshared
+from mdstopo.session.stages import first_row, is_done, iterations_of, run_stages, stage_of
+from mdstopo.session.starts import NOTHING_VARIES, is_moved, replaced, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers, replace_file
@@ -263,9 +265,11 @@ class _Run:
         size = 8.0 * self.case.space.size * _STATE_ARRAYS * chosen.starts
         saver = None if path is None else Checkpointer(lambda: self.checkpoint(path), size / _DISK_SPEED)
 
+        most = chosen.max_iterations * stage_count(self.case)
+
         def keep(index: int, state: State) -> None:
             self.states[index] = state
-            self.on_iteration(Progress.of(state, index, chosen.starts, chosen.max_iterations))
+            self.on_iteration(Progress.of(state, index, chosen.starts, most))
             if saver is not None:
                 saver.offer()
 
@@ -281,15 +285,18 @@ class _Run:
             if self.stop_requested():
                 break
             state = self.states[index]
-            self.states[index] = run_start(self.case, problem, index, state, self.initial, keep, self.stop_requested)
+            self.states[index] = run_stages(
+                self.case, make, problem, index, state, self.initial, keep, self.stop_requested
+            )
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""
-        if any(state is None or state.running for state in self.states):
+        if any(state is None or not is_done(self.case, state) for state in self.states):
             return RunStatus.INTERRUPTED, "stopped on request; the last iteration is saved"
         state = self.states[best]
         assert state is not None
-        return state.status, state.reason
+        stage, count = stage_of(state) + 1, stage_count(self.case)
+        return state.status, state.reason if stage == count else f"stage {stage} of {count}: {state.reason}"
 
     def complete(self, engine: Engine, best: int) -> None:
         """Add what only the final design has: its motion, its sensitivities, advice."""
@@ -404,7 +411,7 @@ class _Run:
             alpha=design[: space.n_alpha],
             variables=space.named(design),
             objectives=dict(zip(names, columns["objectives"][best_row(state)].tolist(), strict=True)),
-            initial_objectives=dict(zip(names, columns["objectives"][0].tolist(), strict=True)),
+            initial_objectives=dict(zip(names, columns["objectives"][first_row(state)].tolist(), strict=True)),
             peaks=self.peaks,
             constraints=columns["constraints"][best_row(state)] if self.constraints is None else self.constraints,
             utopia=self.combining.utopia,
@@ -418,7 +425,7 @@ class _Run:
             states=tuple(self.states),
             best_start=best,
             evaluations=before + sum(int(each.evaluations) for each in begun),
-            iterations=sum(int(each.iteration) for each in begun),
+            iterations=sum(iterations_of(each) for each in begun),
             seconds=seconds,
             compile_seconds=compile_seconds,
             integrator=engine.integrator,

@@ -11,7 +11,7 @@ from typing import IO, Any
 from mdstopo.optimizer.state import State
 from mdstopo.session.combining import even, problem_of
 from mdstopo.session.ready import get_ready
-from mdstopo.session.starts import run_start
+from mdstopo.session.stages import run_stages
 from mdstopo.store.checkpoint import Checkpointer
 
 
@@ -34,7 +34,7 @@ def main() -> None:
         index, arrays = task
         sender = _Sender(output)
         state = None if arrays is None else State.from_arrays(arrays)
-        last = run_start(case, problem, index, state, initial, sender.keep, stopped.is_set)
+        last = run_stages(case, make_engine, problem, index, state, initial, sender.keep, stopped.is_set)
         sender.send("done", index, last)
         if stopped.is_set():
             return

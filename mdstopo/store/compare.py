@@ -22,7 +22,7 @@ _IGNORED: dict[type, set[str]] = {
     LoadCase: {"bodies"},  # follow from the case's bodies and the motions
 }
 # What later versions added, and left out by most: files from before know nothing of it.
-_ADDED = {"shared", "mirrored", "variables", "prices"}
+_ADDED = {"shared", "mirrored", "variables", "prices", "powers"}
 _DESIGN = {"initial", "lower", "upper", "power"}
 _MAY_DIFFER = {"optimizer.max_iterations", "optimizer.tolerance", "optimizer.starts"}
 
@@ -89,6 +89,8 @@ def _text(value: Any) -> str:
 
 def _key(path: str, field: str, owner: Any) -> str:
     """The file's key for a field, where the two differ."""
+    if isinstance(owner, MemberGroup) and field == "powers":
+        return f"design.power.{owner.name}"  # in the place of the last of them
     if isinstance(owner, MemberGroup) and field in _DESIGN:
         return f"design.{field}.{owner.name}"
     if isinstance(owner, MemberGroup) and field == "laws" and len(owner.laws) == 1:

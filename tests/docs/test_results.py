@@ -34,6 +34,7 @@ objectives:
 combine: {weights: {E: 1, X: 1}, normalize: false}
 optimizer: {starts: 2, max_iterations: 1}
 """
+STAGED = VARIED.replace("  X: ", "#").replace("combine:", "#").replace("design: {", "design: {power: [1, 2], ")
 
 UNCERTAIN = """\
 uncertainty: {parameters: {bodies.cargo.mass: {normal: {deviation: 5}}}, sample: 4, validation: 30}
@@ -64,6 +65,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     (folder / "windy.yaml").write_text(boat.text + UNCERTAIN, encoding="utf-8")
     (folder / "jointed.yaml").write_text(JOINTED, encoding="utf-8")
     (folder / "varied.yaml").write_text(VARIED, encoding="utf-8")
+    (folder / "staged.yaml").write_text(STAGED, encoding="utf-8")
     (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
     for command in (
         "simulate jointed.yaml",
@@ -74,6 +76,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "gradient boat.yaml --history --differences --members 2",
         "pareto boat.yaml --points 2 --starts 1",
         "run varied.yaml",
+        "run staged.yaml",
         "gradient varied.yaml --history --differences",
         "pareto varied.yaml --points 2 --starts 1",
         "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
