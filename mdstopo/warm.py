@@ -77,6 +77,13 @@ class Beside:
             if compiled:
                 mark_compiled(self.integrator)
 
+    def __del__(self) -> None:
+        """Nobody has asked for what the other process compiles: an evaluator that was never used."""
+        child = getattr(self, "_child", None)
+        if child is not None:
+            child.kill()
+            child.wait()
+
 
 def compile_looking(integrator: str) -> None:
     """Compile here what looks at the steps of an integrator: the work of the other process."""
