@@ -6,17 +6,21 @@ from pathlib import Path
 
 
 def description() -> str:
-    """One sentence: processor, cores, system, versions, how busy the machine was."""
+    """One sentence: `system`, and how busy the machine was."""
+    return f"{system()}; load before the run {os.getloadavg()[0]:.1f}"
+
+
+def system() -> str:
+    """Processor, cores, operating system, versions."""
     import numba
     import numpy
 
     from mdstopo import __version__
 
-    load = os.getloadavg()[0]
     return (
         f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; "
         f"Python {platform.python_version()}, NumPy {numpy.__version__}, Numba {numba.__version__}, "
-        f"mdstopo {__version__}; load before the run {load:.1f}"
+        f"mdstopo {__version__}"
     )
 
 

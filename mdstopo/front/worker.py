@@ -3,23 +3,19 @@
 import os
 import pickle
 import queue
-import signal
-import sys
 import threading
 from typing import IO, Any
+
+from mdstopo.session.crew import streams
 
 
 def main() -> None:
     """Read what all pieces have in common, then one piece after another, until the input is closed."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
+    source, output = streams()
     from mdstopo.front.jobs import perform
 
-    # Whatever prints by mistake must not disturb the messages.
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
     inbox: queue.Queue[Any] = queue.Queue()
-    threading.Thread(target=_listen, args=(sys.stdin.buffer, inbox), daemon=True).start()
+    threading.Thread(target=_listen, args=(source, inbox), daemon=True).start()
     setting = inbox.get()
     try:
         while True:

@@ -2,8 +2,6 @@
 
 import os
 import pickle
-import signal
-import sys
 from typing import Any
 
 from mdstopo.engine import Evaluator
@@ -12,17 +10,13 @@ from mdstopo.robust.points import case_at, nominal_case
 from mdstopo.robust.sample import design_sample
 from mdstopo.robust.trial import tried
 from mdstopo.session.combining import even, problem_of
+from mdstopo.session.crew import streams
 from mdstopo.session.ready import get_ready
 
 
 def main() -> None:
     """Read the case and the share, then one request after another, until the input is closed."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    # Whatever prints by mistake must not disturb the messages.
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    source = sys.stdin.buffer
+    source, output = streams()
     case, share = pickle.load(source)
     nominal = nominal_case(case)
     engine = Evaluator(nominal)

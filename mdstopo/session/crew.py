@@ -7,6 +7,7 @@ outlive a killed parent.
 import os
 import pickle
 import queue
+import signal
 import subprocess
 import sys
 import threading
@@ -17,6 +18,16 @@ from typing import IO, Any
 def cores() -> int:
     """How many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def streams() -> tuple[IO[bytes], IO[bytes]]:
+    """In a worker: where messages come from and where answers go. Signals are for the parent to act on."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    # Whatever prints by mistake must not disturb the messages.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    return sys.stdin.buffer, answers
 
 
 class WorkerProcess:

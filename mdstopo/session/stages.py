@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_case, stage_count
-from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.optimizer.problem import Problem, Sample
 from mdstopo.optimizer.state import History, State
 from mdstopo.session.engine import MakeEngine
 from mdstopo.session.starts import make_optimizer, run_start
@@ -112,27 +112,14 @@ class _Marked:
     """A problem whose samples say which stage they belong to."""
 
     def __init__(self, problem: Problem, stage: int) -> None:
+        self.initial, self.linear = problem.initial, problem.linear
+        self.lower, self.upper = problem.lower, problem.upper
         self._problem = problem
         self._stage = float(stage)
 
     def __getattr__(self, name: str) -> Any:
+        """What only some problems have."""
         return getattr(self._problem, name)
-
-    @property
-    def initial(self) -> Floats:
-        return self._problem.initial
-
-    @property
-    def lower(self) -> Floats:
-        return self._problem.lower
-
-    @property
-    def upper(self) -> Floats:
-        return self._problem.upper
-
-    @property
-    def linear(self) -> LinearRows:
-        return self._problem.linear
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         sample = self._problem.evaluate(x, gradient)

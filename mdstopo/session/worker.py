@@ -3,13 +3,12 @@
 import os
 import pickle
 import queue
-import signal
-import sys
 import threading
 from typing import IO, Any
 
 from mdstopo.optimizer.state import State
 from mdstopo.session.combining import even, problem_of
+from mdstopo.session.crew import streams
 from mdstopo.session.ready import get_ready
 from mdstopo.session.stages import run_stages
 from mdstopo.store.checkpoint import Checkpointer
@@ -17,12 +16,7 @@ from mdstopo.store.checkpoint import Checkpointer
 
 def main() -> None:
     """Read the case, then one start after another, until the input is closed."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.SIG_IGN)
-    # Whatever prints by mistake must not disturb the messages.
-    output = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)
-    source = sys.stdin.buffer
+    source, output = streams()
     case, initial, make_engine, scalarisation = pickle.load(source)
     inbox: queue.Queue[Any] = queue.Queue()
     stopped = threading.Event()

@@ -1,9 +1,8 @@
 """The outcomes as the documentation shows them."""
 
-import platform
 from collections.abc import Sequence
-from pathlib import Path
 
+from mdstopo.bench.machine import system
 from mdstopo.stress.registry import FAMILIES, scenes_of
 from mdstopo.stress.scene import Outcome
 
@@ -19,7 +18,7 @@ def markdown_of(outcomes: Sequence[Outcome]) -> str:
             head = ["| scene | integrator | what is compared | outcome | error | bound | s |", "|" + " --- |" * 7]
             parts += [f"### {words[0].upper()}{words[1:]} {{ #stress-{family} }}", "", *head, *rows, ""]
     right = sum(each.ok for each in outcomes)
-    parts += [f"{right} of {len(outcomes)} scenes end as they have to. Computed on: {_machine()}."]
+    parts += [f"{right} of {len(outcomes)} scenes end as they have to. Computed on: {system()}."]
     return "\n".join(parts)
 
 
@@ -42,27 +41,3 @@ def _short(message: str) -> str:
     """A message in a cell: one line, without the place in a file that nobody has."""
     line = " ".join(message.split())
     return line.removeprefix("<text>:")
-
-
-def _machine() -> str:
-    import os
-
-    import numba
-    import numpy
-
-    from mdstopo import __version__
-
-    return (
-        f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; "
-        f"Python {platform.python_version()}, NumPy {numpy.__version__}, Numba {numba.__version__}, "
-        f"mdstopo {__version__}"
-    )
-
-
-def _processor() -> str:
-    information = Path("/proc/cpuinfo")
-    if information.exists():
-        for line in information.read_text().splitlines():
-            if line.startswith("model name"):
-                return " ".join(line.partition(":")[2].split())
-    return platform.processor() or "an unknown processor"

@@ -33,6 +33,27 @@ def slopes(case, alpha, direction, h):
     return total
 
 
+def check_adjoint(case, h, bound):
+    """The adjoint gradients of a design are the slopes along two random directions, to a share of the largest part."""
+    alpha = design_of(case)
+    found = mdstopo.evaluate(case, alpha)
+    assert found.status.ok, found.message
+    rng = np.random.default_rng(1)
+    for _ in range(2):
+        direction = rng.normal(size=case.n_design) * alpha
+        for objective, slope in slopes(case, alpha, direction, h).items():
+            gradient = found.gradients[objective]
+            assert abs(slope - gradient @ direction) <= bound * np.abs(gradient * direction).max(), objective
+
+
+def check_direct(case):
+    """Direct and adjoint gradients of a design agree to 1e-9 of the largest."""
+    alpha = design_of(case)
+    adjoint, direct = (mdstopo.evaluate(case, alpha, method=method) for method in ("adjoint", "direct"))
+    for objective, gradient in adjoint.gradients.items():
+        assert np.abs(direct.gradients[objective] - gradient).max() <= 1e-9 * np.abs(gradient).max(), objective
+
+
 def simulate_text(text, **solver):
     """The trajectory of a case given as text."""
     from mdstopo.case.reader import read_case

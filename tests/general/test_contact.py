@@ -13,7 +13,7 @@ from mdstopo.general.contact import add_contacts
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.mechanics.contact import CLOSED
 from mdstopo.status import Status
-from tests.general.support import design_of, load, simulate_text, slopes
+from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text
 
 G, ANGLE, K = 9.8, 0.4, 2.0e5
 # a block that does not turn, on two feet, on a slope that falls to the right; it begins at its depth at rest
@@ -208,25 +208,12 @@ def test_tangents_are_the_slopes_of_the_forces():
 
 
 def test_the_adjoint_is_the_derivative_of_what_is_computed():
-    case = load("crate", tolerance=1e-11)
-    alpha = design_of(case)
-    found = mdstopo.evaluate(case, alpha)
-    assert found.status.ok, found.message
-    rng = np.random.default_rng(1)
-    for _ in range(2):
-        direction = rng.normal(size=case.n_design) * alpha
-        for objective, slope_of in slopes(case, alpha, direction, 3e-6).items():
-            gradient = found.gradients[objective]
-            assert abs(slope_of - gradient @ direction) <= 1e-6 * np.abs(gradient * direction).max(), objective
+    check_adjoint(load("crate", tolerance=1e-11), 3e-6, 1e-6)
 
 
 @pytest.mark.parametrize("solver", [{"tolerance": 1e-10}, {"integrator": "generalized_alpha", "step": 0.001}])
 def test_direct_and_adjoint_agree(solver):
-    case = load("crate", **solver)
-    alpha = design_of(case)
-    adjoint, direct = (mdstopo.evaluate(case, alpha, method=method) for method in ("adjoint", "direct"))
-    for objective, gradient in adjoint.gradients.items():
-        assert np.abs(direct.gradients[objective] - gradient).max() <= 1e-9 * np.abs(gradient).max(), objective
+    check_direct(load("crate", **solver))
 
 
 def test_generalized_alpha_comes_to_the_same_motion():

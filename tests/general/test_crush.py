@@ -12,7 +12,7 @@ from mdstopo.case.model import CrushLaw
 from mdstopo.case.reader import read_case
 from mdstopo.mechanics.laws import crush, table
 from mdstopo.status import Status
-from tests.general.support import design_of, load, simulate_text, slopes
+from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text, slopes
 
 OPEN, ELASTIC, CRUSHING = crush.OPEN, crush.ELASTIC, crush.CRUSHING
 
@@ -234,25 +234,12 @@ def test_a_case_that_begins_beyond_the_plateau_is_crushed_already():
 
 @pytest.mark.parametrize("solver", [{"tolerance": 1e-11}], ids=["runge_kutta"])
 def test_the_adjoint_is_the_derivative_of_what_is_computed(solver):
-    case = load("crash", **solver)
-    alpha = design_of(case)
-    found = mdstopo.evaluate(case, alpha)
-    assert found.status.ok, found.message
-    rng = np.random.default_rng(1)
-    for _ in range(2):
-        direction = rng.normal(size=case.n_design) * alpha
-        for objective, slope in slopes(case, alpha, direction, 3e-6).items():
-            gradient = found.gradients[objective]
-            assert abs(slope - gradient @ direction) <= 1e-6 * np.abs(gradient * direction).max(), objective
+    check_adjoint(load("crash", **solver), 3e-6, 1e-6)
 
 
 @pytest.mark.parametrize("solver", [{"tolerance": 1e-10}, {"integrator": "generalized_alpha", "step": 0.001}])
 def test_direct_and_adjoint_agree(solver):
-    case = load("crash", **solver)
-    alpha = design_of(case)
-    adjoint, direct = (mdstopo.evaluate(case, alpha, method=method) for method in ("adjoint", "direct"))
-    for objective, gradient in adjoint.gradients.items():
-        assert np.abs(direct.gradients[objective] - gradient).max() <= 1e-9 * np.abs(gradient).max(), objective
+    check_direct(load("crash", **solver))
 
 
 def test_generalized_alpha_gives_the_gradient_to_its_own_order():

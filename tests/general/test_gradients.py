@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import mdstopo
-from tests.general.support import design_of, load, slopes
+from tests.general.support import check_adjoint, check_direct, design_of, load
 
 #: scene, solver settings, step of the differences
 SCENES = [
@@ -23,16 +23,7 @@ def _name(scene):
 @pytest.mark.parametrize("scene", SCENES, ids=_name)
 def test_the_adjoint_is_the_derivative_of_what_is_computed(scene):
     name, solver, h = scene
-    case = load(name, **solver)
-    alpha = design_of(case)
-    found = mdstopo.evaluate(case, alpha)
-    assert found.status.ok, found.message
-    rng = np.random.default_rng(1)
-    for _ in range(2):
-        direction = rng.normal(size=case.n_design) * alpha
-        for objective, slope in slopes(case, alpha, direction, h).items():
-            gradient = found.gradients[objective]
-            assert abs(slope - gradient @ direction) <= 1e-7 * np.abs(gradient * direction).max(), objective
+    check_adjoint(load(name, **solver), h, 1e-7)
 
 
 @pytest.mark.parametrize(
@@ -42,11 +33,7 @@ def test_the_adjoint_is_the_derivative_of_what_is_computed(scene):
 )
 def test_direct_and_adjoint_agree(scene):
     name, solver, _ = scene
-    case = load(name, **solver)
-    alpha = design_of(case)
-    adjoint, direct = (mdstopo.evaluate(case, alpha, method=method) for method in ("adjoint", "direct"))
-    for objective, gradient in adjoint.gradients.items():
-        assert np.abs(direct.gradients[objective] - gradient).max() <= 1e-9 * np.abs(gradient).max(), objective
+    check_direct(load(name, **solver))
 
 
 def test_through_events_generalized_alpha_gives_the_gradient_to_its_own_order():

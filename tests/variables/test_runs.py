@@ -11,6 +11,7 @@ from mdstopo.session.run import run_session
 from mdstopo.store.design import read_design
 from mdstopo.store.errors import StoreError
 from mdstopo.store.reader import read_result
+from tests.variables.support import whole_and_resumed
 
 CATCH = Path(__file__).parents[2] / "cases" / "catch.yaml"
 #: a mass on a spring of which x0 is stretched at the start, and a damper; axis x, nothing turns
@@ -61,15 +62,7 @@ def test_what_a_value_costs_is_in_volume_rows():
 
 def test_a_run_that_is_stopped_and_resumed_is_the_same_to_the_bit(tmp_path):
     case = mdstopo.load_case(CATCH, overrides={"optimizer.max_iterations": "8"})
-    whole = run_session(case, path=tmp_path / "whole.h5")
-    reached: list[int] = []
-    run_session(
-        case,
-        path=tmp_path / "parts.h5",
-        on_iteration=lambda progress: reached.append(progress.iteration),
-        stop_requested=lambda: len(reached) > 3,
-    )
-    resumed = run_session(case, path=tmp_path / "parts.h5", resume=True)
+    whole, resumed = whole_and_resumed(case, tmp_path)
     assert {name: each.tolist() for name, each in resumed.variables.items()} == {
         name: each.tolist() for name, each in whole.variables.items()
     }

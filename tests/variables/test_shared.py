@@ -8,6 +8,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.session.run import run_session
+from tests.variables.support import whole_and_resumed
 
 SCENE = """
 format: 1
@@ -141,15 +142,7 @@ def test_a_design_that_differs_where_the_case_has_one_alpha_is_replaced_by_the_m
 
 def test_a_shared_run_that_is_stopped_and_resumed_is_the_same_to_the_bit(tmp_path):
     case = case_with("shared: [more], mirrored: [[lefts, rights]]")
-    whole = run_session(case, path=tmp_path / "whole.h5")
-    reached: list[int] = []
-    run_session(
-        case,
-        path=tmp_path / "parts.h5",
-        on_iteration=lambda progress: reached.append(progress.iteration),
-        stop_requested=lambda: len(reached) > 3,
-    )
-    resumed = run_session(case, path=tmp_path / "parts.h5", resume=True)
+    whole, resumed = whole_and_resumed(case, tmp_path)
     assert resumed.alpha.tobytes() == whole.alpha.tobytes()
     assert resumed.history["objectives"].tobytes() == whole.history["objectives"].tobytes()
     assert mdstopo.evaluate(case, whole.alpha).objectives["G"] == whole.objectives["G"]
