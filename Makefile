@@ -17,8 +17,9 @@ CASE ?= cases/fig6.yaml
 RESULT := results/$(basename $(notdir $(CASE))).h5
 # options of `mdstopo run`, e.g. ARGS=--overwrite
 ARGS ?=
-# options of pytest, e.g. TESTS="tests/case -x"
+# options of pytest, e.g. TESTS="tests/case -x"; how many processes run tests, 0 for this one
 TESTS ?=
+JOBS ?= 2
 SECTIONS ?=
 PEERS ?=
 PEERS_PYTHON ?= $(BIN)/python
@@ -60,7 +61,7 @@ reproduce: $(VENV)/.ready-plot
 	$(BIN)/python -m reproduce
 
 test: $(VENV)/.ready-dev
-	$(BIN)/python -m pytest $(TESTS)
+	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .

@@ -8,6 +8,7 @@ simulation.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from operator import add
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -42,6 +43,9 @@ if TYPE_CHECKING:
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
 #: else exceed ten tolerances on scenes whose members turn fast
 LOOSEST = 5e-5
+
+#: finite numbers from 0 on, read as unsigned integers, are below this; all other numbers are not
+_INFINITY_BITS = 0x7FF0_0000_0000_0000
 
 #: steps that a time history has at least
 HISTORY = 50
@@ -79,8 +83,9 @@ class Evaluator:
         self._rows.flags.writeable = False
         self._bounds = np.array([row.bound for row in case.constraints], dtype=np.float64)
         # what is looked at in each load case: objectives, then constraints on a response
-        limited = {f"constraints[{i}]": row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
-        self._limited = tuple(limited)
+        bounded = {i: row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
+        limited = {f"constraints[{i}]": row for i, row in bounded.items()}
+        self._limited = dict(zip(bounded, limited, strict=True))
         self._by_load_case: dict[str, dict[str, Objective | ResponseRow]] = {
             name: {o.name: o for o in case.objectives if o.load_case == name}
             | {key: row for key, row in limited.items() if row.load_case == name}
@@ -93,7 +98,7 @@ class Evaluator:
             for group, part in zip(case.design_groups, case.group_slices.values(), strict=True)
             if group.power < 1.0
         ]
-        self._work = np.zeros(WORK, dtype=np.int64)
+        self._work = [0] * WORK
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
         self._others: dict[tuple[tuple[str, Any], ...], Evaluator] = {}
 
@@ -102,7 +107,7 @@ class Evaluator:
     @property
     def work(self) -> dict[str, int]:
         """Counts of everything evaluated so far, by name."""
-        return dict(zip(WORK_NAMES, self._work.tolist(), strict=True))
+        return dict(zip(WORK_NAMES, self._work, strict=True))
 
     @property
     def skipped(self) -> list[str]:
@@ -138,7 +143,7 @@ class Evaluator:
         exact = gradient and method == "adjoint"
         status, message, grazing = Status.OK, "", ""
         looked: dict[str, tuple[Peak, ...]] = {}
-        counts = np.zeros(WORK, dtype=np.int64)
+        counts = [0] * WORK
         for name, objectives in self._by_load_case.items():
             if not objectives:
                 continue
@@ -151,7 +156,7 @@ class Evaluator:
             status, culprit = self._verdict(name, design, result)
             if not status.ok:
                 message = culprit
-                counts += driver.work
+                counts = _sum(counts, driver.work.tolist())
                 break
             if result.grazing >= 0:
                 grazing = self._member(name, result.grazing)
@@ -161,15 +166,15 @@ class Evaluator:
                 found = _differentiate(method, driver, design, result)
                 status, message = found.status, found.message or message
                 if not status.ok:
-                    counts += driver.work
+                    counts = _sum(counts, driver.work.tolist())
                     break
                 for j, key in enumerate(objectives):
                     looked[key] = tuple(
                         Peak(peak.time, peak.value, found.gradients[j][r]) for r, peak in enumerate(looked[key])
                     )
-            counts += driver.work
-        self._work += counts
-        work = dict(zip(WORK_NAMES, counts.tolist(), strict=True))
+            counts = _sum(counts, driver.work.tolist())
+        self._count(counts)
+        work = dict(zip(WORK_NAMES, counts, strict=True))
         if edge and status.ok:
             status, message = Status.NO_GRADIENT, edge
         if grazing and gradient and status.ok:
@@ -180,7 +185,7 @@ class Evaluator:
         """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors."""
         if self._is_for_generalized_alpha(sensitivity or self.sensitivity):
             return self.otherwise(sensitivity="iterative").with_errors(alpha, found, sensitivity)
-        return replace(found, errors=self._estimator.errors(self.design(alpha), found, sensitivity))
+        return found._replace(errors=self._estimator.errors(self.design(alpha), found, sensitivity))
 
     @cached_property
     def _estimator(self) -> "Estimator":
@@ -301,11 +306,15 @@ class Evaluator:
                 raise ValueError(f"values of variables must be finite; those of {name} are {design[part]}")
         if self._n:
             own = design[: self._n]
-            lowest = np.minimum.reduce(own)
-            if not (lowest >= 0.0 and np.maximum.reduce(own) < np.inf):
-                worst = int(np.flatnonzero(~((own >= 0.0) & (own < np.inf)))[0])
-                raise ValueError(f"alpha must be finite and at least 0; alpha[{worst}] is {design[worst]}")
+            bits = own.view(np.uint64)
+            if bits.item(bits.argmax()) >= _INFINITY_BITS:
+                wrong = np.flatnonzero(~((own >= 0.0) & (own < np.inf)))  # -0.0 is not
+                if len(wrong):
+                    raise ValueError(f"alpha must be finite and at least 0; alpha[{wrong[0]}] is {design[wrong[0]]}")
         return design
+
+    def _count(self, counts: list[int]) -> None:
+        self._work = _sum(self._work, counts)
 
     def _without_slope(self, design: FloatArray) -> str:
         """Why there is no gradient at this design, or nothing: alpha^mu has no slope at 0 where mu < 1."""
@@ -387,39 +396,44 @@ class Evaluator:
         names = self._names
         if not status.usable:
             lost = (Peak(np.nan, np.nan, None),)
-            keys = [*names, *self._limited]
+            keys = [*names, *self._limited.values()]
             looked = {key: looked.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}
-        gradients = {}
-        by_variable = {}
+        objectives: dict[str, float] = {}
+        times: dict[str, float] = {}
+        peaks: dict[str, tuple[Peak, ...]] = {}
+        slopes: dict[str, FloatArray] = {}
         for name in names:
-            first = looked[name][0].gradient
-            if gradient and first is not None:
-                gradients[name] = first[: self._n]
-                if self.case.variables:
-                    by_variable[name] = self._space.named(first)
-        constraints, rows = np.einsum("ij,j->i", self._rows, design) - self._bounds, self._rows
+            peaks[name] = looked[name]
+            times[name], objectives[name], slope = looked[name][0]
+            if gradient and slope is not None:
+                slopes[name] = slope
+        constraints, rows = self._bounds, self._rows
+        if len(rows):
+            constraints = np.einsum("ij,j->i", rows, design) - self._bounds
         if self._limited:
             rows = rows.copy()
-            for key in self._limited:
-                i = int(key[len("constraints[") : -1])
+            for i, key in self._limited.items():
                 peak = looked[key][0]
                 constraints[i] = peak.value - self._bounds[i]
                 rows[i] = np.nan if peak.gradient is None else peak.gradient
-        return Evaluation(
-            objectives={name: looked[name][0].value for name in names},
-            gradients=gradients,
-            peak_times={name: looked[name][0].time for name in names},
-            constraints=constraints,
-            constraint_gradients=rows[:, : self._n] if self.case.variables else rows,
-            peaks={name: looked[name] for name in names},
-            constraint_peaks={int(key[len("constraints[") : -1]): looked[key] for key in self._limited},
-            work=work,
-            status=status,
-            message=message,
-            variables=self._space.named(design),
-            variable_gradients=by_variable,
-            constraint_variable_gradients=self._space.named(rows),
+        limits = {i: looked[key] for i, key in self._limited.items()}
+        found = Evaluation(objectives, slopes, times, constraints, rows, peaks, work, status, message, limits)
+        return self._parted(found, design) if self.case.variables else found
+
+    def _parted(self, found: Evaluation, design: FloatArray) -> Evaluation:
+        """What was found with respect to a whole design (N + P,), told by alpha and by variables."""
+        n, named = self._n, self._space.named
+        return found._replace(
+            gradients={name: slope[:n] for name, slope in found.gradients.items()},
+            constraint_gradients=found.constraint_gradients[:, :n],
+            variables=named(design),
+            variable_gradients={name: named(slope) for name, slope in found.gradients.items()},
+            constraint_variable_gradients=named(found.constraint_gradients),
         )
+
+
+def _sum(some: list[int], others: list[int]) -> list[int]:
+    return list(map(add, some, others))
 
 
 def _of_motion(tolerance: float) -> float:
@@ -454,5 +468,5 @@ def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:
     if not gradient:
         return tuple(Peak(row[0], row[1], None) for row in rows)
     gradients = result.gradients[j, : len(rows)].copy()
-    gradients.flags.writeable = False
-    return tuple(Peak(row[0], row[1], gradients[r]) for r, row in enumerate(rows))
+    gradients.setflags(write=False)
+    return tuple([Peak(row[0], row[1], gradients[r]) for r, row in enumerate(rows)])

@@ -26,15 +26,12 @@ class Status(enum.Enum):
     NOT_POSITIVE = "an objective is not positive"
     GRAZING = "a member only just touches, or only just does not: the gradient holds on one side only"
 
-    @property
-    def ok(self) -> bool:
-        """Whether values and gradients can be trusted."""
-        return self is Status.OK
+    ok: bool  #: whether values and gradients can be trusted
+    usable: bool  #: whether values can be trusted, and gradients at least on one side
 
-    @property
-    def usable(self) -> bool:
-        """Whether values can be trusted, and gradients at least on one side."""
-        return self in (Status.OK, Status.GRAZING)
+    def __init__(self, sentence: str) -> None:
+        self.ok = self.name == "OK"
+        self.usable = self.name in ("OK", "GRAZING")
 
 
 class RunStatus(enum.StrEnum):

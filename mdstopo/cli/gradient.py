@@ -180,7 +180,8 @@ def _all_methods(
 
 def _in_words(evaluation: "Evaluation") -> str:
     """The status, and whose it is."""
-    return evaluation.status.value + (f" ({evaluation.message})" if evaluation.message else "")
+    sentence = f"{evaluation.status.value}"
+    return f"{sentence} ({evaluation.message})" if evaluation.message else sentence
 
 
 def _difference(

@@ -129,7 +129,7 @@ class Driver:
         code, count, time = self.run(alpha, gradient)
         if code == OK:
             self._look_at(count, gradient)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.meeting[0]))
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, self.meeting.item(0))
 
     def met(self, count: int) -> int:
         """A member (padded) whose ends meet under force within the steps of the last run, or -1."""

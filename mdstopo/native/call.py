@@ -9,8 +9,11 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.native.store import CALL, Code
+
+IndexArray = NDArray[np.int64]
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
@@ -51,16 +54,30 @@ class Native:
         self._single = not code.result.startswith("(")
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.prepare(*arguments)()
+        return self._block_of(arguments)[0]()
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """These arguments as a block, ready to be called; see `Entry.prepare`."""
+        bare, block, places = self._block_of(arguments)
+        number = block.view(np.float64)
+        placed = [(number if kind == "f" else block, place) for kind, place in zip(self._kinds, places, strict=True)]
+
+        def call(*changes: tuple[int, Any]) -> Any:
+            for which, value in changes:
+                view, place = placed[which]
+                view[place] = value
+            return bare()
+
+        return call
+
+    def _block_of(self, arguments: tuple[Any, ...]) -> tuple[Callable[[], Any], IndexArray, list[int]]:
+        """A call with these arguments, its block, and where each argument begins in it."""
         numbers: list[int] = []
         places: list[int] = []
         for kind, argument in zip(self._kinds, arguments, strict=True):
             places.append(len(numbers))
             if kind[0] in "dq?":
-                numbers.append(argument.ctypes.data)
+                numbers.append(argument.__array_interface__["data"][0])
                 numbers.extend(argument.shape)
             elif kind[0] == "t":
                 numbers.extend(argument)
@@ -69,25 +86,22 @@ class Native:
             else:
                 numbers.append(int(argument))
         first = len(numbers)
-        block = np.zeros(first + len(self._result) + 1, dtype=np.int64)
-        block[:first] = numbers
-        views = {"f": block.view(np.float64), "i": block, "b": block}
-        address = ctypes.c_void_p(block.ctypes.data)
-        slots = [(views[letter], first + k, letter) for k, letter in enumerate(self._result)]
-        function, kinds, single = self._call, self._kinds, self._single
+        block = np.array(numbers + [0] * (len(self._result) + 1), dtype=np.int64)
+        items = {"f": block.view(np.float64).item, "i": block.item, "b": block.item}
+        slots = [(items[letter], first + k, letter == "b") for k, letter in enumerate(self._result)]
+        address = ctypes.c_void_p(block.__array_interface__["data"][0])
+        function, single = self._call, self._single
 
         # `kept`: the block holds addresses only, and the arrays have to live as long as the call
-        def call(*changes: tuple[int, Any], kept: Any = arguments) -> Any:
-            for place, value in changes:
-                views[kinds[place]][places[place]] = value
+        def call(kept: Any = arguments) -> Any:
             if function(address):
-                self._fail(int(block[-1]))
+                self._fail(block.item(-1))
             if not slots:
                 return None
-            found = [view[k].item() if letter != "b" else bool(view[k]) for view, k, letter in slots]
+            found = [bool(item(k)) if boolean else item(k) for item, k, boolean in slots]
             return found[0] if single else tuple(found)
 
-        return call
+        return call, block, places
 
     def _fail(self, address: int) -> None:
         """Raise what the compiled code raised: its class and arguments, pickled where Numba keeps them.

@@ -15,7 +15,10 @@ import numpy as np
 from mdstopo.native.kernel import Kernel
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from mdstopo.native.call import Native
+    from mdstopo.native.store import Code
 
 _LETTERS = {np.dtype(np.float64): "d", np.dtype(np.int64): "q", np.dtype(np.bool_): "?"}
 
@@ -98,13 +101,18 @@ class Entry(Kernel):
         path = store.path_of(self.py_func.__module__, self.py_func.__qualname__, types)
         code = store.read(path)
         if code is None:
-            from mdstopo.native.build import build
+            with store.alone(path):
+                code = store.read(path) or self._built(path, types)
+        return None if code is None else Native(self.py_func.__qualname__, code, types)
 
-            code = build(self.dispatcher, types)
-            if code is None:
-                return None
+    def _built(self, path: Path, types: str) -> Code | None:
+        from mdstopo.native import store
+        from mdstopo.native.build import build
+
+        code = build(self.dispatcher, types)
+        if code is not None:
             store.write(path, code)
-        return Native(self.py_func.__qualname__, code, types)
+        return code
 
     def _by_numba(self, *arguments: Any) -> Any:
         """Called through Numba's own wrapper: the slow way in, for what the machine code does not take."""

@@ -8,6 +8,7 @@ import os
 import sys
 import tempfile
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -91,6 +92,30 @@ def read(path: Path) -> Code | None:
     if zlib.crc32(rest) != checksum:
         return None
     return Code(rest[:size], rest[size:], result)
+
+
+@contextlib.contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """The right to compile what belongs in a file: whoever comes second waits, and then finds it there.
+
+    Where nothing can be locked, everybody compiles.
+    """
+    import fcntl
+
+    lock = path.with_suffix(".lock")
+    try:
+        lock.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+    except OSError:
+        yield
+        return
+    try:
+        with contextlib.suppress(OSError):
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        lock.unlink(missing_ok=True)
+        os.close(descriptor)
 
 
 def write(path: Path, code: Code) -> None:

@@ -32,7 +32,7 @@ from mdstopo.optimizer.wide_kernels import (
 MANY = 256
 #: and from which on single passes over them are compiled too
 WIDE = 10_000
-_LEAST_SAMPLE = 1024
+_LEAST_SAMPLE = 256
 
 
 class Proposal(NamedTuple):

@@ -76,12 +76,12 @@ class Ensemble(Evaluator):
         parts = self._parts(wanted, design, gradient, sensitivity)
         status, message = self._verdict_of(parts)
         counts = {name: sum(part.work[name] for part in parts.values()) for name in WORK_NAMES}
-        self._work += np.array([counts[name] for name in WORK_NAMES], dtype=np.int64)
+        self._count(list(counts.values()))
         looked: dict[str, tuple[Peak, ...]] = {}
         if status.usable or status is Status.NO_GRADIENT:
             looked = self._looked(parts)
         found = self._evaluation(design, looked, gradient and status.usable, counts, status, message)
-        return replace(found, all_compete=True)
+        return found._replace(all_compete=True)
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found, and estimates of its errors: those of the points, weighted as the measure does.
@@ -95,14 +95,14 @@ class Ensemble(Evaluator):
         for i, point in sorted(self.points.items()):
             each = point.with_errors(design, point.evaluate(design, bool(found.gradients), sensitivity), sensitivity)
             if not each.errors:
-                return replace(found, errors={})
+                return found._replace(errors={})
             if i == NOMINAL:
                 nominal = each.errors
                 continue
             for name in self._names:
                 values[name].append(each.objectives[name])
                 errors[name].append(each.errors[name])
-        return replace(found, errors={n: self._error(n, values[n], errors[n], nominal[n]) for n in self._names})
+        return found._replace(errors={n: self._error(n, values[n], errors[n], nominal[n]) for n in self._names})
 
     def _error(
         self, name: str, values: Sequence[float], errors: Sequence[ErrorEstimate], nominal: ErrorEstimate
@@ -171,7 +171,7 @@ class Ensemble(Evaluator):
         for place in limits:  # where the bound itself is uncertain, what counts is the distance to it
             shift = point.case.constraints[place].bound - self._bounds_here[place]
             if shift != 0.0:
-                limits[place] = tuple(replace(peak, value=peak.value - shift) for peak in limits[place])
+                limits[place] = tuple(peak._replace(value=peak.value - shift) for peak in limits[place])
         return Part(found.peaks, limits, found.status, found.message, found.work)
 
     def _parts(

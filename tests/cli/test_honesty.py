@@ -61,8 +61,9 @@ def test_an_interrupt_that_trips_the_compiler_is_an_interrupt(monkeypatch, capsy
     ended = []
     monkeypatch.setattr(cli, "_dispatch", stumbles)
     monkeypatch.setattr("os._exit", ended.append)
+    monkeypatch.setattr("atexit._run_exitfuncs", lambda: None)
+    monkeypatch.setattr("gc.set_threshold", lambda _: None)
     monkeypatch.setattr("signal.signal", lambda *_: None)
-    with pytest.raises(UnboundLocalError):
-        cli.main()
+    cli.main()
     assert ended == [3]
     assert capsys.readouterr().err == "interrupted\n"

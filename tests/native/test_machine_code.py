@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -156,6 +157,34 @@ def test_code_on_the_disk_that_was_damaged_is_not_used(tmp_path):
         path.write_bytes(damaged)
         assert store.read(path) is None
     assert store.read(tmp_path / "none.code") is None
+
+
+def test_of_several_processes_one_compiles_and_the_others_find_it(tmp_path, monkeypatch):
+    @entry
+    def doubled(x):
+        return 2.0 * x[0]
+
+    other = entry(doubled.py_func)
+    path = tmp_path / "doubled.code"
+    monkeypatch.setattr(store, "path_of", lambda *_: path)
+    builds = []
+    compiled = build.build
+
+    def slowly(*arguments):
+        builds.append(threading.get_ident())
+        waiting.start()
+        waiting.join(0.3)
+        assert waiting.is_alive()  # it does not compile beside us
+        return compiled(*arguments)
+
+    monkeypatch.setattr(build, "build", slowly)
+    found = []
+    waiting = threading.Thread(target=lambda: found.append(other(np.full(1, 3.0))))
+    assert doubled(np.full(1, 2.0)) == 4.0
+    waiting.join()
+    assert found == [6.0]
+    assert builds == [threading.get_ident()]
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["doubled.code"]
 
 
 def test_code_that_needs_more_of_numba_than_is_provided_goes_through_numba(monkeypatch):
