@@ -147,12 +147,31 @@ def _refuse_fixed(path: str, steps: list[str], root: Node) -> None:
     why = f"`{section}` {_MEANS[section]}" if section in _MEANS else ""
     if section == "members" and len(steps) > 2 and steps[2] in _FILTERS:
         why = f"`{steps[2]}` decides {_FILTERS[steps[2]]}"
+    elif section == "members" and len(steps) > 3 and steps[2] == "law":
+        why = _varied_by(steps, root)
     elif section == "points" and "count" in steps:
         why = "`count` decides which members there are"
     elif section == "constraints" and len(steps) > 1 and _stands([*steps[:2], "volume"], root):
         why = "a volume is as certain as the design"
+    elif section in ("constraints", "objectives") and len(steps) < 3:
+        why = f"only single numbers in `{section}` can be, not what they ask for"
     if why:
         raise WrongPathError(path, f"{path} cannot be uncertain: {why}")
+
+
+def _varied_by(steps: list[str], root: Node) -> str:
+    """Which design variable decides the parameter of a law that a key path leads to; nothing where none does."""
+    design = root.entries.get("design")
+    variables = design[1].entries.get("variables") if design is not None else None
+    for name, (_, node) in variables[1].entries.items() if variables is not None else ():
+        stated = {key: value for key, (_, value) in node.entries.items()}
+        if "group" not in stated or "parameter" not in stated or stated["parameter"].text != steps[-1]:
+            continue
+        groups = [each.text for each in stated["group"].items] or [stated["group"].text]
+        place = stated["law"].text if "law" in stated else ""
+        if steps[1] in groups and (len(steps) == 4 or place in ("", steps[3])):
+            return f"it is the design variable {name}"
+    return ""
 
 
 def _distribution(keys: Fields, nominal: float, reading: Reading) -> Distribution | None:
@@ -223,8 +242,9 @@ def _scenarios(fields: Fields, root: Node, numbers: set[str], reading: Reading) 
             except WrongPathError as error:
                 reading.mistake(here, error.message)
                 continue
-            if settled in numbers:
-                reading.mistake(here, f"{settled} has a distribution; it varies by itself or by scenario, not both")
+            below = f"{settled}.", f"{settled}["
+            for both in sorted(each for each in numbers if each == settled or each.startswith(below)):
+                reading.mistake(here, f"{both} has a distribution; it varies by itself or by scenario, not both")
             values[settled] = as_yaml(value)
         built.append(Scenario(name, share, FrozenDict(values)))
     return built

@@ -13,7 +13,7 @@ from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unk
 from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces
-from mdstopo.general.gather import add_design, explicit_part
+from mdstopo.general.gather import add_design, explicit_part, force_sign
 from mdstopo.general.parameters import add_event, add_times
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response, value_at
 from mdstopo.general.track import copy_vector, restore_modes
@@ -170,7 +170,8 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     free_only(model, bars[1])
     weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
     add_design(model, segment, t, strength, q, v, a, z, weight, out, work)
-    explicit_part(model, segment, j, who, t, strength, q, v, a, 1.0, out)
+    sign = force_sign(model, segment, j, who, t, strength, q, v, a)
+    explicit_part(model, segment, j, who, t, strength, q, v, a, sign, out)
     if bar_set.shape[0] > 0:
         add_sets(model, segment, strength, q, v, z, 0.0, bar_set)
     at = k if c <= 0.0 else k + 1
@@ -281,20 +282,29 @@ def one_sided(  # type: ignore[no-untyped-def]
     An absolute value or a norm that all but vanishes at the stage may have turned round there, and the largest force
     may be another's, by what the stage is off by; then the integrand is followed as the smooth function that it is
     inside. In: who, value at the stage; mine, size, slopes (3, n), rows (n_row,) at the stage `inside`. In place: own
-    (3, n), own_rows (n_row,). Returns the value, and whose force it is.
+    (3, n), own_rows (n_row,). Returns the value, whose force it is, and whether it has turned round.
     """
+    same = np.bool_(False)
     n = model.mass.shape[0]
     if mine != who:  # nearly as large as the largest here: it is the largest inside
         others = np.empty((3, n))
         others_rows = np.empty(model.size[0])
         other, _ = at_stage(model, strength, segment, track, at, j, mine, desk, others, others_rows)
         if other < (1.0 - VANISHING) * value:
-            return value, who
+            return value, who, same
         own[:] = others
         own_rows[:] = others_rows
-        return other, mine
+        value = other
+        who = mine
     if value > VANISHING * size:
-        return value, who
+        return value, who, same
+    if model.response[j, 0] == MEMBER_FORCE:
+        a, b = track.stage[at], track.stage[inside]
+        here = force_sign(model, segment, j, who, track.when[at], strength, a[0], a[1], a[2])
+        if here == force_sign(model, segment, j, who, track.when[inside], strength, b[0], b[1], b[2]):
+            return value, who, same
+        _turn(own, own_rows)
+        return -value, who, np.bool_(True)
     if value <= ASIDE * size:  # no direction of its own: that of a state a little inside
         state = np.empty((3, n))
         lam = np.empty(model.size[0])
@@ -305,7 +315,7 @@ def one_sided(  # type: ignore[no-untyped-def]
             lam[r] = track.lam[at, r] + ASIDE * (track.lam[inside, r] - track.lam[at, r])
         t = track.when[at]
         response(model, strength, segment, j, who, t, state[0], state[1], state[2], lam, desk, own, own_rows)
-        return value, who
+        return value, who, same
     turned = 0.0
     for i in range(3):
         for d in range(n):
@@ -313,13 +323,18 @@ def one_sided(  # type: ignore[no-untyped-def]
     for r in range(model.size[0]):
         turned += own_rows[r] * rows[r]
     if turned >= 0.0:
-        return value, who
-    for i in range(3):
-        for d in range(n):
-            own[i, d] = -own[i, d]
-    for r in range(model.size[0]):
-        own_rows[r] = -own_rows[r]
-    return -value, who
+        return value, who, same
+    _turn(own, own_rows)
+    return -value, who, np.bool_(True)
+
+
+@kernel
+def _turn(slopes, rows):  # type: ignore[no-untyped-def]
+    for i in range(slopes.shape[0]):
+        for d in range(slopes.shape[1]):
+            slopes[i, d] = -slopes[i, d]
+    for r in range(rows.shape[0]):
+        rows[r] = -rows[r]
 
 
 @kernel
@@ -361,8 +376,9 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
             stage = track.stage[o + i]
             t = track.when[o + i]
             value, who = at_stage(model, strength, segment, track, o + i, j, -1, desk, own, own_rows)
+            turned = np.bool_(False)
             if bends and o + i != inside:
-                value, who = one_sided(
+                value, who, turned = one_sided(
                     model, strength, segment, track, o + i, inside, j, who, value, mine, size, slopes, rows, desk, own,
                     own_rows,
                 )  # fmt: skip
@@ -377,10 +393,10 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
                 rows_bar[o + i, r] = factor * own_rows[r]
             if energy:
                 add_design(model, segment, t, strength, stage[0], stage[1], stage[2], none, factor, out, work)
-            # followed beyond a kink, an absolute value is the negative of itself
-            beyond = kind == MEMBER_FORCE and value < 0.0
-            own_factor = -factor if beyond else factor
-            explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], own_factor, out)
+            sign = force_sign(model, segment, j, who, t, strength, stage[0], stage[1], stage[2])
+            if turned:
+                sign = -sign
+            explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor * sign, out)
             if sets_bar.shape[1] > 0:
                 add_looked_sets(
                     model, strength, segment, j, who, t, stage[0], stage[1], stage[2], own, factor, sets_bar[o + i]

@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.general.balance import balance, joint_slopes, make_desk
 from mdstopo.general.duties import point_of
 from mdstopo.general.forces import general_forces
-from mdstopo.general.gather import add_design, explicit_part
+from mdstopo.general.gather import add_design, explicit_part, force_sign
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.responses import ENERGY, response
@@ -72,7 +72,8 @@ def hold(  # type: ignore[no-untyped-def]
         padded[:] = 0.0
         weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
         add_design(model, segment, t, strength, q, v, a, z, weight, padded, work)
-        explicit_part(model, segment, j, who, t, strength, q, v, a, 1.0, padded)
+        sign = force_sign(model, segment, j, who, t, strength, q, v, a)
+        explicit_part(model, segment, j, who, t, strength, q, v, a, sign, padded)
         unscale_general(model.block, model.power, alpha, padded, out)
         return
     general_forces(

@@ -54,32 +54,46 @@ def _virtual(pair, rel, p, z, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
-    """out (M_padded,) += scale dg_j/d(alpha^mu) at fixed motion of a member force."""
+    """out (M_padded,) += scale df*/d(alpha^mu) at fixed motion, where g_j is the force f* of member `who`.
+
+    f* has a sign; its absolute value is what is looked at (`force_sign`).
+    """
     if model.response[j, 0] != MEMBER_FORCE:
         return
+    _laws_force(model, segment, j, who, t, strength, q, v, a, scale, out)
+    if model.varied.shape[0] > 0:
+        add_force_parameters(model, segment, model.response[j, 5], who, t, strength, q, v, a, scale, out)
+
+
+@kernel
+def force_sign(model, segment, j, who, t, strength, q, v, a):  # type: ignore[no-untyped-def]
+    """The sign of f* where g_j is the force of member `who`; else 1."""
+    if model.response[j, 0] != MEMBER_FORCE:
+        return 1.0
+    return 1.0 if _laws_force(model, segment, j, who, t, strength, q, v, a, 0.0, np.empty(0)) >= 0.0 else -1.0
+
+
+@kernel
+def _laws_force(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+    """f* of a member, all its laws together; what each has at unit strength, times scale, is added to out, if any."""
     row = np.empty(6)
     rel = np.empty((model.pair.shape[0], POSE))
     relative_pose(model.pair, q, v, rel)
     total = 0.0
-    for part in range(2):  # the sum of its laws gives the sign, then each law its part
-        sign = 1.0 if total >= 0.0 else -1.0
-        for k in range(model.block.shape[0]):
-            if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
-                continue
-            if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
-                continue
-            i = model.block[k, 1] + who - model.block[k, 7]
-            if model.block[k, 3] == INERTER:
-                f = inerter_force(model, k, i, q, v, a, row)
-            else:
-                f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], strength)
-            if part == 0:
-                total += strength[0, i] * f
-            else:
-                out[i] += scale * sign * f
-    if model.varied.shape[0] > 0:
-        sign = 1.0 if total >= 0.0 else -1.0
-        add_force_parameters(model, segment, model.response[j, 5], who, t, strength, q, v, a, scale * sign, out)
+    for k in range(model.block.shape[0]):
+        if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
+            continue
+        if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
+            continue
+        i = model.block[k, 1] + who - model.block[k, 7]
+        if model.block[k, 3] == INERTER:
+            f = inerter_force(model, k, i, q, v, a, row)
+        else:
+            f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], strength)
+        total += strength[0, i] * f
+        if out.shape[0] > 0:
+            out[i] += scale * f
+    return total
 
 
 @kernel

@@ -15,6 +15,8 @@ from mdstopo.scene.model import FloatArray
 
 #: a low value counts as a kink, or nearly one, below this share of the highest
 LOW = 0.05
+#: looks for changes of hands about a low value, and how far from it, in times that the fastest change needs for it
+LOOKS, REACH = 41, 20.0
 #: bisections that find where the largest force changes hands
 HALVINGS = 60
 
@@ -28,6 +30,7 @@ def kinks(t: FloatArray, see: See) -> list[float]:
     if highest == 0.0:
         return []
     found: list[float] = []
+    several = bool((samples.who != samples.who[0, 0]).any())
     for row in peaks(samples, see, -1.0, 1e9):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
         if low > LOW * highest or not t[0] < row[0] < t[-1]:
@@ -35,7 +38,10 @@ def kinks(t: FloatArray, see: See) -> list[float]:
         w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), see)
         time = float(t[w] + c * (t[w + 1] - t[w]))
         found.append(time)
-        found += _around(time, low, float(np.abs(samples.rate).max()), float(t[0]), float(t[-1]))
+        rate = float(np.abs(samples.rate).max())
+        found += _around(time, low, rate, float(t[0]), float(t[-1]))
+        if several and rate > 0.0:
+            found += _hands_about(time, REACH * low / rate, t, see)
     found += _changes_of_hands(t, samples.who, see)
     return found
 
@@ -70,19 +76,37 @@ def _changes_of_hands(t: FloatArray, who: FloatArray, see: See) -> list[float]:
     found = []
     for w in range(len(t) - 1):
         for i in range(len(FRACTIONS) - 1):
-            if who[w, i] == who[w, i + 1]:
-                continue
-            low, high, first = FRACTIONS[i], FRACTIONS[i + 1], who[w, i]
-            for _ in range(HALVINGS):
-                middle = 0.5 * (low + high)
-                if not low < middle < high:
-                    break
-                if see(np.array([[float(w), middle]]), True)[0, 2] == first:
-                    low = middle
-                else:
-                    high = middle
-            found.append(float(t[w] + high * (t[w + 1] - t[w])))
+            if who[w, i] != who[w, i + 1]:
+                low, high = (float(t[w] + c * (t[w + 1] - t[w])) for c in (FRACTIONS[i], FRACTIONS[i + 1]))
+                found.append(_handover(low, high, float(who[w, i]), t, see))
     return found
+
+
+def _hands_about(time: float, reach: float, t: FloatArray, see: See) -> list[float]:
+    """The same about a low value: of two forces that vanish one after the other, each is the larger for a moment."""
+    near = np.linspace(max(time - reach, float(t[0])), min(time + reach, float(t[-1])), LOOKS)
+    who = see(_places(near, t), True)[:, 2]
+    changes = np.flatnonzero(who[1:] != who[:-1])
+    return [_handover(float(near[i]), float(near[i + 1]), float(who[i]), t, see) for i in changes]
+
+
+def _handover(low: float, high: float, first: float, t: FloatArray, see: See) -> float:
+    """When, between two times, the largest force is no longer that of the member `first`."""
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if not low < middle < high:
+            break
+        if see(_places(np.array([middle]), t), True)[0, 2] == first:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def _places(times: FloatArray, t: FloatArray) -> FloatArray:
+    """Step and fraction (m, 2) of times."""
+    w = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
+    return np.column_stack([w, np.clip((times - t[w]) / (t[w + 1] - t[w]), 0.0, 1.0)])
 
 
 def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: pseudo-steps at most, and the farthest that one goes, relative to the scene
 MOST, FAR = 400, 0.1
+#: the farthest that an equilibrium is looked for: by how many sizes of the scene a body may move, and how far turn, rad
+SIZES, TURN = 2.0, 2.0 * np.pi
 #: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
 NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
@@ -68,7 +70,7 @@ def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: flo
         pace *= min(max(left / now, 0.3), 10.0) if now > 0.0 else 10.0
         left = now
         rate = scene.rate()
-        if scene.extent(q - q0) > size:
+        if scene.lost(q - q0):
             return _nowhere(driver, q - q0, scene.arms)
         if far <= NEAR * size and pace * rate > 1.0:
             break
@@ -184,6 +186,11 @@ class _AtRest:
     def extent(self, step: FloatArray) -> float:
         """How far a step (n,) goes: the largest shift of a centre, or angle times the scene's size, m."""
         return float(np.abs(step * self.arms).max(initial=0.0))
+
+    def lost(self, shift: FloatArray) -> bool:
+        """Whether a shift (n,) from the stated place is too large for an equilibrium near it."""
+        far = np.abs(shift).reshape(-1, 3).max(axis=0, initial=0.0)
+        return bool(max(far[0], far[1]) > SIZES * self._size or far[2] > TURN)
 
     def _basis(self) -> FloatArray:
         """Directions that the joints allow (columns), of length 1 by mass."""

@@ -7,6 +7,8 @@ from typing import Any
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, Uncertainty
 from mdstopo.case.reader import read_case
+from mdstopo.case.words import inside
+from mdstopo.robust.alike import other_problem
 from mdstopo.robust.sample import Sample
 from mdstopo.scene.refusals import refusals
 
@@ -26,7 +28,9 @@ def case_at(case: Case, sample: Sample, i: int) -> Case:
         made = read_case(case.text, path=case.path, overrides=overrides, without=("uncertainty",))
     except CaseError as error:
         raise _refused(case, sample, i, error.mistakes) from None
-    _same_members(case, made, sample, i)
+    other = other_problem(case, made)
+    if other:
+        raise _refused(case, sample, i, [Mistake("", other, 1, 1)])
     names = {objective.name for objective in case.objectives}
     made = replace(
         made,
@@ -65,23 +69,16 @@ def _uncertainty(case: Case) -> Uncertainty:
     return case.uncertainty
 
 
-def _same_members(case: Case, made: Case, sample: Sample, i: int) -> None:
-    for stated, found in zip(case.members, made.members, strict=False):
-        if len(stated) != len(found) or stated.name != found.name:
-            words = f"the group {stated.name} has {len(found)} members, not {len(stated)}: a design would not fit both"
-            raise _refused(case, sample, i, [Mistake("", words, 1, 1)])
-    if len(case.members) != len(made.members) or len(case.objectives) > len(made.objectives):
-        raise _refused(case, sample, i, [Mistake("", "groups or objectives are missing or new", 1, 1)])
-
-
 def _refused(case: Case, sample: Sample, i: int, mistakes: Sequence[Mistake]) -> CaseError:
     """The mistakes that only a point has, at the place of what makes it."""
     place = int(sample.scenario[i])
-    path = "uncertainty.parameters"
+    numbers = {number.key for number in _uncertainty(case).numbers}
+    default = "uncertainty.parameters"
     if not sample.values.shape[1]:
-        path = f"uncertainty.scenarios.{_uncertainty(case).scenarios[place].name}"
+        default = f"uncertainty.scenarios.{_uncertainty(case).scenarios[place].name}"
     found = []
     for mistake in mistakes:
+        path = inside("uncertainty.parameters", mistake.path_key) if mistake.path_key in numbers else default
         key = f"{mistake.path_key}: " if mistake.path_key else ""
         found.append(case.marks.mistake(path, f"{name_of(case, sample, i)}: {key}{mistake.message}"))
     return CaseError(found, str(case.path or case.name))

@@ -184,3 +184,76 @@ def test_a_component_that_changes_its_sign_is_no_norm():
     assert found.objectives["F"] == pytest.approx((1.0 - np.cos(9.0)) / 9.0, rel=1e-8)
     slope = 1.5 * (3.0 * np.sin(9.0) / 9.0 - 2.0 * (1.0 - np.cos(9.0)) / 27.0)
     assert found.gradients["F"] == pytest.approx([slope], rel=1e-8)
+
+
+#: a damped, loaded spring whose force passes zero several times; what it is made of varies
+LOADED = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.9}
+bodies:
+  b: {mass: 10, inertia: 0.5, position: [0, 1], velocity: [0, -1]}
+members:
+  g:
+    from: {body: b, at: [0, 1]}
+    to: {body: ground, at: [0, 0]}
+    law: {type: spring, stiffness: 2000, damping: 40, preload: 3, free_length: 0.98}
+design:
+  initial: 1
+  variables:
+    k: {group: g, parameter: stiffness, lower: 1000, upper: 9000}
+    c: {group: g, parameter: damping, lower: 0, upper: 100}
+    p: {group: g, parameter: preload, lower: -50, upper: 50}
+    l: {group: g, parameter: free_length, lower: 0.9, upper: 1.1}
+objectives:
+  F: {response: {member_force: {group: g}}, over_time: OVER}
+solver: {tolerance: 1e-10, integrator: runge_kutta}
+"""
+
+
+@pytest.mark.parametrize("method", ["adjoint", "direct"])
+@pytest.mark.parametrize("over_time", ["mean", "integral"])
+def test_parameters_change_a_force_also_where_it_passes_zero(over_time, method):
+    case = read_case(LOADED.replace("OVER", over_time))
+    values = {"k": 2000.0, "c": 40.0, "p": 3.0, "l": 0.98}
+    slopes = evaluate(case, variables=values, method=method).variable_gradients["F"]
+    for name, size in (("k", 1.0), ("c", 0.02), ("p", 0.01), ("l", 5e-6)):
+        slope = 0.0
+        for k, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+            for sign in (1.0, -1.0):
+                moved = values | {name: values[name] + sign * k * size}
+                slope += sign * weight * evaluate(case, variables=moved, gradient=False).objectives["F"] / size
+        assert slopes[name] == pytest.approx([slope], rel=1e-7), name
+
+
+#: two ropes' forces pass zero a fifth of a millisecond apart: each is the larger for a moment
+TOGETHER = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.4}
+bodies:
+  b: {mass: 10, inertia: 0.5, position: [0, 1], velocity: [0, -1], angular_velocity: 0.8}
+points:
+  t: {body: b, grid: {list: [[-0.3, 0.9], [0.3, 0.9]]}}
+  g: {body: ground, grid: {list: [[-0.3, 0], [0.3, 0]]}}
+members:
+  g:
+    from: t
+    to: g
+    connect: pairs
+    law: {type: gap, side: compression, stiffness: 6000, damping: 40, gap: 0.05, clip: false}
+design: {initial: 0.8}
+objectives:
+  F: {response: {member_force: {group: g}}, over_time: integral}
+solver: {tolerance: 1e-9, integrator: runge_kutta}
+"""
+
+
+def test_forces_that_vanish_one_after_the_other_change_hands_twice():
+    case = read_case(TOGETHER)
+    alpha = np.array([0.8415044629746464, 0.9388241278267757])
+    found = evaluate(case, alpha)
+    assert found.gradients["F"] == pytest.approx(differences(case, "F", alpha), rel=1e-6)
+    tight = evaluate(read_case(TOGETHER, overrides={"solver.tolerance": 1e-12}), alpha)
+    assert found.objectives["F"] == pytest.approx(tight.objectives["F"], rel=1e-8)
+    assert found.gradients["F"] == pytest.approx(tight.gradients["F"], rel=1e-6)

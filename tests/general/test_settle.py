@@ -155,6 +155,22 @@ solver: {settle: true}
         mdstopo.simulate(read_case(text))
 
 
+@pytest.mark.parametrize("degrees", [60.0, 90.0, 120.0, 175.0])
+def test_a_pendulum_settles_from_wherever_it_is_drawn(degrees):
+    x, y = np.sin(np.radians(degrees)), -np.cos(np.radians(degrees))
+    case = read_case(f"""
+format: 1
+gravity: [0, -9.81]
+time: {{end: 0.1}}
+bodies: {{arm: {{mass: 3, inertia: 0.1, position: [{x}, {y}]}}}}
+joints: [{{type: revolute, bodies: [arm, ground], at: [0, 0]}}]
+solver: {{settle: true}}
+""")
+    motion = mdstopo.simulate(case)
+    assert motion.status.ok, motion.message
+    assert motion.q[0] == pytest.approx([0.0, -1.0, -np.radians(degrees)], abs=1e-9)
+
+
 def test_the_command_says_how_far_the_start_has_moved(tmp_path):
     file = tmp_path / "lamp.yaml"
     file.write_text(HANGS)

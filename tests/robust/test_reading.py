@@ -144,7 +144,8 @@ def test_a_case_that_is_none_at_a_point_is_refused_with_the_point():
     with pytest.raises(CaseError) as caught:
         evaluator_of(case)
     words = str(caught.value)
-    assert re.search(r"uncertainty\.parameters: at point \d+ of the sample \(bodies\.torso\.mass = -", words)
+    place = r"uncertainty\.parameters\.'bodies\.torso\.mass'"
+    assert re.search(place + r": at point \d+ of the sample \(bodies\.torso\.mass = -", words)
     assert "bodies.torso.mass: found -" in words
 
 
@@ -153,6 +154,57 @@ def test_other_members_at_a_point_are_refused():
     moved = {"points.edge.grid.rectangle.center[0]": {"uniform": {"from": -0.3, "to": 0.3}}}
     with pytest.raises(CaseError, match=r"the group belts has .* a design would not fit both"):
         evaluator_of(read(uncertain(parameters=moved), members=members))
+
+
+VARIED = {"power": 1, "variables": {"k": {"group": "belts", "parameter": "stiffness", "lower": 3000, "upper": 5000}}}
+
+
+@pytest.mark.parametrize(
+    "section",
+    [
+        {"parameters": {"members.belts.law.stiffness": {"normal": {"deviation": 400}}}},
+        {"scenarios": {"soft": {"set": {"members.belts.law.stiffness": 3500}}}},
+    ],
+)
+def test_what_the_design_decides_is_not_uncertain(section):
+    (found,) = refused(section, design=VARIED)
+    assert "it is the design variable k" in found[1]
+
+
+SOFT = {"type": "spring", "stiffness": 3500}
+HALVES = {name: {**scene()["members"]["belts"], "design": name == "belts"} for name in ("belts", "straps")}
+
+
+@pytest.mark.parametrize(
+    ("stated", "words", "changes"),
+    [
+        ({"members.belts.law": SOFT}, "it is the design variable k", {"design": VARIED}),
+        ({"members.belts.design": False, "members.straps.design": True}, "belts is fixed", {"members": HALVES}),
+        ({"objectives.G.over_time": "mean"}, "the objective G asks for something else", {}),
+        ({"constraints[1].over_time": "final"}, "constraints[1] limits something else", {}),
+    ],
+)
+def test_a_scenario_that_poses_another_problem_is_refused_before_anything_runs(stated, words, changes):
+    rows = [{"volume": "all", "limit": 6}, BOUND]
+    case = read({"scenarios": {"usual": {}, "other": {"set": stated}}}, **{"constraints": rows, **changes})
+    with pytest.raises(CaseError) as caught:
+        evaluator_of(case)
+    assert words in str(caught.value)
+    assert "uncertainty.scenarios.other" in str(caught.value)
+
+
+@pytest.mark.parametrize("key", ["constraints", "objectives", "constraints[1]", "objectives.G"])
+def test_a_scenario_sets_no_whole_aims(key):
+    value = [BOUND] if key == "constraints" else {"response": "energy"}
+    rows = [{"volume": "all", "limit": 6}, BOUND]
+    (found,) = refused({"scenarios": {"other": {"set": {key: value}}}}, constraints=rows)
+    assert "only single numbers in" in found[1]
+
+
+def test_what_has_a_distribution_is_not_set_as_part_of_a_whole():
+    whole = {"bodies.torso": {"mass": 30, "inertia": 10, "position": [0, 0]}}
+    (found,) = refused(uncertain(scenarios={"light": {"set": whole}}))
+    assert found[1] == "bodies.torso.mass has a distribution; it varies by itself or by scenario, not both"
 
 
 def test_without_distributions_what_belongs_to_a_sample_is_ignored_with_a_warning():

@@ -1,0 +1,64 @@
+"""Whether a point of a sample poses the problem that the case poses: one design and one list of aims fit both."""
+
+from collections.abc import Iterator
+
+from mdstopo.case.model import Case, Objective, Response, ResponseRow, VolumeRow
+
+
+def other_problem(case: Case, made: Case) -> str:
+    """What the case at a point has otherwise than the case, and must not; nothing where a design fits both."""
+    return next(_members(case, made), "") or next(_aims(case, made), "")
+
+
+def _members(case: Case, made: Case) -> Iterator[str]:
+    for stated, found in zip(case.members, made.members, strict=False):
+        if stated.name != found.name:
+            break
+        if len(stated) != len(found):
+            yield f"the group {stated.name} has {len(found)} members, not {len(stated)}: a design would not fit both"
+        if stated.design != found.design:
+            now = "designed" if found.design else "fixed"
+            yield f"the group {stated.name} is {now}, which it is not in the case: a design would not fit both"
+    if [group.name for group in case.members] != [group.name for group in made.members]:
+        yield "groups of members are missing, new, or in another order"
+    groups = {group.name: group for group in made.members}
+    for variable in case.variables:
+        for name, place in zip(variable.groups, variable.laws, strict=True):
+            own = next(group for group in case.members if group.name == name)
+            if getattr(own.laws[place], variable.parameter) != getattr(groups[name].laws[place], variable.parameter):
+                yield (
+                    f"{variable.parameter} of {name} is set, but it is the design variable {variable.name}, "
+                    "whose value the design states"
+                )
+
+
+def _aims(case: Case, made: Case) -> Iterator[str]:
+    objectives = {objective.name: objective for objective in made.objectives}
+    for stated in case.objectives:
+        found = objectives.get(stated.name)
+        if found is None:
+            yield f"the objective {stated.name} is missing"
+        elif _asked(stated) != _asked(found):
+            yield f"the objective {stated.name} asks for something else than in the case"
+    if len(case.constraints) != len(made.constraints):
+        yield f"there are {len(made.constraints)} constraints, not {len(case.constraints)}"
+    for i, (row, other) in enumerate(zip(case.constraints, made.constraints, strict=False)):
+        if _limited(row) != _limited(other):
+            yield f"constraints[{i}] limits something else than in the case, or otherwise"
+
+
+def _asked(aim: Objective) -> tuple[object, ...]:
+    return _seen(aim.response), aim.over_time, aim.load_case, aim.sense
+
+
+def _limited(row: VolumeRow | ResponseRow) -> tuple[object, ...]:
+    """All of a constraint but numbers that may be uncertain: a bound on a response."""
+    if isinstance(row, VolumeRow):
+        return row.groups, row.sense
+    return _seen(row.response), row.over_time, row.load_case, row.sense
+
+
+def _seen(response: Response) -> tuple[object, ...]:
+    """A response but for where on its body it is looked at."""
+    of = response
+    return of.kind, of.body, of.relative_to, of.component, of.group, of.joint
