@@ -9,7 +9,7 @@ from benchmarks.hand import HANDS, even, places
 from benchmarks.motions import DATA, texts
 from benchmarks.scenes import CASES
 from mdstopo import Case, evaluate, load_case, optimize
-from mdstopo.case.model import CrushLaw, ResponseRow, VolumeRow
+from mdstopo.case.model import CrushLaw, VolumeRow
 from mdstopo.scene.refusals import refusals
 from mdstopo.store.design import read_design
 
