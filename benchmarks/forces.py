@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo import Case, simulate
-from mdstopo.case.model import GROUND, ActuatorLaw, GapLaw, SpringLaw
+from mdstopo.case.model import GROUND, ActuatorLaw, CrushLaw, GapLaw, SpringLaw
 from mdstopo.case.parts import MemberGroup
 
 Floats = NDArray[np.float64]
@@ -18,19 +18,29 @@ def whole_forces(case: Case, alpha: Floats, group: MemberGroup, load_case: str) 
 
     Raises ValueError for a law that is not written out here.
     """
-    motion = simulate(case, alpha, load_case)
-    times = np.linspace(motion.t[0], motion.t[-1], PLACES)
-    states = motion.at(times)
-    p, vp = _points(case, group.body_from, group.from_local[group.from_index], states.q, states.v)
-    q, vq = _points(case, group.body_to, group.to_local[group.to_index], states.q, states.v)
-    r, length = q - p, np.linalg.norm(q - p, axis=2)
-    x, rate = length - group.length, ((vq - vp) * r).sum(axis=2) / length
+    times, x, rate = _elongations(case, alpha, group, load_case)
     total = np.zeros_like(x)
     for law in group.laws:
         until = np.inf if law.active_until is None else law.active_until
         acts = (times >= (-np.inf if law.active_from is None else law.active_from)) & (times < until)
         total += np.where(acts[:, None], _force(law, x, rate), 0.0)
     return np.asarray(np.abs(total).max(axis=0))
+
+
+def strokes(case: Case, alpha: Floats, group: MemberGroup, load_case: str) -> Floats:
+    """By how much each member (M,) of a group becomes shorter or longer in this motion, at most, in m."""
+    return np.asarray(np.abs(_elongations(case, alpha, group, load_case)[1]).max(axis=0))
+
+
+def _elongations(case: Case, alpha: Floats, group: MemberGroup, load_case: str) -> tuple[Floats, Floats, Floats]:
+    """Times (T,), elongations and their rates (T, M)."""
+    motion = simulate(case, alpha, load_case)
+    times = np.linspace(motion.t[0], motion.t[-1], PLACES)
+    states = motion.at(times)
+    p, vp = _points(case, group.body_from, group.from_local[group.from_index], states.q, states.v)
+    q, vq = _points(case, group.body_to, group.to_local[group.to_index], states.q, states.v)
+    r, length = q - p, np.linalg.norm(q - p, axis=2)
+    return times, length - group.length, ((vq - vp) * r).sum(axis=2) / length
 
 
 def _points(case: Case, body: str, local: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
@@ -55,4 +65,9 @@ def _force(law: object, x: Floats, rate: Floats) -> Floats:
         force = law.stiffness * (sign * x - law.gap) + law.damping * sign * rate
         force = np.maximum(force, 0.0) if law.clip else force
         return np.where(sign * x >= law.gap, force, 0.0)
+    if isinstance(law, CrushLaw):
+        sign = 1.0 if law.side == "tension" else -1.0
+        beyond = sign * x - law.gap - law.force / law.stiffness
+        crushed = np.maximum.accumulate(np.maximum(beyond, 0.0), axis=0)
+        return np.clip(law.stiffness * (sign * x - law.gap - crushed), 0.0, law.force)
     raise ValueError(f"no force is written out for {type(law).__name__}")

@@ -1,7 +1,10 @@
 """Designs that a careful person would draw, and how they are sized: what the found designs are compared with.
 
 A hand design is a choice of members. Their sizes are one number for each of its parts, which is then made as good as
-it can be, by the same optimiser under the same limits.
+it can be, by the same optimiser under the same limits. An even design has no choice: every candidate of a group has the
+same size, which is found in the same way.
+
+The layouts below keep all limits within the volumes of their cases. They are not first drafts: these did not.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,41 +30,48 @@ Hand = Mapping[str, Sequence[Ends]]
 #: iterations that its sizes are given, and shares of the upper bounds that they begin with
 ITERATIONS, STARTS = 40, (0.5, 1.0)
 
+
+def mirrored(*members: Ends) -> list[Ends]:
+    """Members and their mirror images, x against -x."""
+    return [((side * p[0], p[1]), (side * q[0], q[1])) for side in (1, -1) for p, q in members]
+
+
 HANDS: dict[str, Hand] = {
     "tiedown": {
-        # every hook tied outwards, the outer ones inwards too, symmetric; chocks on both sides of the outer axles
-        "chains at the ends": [((-2.8, 0.9), (-4.5, 0)), ((2.8, 0.9), (4.5, 0))],
-        "chains between": [((-0.933, 0.9), (-3, 0)), ((0.933, 0.9), (3, 0))],
-        "chains inwards": [((-2.8, 0.9), (-0.75, 0)), ((2.8, 0.9), (0.75, 0))],
-        "straps at the ends": [((-2.8, 0.9), (-4.5, 0)), ((2.8, 0.9), (4.5, 0))],
-        "straps between": [((-0.933, 0.9), (-3, 0)), ((0.933, 0.9), (3, 0))],
-        "chocks": [
-            ((-2.1, 0.3), (-3.1, 0.1)), ((-2.1, 0.3), (-1.1, 0.1)), ((2.1, 0.3), (1.1, 0.1)), ((2.1, 0.3), (3.1, 0.1)),
-        ],
+        # both sides alike; every hook is tied outwards to the two rings that pull least downwards, a size for each of
+        # the four directions; straps beside the chains; a chock on the outer side of either outer axle
+        "chains to the ends": mirrored(((2.8, 0.9), (4.5, 0))),
+        "chains beside them": mirrored(((2.8, 0.9), (3.75, 0))),
+        "chains between, short": mirrored(((0.933, 0.9), (3, 0))),
+        "chains between, long": mirrored(((0.933, 0.9), (3.75, 0))),
+        "straps at the ends": mirrored(((2.8, 0.9), (4.5, 0)), ((2.8, 0.9), (3.75, 0))),
+        "straps between": mirrored(((0.933, 0.9), (3, 0))),
+        "chocks": mirrored(((2.1, 0.3), (3.1, 0.1))),
     },
     "mooring": {
-        # head and stern lines, breast lines, springs from both quarters, as on any pier
-        "long_lines head and stern": [((54, -4), (90, -13)), ((-54, -4), (-90, -13))],
-        "long_lines springs": [((22, -9), (-15, -13)), ((-22, -9), (15, -13))],
-        "short_lines breast": [((44, -8), (45, -13)), ((-44, -8), (-45, -13))],
-        "tensioners": [((54, -4), (75, -13)), ((-54, -4), (-75, -13))],
-        "fenders": [((x, -9), (x, -40)) for x in (-40, -20, 0, 20, 40)],
+        # head and stern lines, four breast lines, springs from both quarters, a tensioner and a fender at either end
+        "long_lines head and stern": mirrored(((54, -4), (90, -13))),
+        "long_lines springs": mirrored(((22, -9), (-15, -13))),
+        "short_lines breast": mirrored(((44, -8), (45, -13)), ((22, -9), (30, -13))),
+        "tensioners": mirrored(((54, -4), (75, -13))),
+        "fenders": mirrored(((40, -9), (40, -40))),
     },
     "restraint": {
-        # a four-point harness: level shoulder straps from a reel, lap belts at 45 degrees, and a knee pad
+        # a four-point harness: level shoulder straps from a reel, lap belts to the rear of the seat, and a knee pad
         "shoulder_belts": [((-0.08, 1.05), (-0.55, 1.05))],
         "retractors": [((-0.08, 1.05), (-0.55, 1.05))],
-        "lap_belts": [((0.06, 0.52), (-0.3, 0.2)), ((0.04, 0.6), (-0.3, 0.2))],
+        "lap_belts": [((0.06, 0.52), (-0.4, 0.2)), ((0.04, 0.6), (-0.4, 0.2))],
         "knee_pads": [((0.44, 0.56), (1.0, 0.5))],
     },
     "lander": {
-        # as the lunar module: two crushable struts high up, a brace beside them and one to the lower edge, symmetric
+        # as the lunar module: two crushable struts high up, a brace beside them and two to the lower edge; both legs
+        # are laid out alike, with sizes of their own, because only one meets the stone
         "left_crush": [((-1.9, 0), (-1, 1.7)), ((-1.9, 0), (-1, 2.1))],
         "right_crush": [((1.9, 0), (1, 1.7)), ((1.9, 0), (1, 2.1))],
         "left_struts upper": [((-1.9, 0), (-1, 1.7))],
         "right_struts upper": [((1.9, 0), (1, 1.7))],
-        "left_struts lower": [((-1.9, 0), (-1, 0.9))],
-        "right_struts lower": [((1.9, 0), (1, 0.9))],
+        "left_struts lower": [((-1.9, 0), (-1, 0.9)), ((-1.9, 0), (-0.6, 0.9))],
+        "right_struts lower": [((1.9, 0), (1, 0.9)), ((1.9, 0), (0.6, 0.9))],
     },
 }  # fmt: skip
 
@@ -84,6 +94,12 @@ def places(case: Case, hand: Hand) -> list[tuple[str, list[int]]]:
             chosen.append(first + int(off.argmin()))
         found.append((part, chosen))
     return found
+
+
+def even(case: Case) -> list[tuple[str, list[int]]]:
+    """The simplest rule, as parts of a design: all candidates of a group have one size."""
+    ranges = ((group.name, case.group_slices[group.name]) for group in case.design_groups)
+    return [(name, list(range(own.start, own.stop))) for name, own in ranges]
 
 
 class Sizes:
@@ -115,9 +131,9 @@ class Sizes:
         return replace(sample, gradients=sample.gradients @ self.spread, constraint_gradients=limits @ self.spread)
 
 
-def sized(case: Case, hand: Hand, score: Scalarisation) -> Floats:
-    """The hand design (N,) with the sizes that the optimiser finds best, from the best of several equal starts."""
-    problem = Sizes(StructureProblem(Evaluator(case), score), places(case, hand))
+def sized(case: Case, parts: list[tuple[str, list[int]]], score: Scalarisation) -> Floats:
+    """The design (N,) with the sizes of its parts that the optimiser finds best, from the best of several starts."""
+    problem = Sizes(StructureProblem(Evaluator(case), score), parts)
     chosen = settings(max_iterations=ITERATIONS)
     ends = [run(Gsao(problem, chosen), Gsao(problem, chosen).start(share * problem.upper)) for share in STARTS]
     best = min(ends, key=lambda state: (max(state.best_violation, 1e-6), state.best_objective))

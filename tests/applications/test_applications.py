@@ -3,15 +3,18 @@
 import numpy as np
 import pytest
 
-from benchmarks.applications import APPLICATIONS, HELD, excess, finer
-from benchmarks.forces import whole_forces
-from benchmarks.hand import HANDS, places
+from benchmarks.applications import APPLICATIONS, HELD, PRESENT, excess, finer, scorer
+from benchmarks.forces import strokes, whole_forces
+from benchmarks.hand import HANDS, even, places
 from benchmarks.motions import DATA, texts
 from benchmarks.scenes import CASES
 from mdstopo import Case, evaluate, load_case, optimize
-from mdstopo.case.model import ResponseRow, VolumeRow
+from mdstopo.case.model import CrushLaw, VolumeRow
 from mdstopo.scene.refusals import refusals
 from mdstopo.store.design import read_design
+
+#: the rows on members of the lander's sides
+SIDES = ((4, "left"), (5, "right"))
 
 
 def case_of(name: str, **overrides: object) -> Case:
@@ -38,6 +41,14 @@ def test_a_hand_design_is_made_of_candidates(name: str) -> None:
     assert {part.split()[0] for part, _ in found} <= {group.name for group in case.design_groups}
     chosen = [member for _, members in found for member in members]
     assert len(set(chosen)) == len(chosen) > 3
+
+
+@pytest.mark.parametrize("name", APPLICATIONS)
+def test_an_even_design_has_every_candidate_once(name: str) -> None:
+    case = case_of(name)
+    parts = even(case)
+    assert [part for part, _ in parts] == [group.name for group in case.design_groups]
+    assert [member for _, members in parts for member in members] == list(range(case.n_design))
 
 
 def test_a_hand_design_with_a_member_that_is_none_is_refused() -> None:
@@ -68,6 +79,22 @@ def test_the_stored_design_keeps_its_limits_when_computed_a_hundred_times_finer(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", APPLICATIONS)
+def test_the_stored_hand_design_has_the_parts_stated_keeps_all_limits_and_is_worse(name: str) -> None:
+    case = case_of(name)
+    hand, found = (read_design(CASES / "designs" / f"{each}.txt", case.n_design) for each in (f"{name}-hand", name))
+    rest = np.ones(case.n_design, dtype=bool)
+    for _, members in places(case, HANDS[name]):
+        assert np.ptp(hand[members]) == 0.0
+        rest[members] = False
+    assert np.array_equal(hand[rest], case.lower[rest])
+    fine, score = finer(case), scorer(case)
+    drawn = evaluate(fine, hand, gradient=False)
+    assert excess(case, drawn) <= HELD
+    assert score(evaluate(fine, found, gradient=False)) < 0.98 * score(drawn)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", APPLICATIONS)
 def test_a_short_run_from_the_stated_start_makes_headway(name: str) -> None:
     case = case_of(name, **{"optimizer.max_iterations": 5, "combine.weights": weights(name)})
     result = optimize(case)
@@ -84,15 +111,30 @@ def weights(name: str) -> dict[str, float]:
 
 @pytest.mark.slow
 def test_forces_that_are_written_out_again_agree_with_the_response() -> None:
-    case = case_of("lander")
-    design = read_design(CASES / "designs" / "lander.txt", case.n_design)
-    looked = {row.response.group: i for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
-    found = evaluate(case, design, gradient=False)
-    for group in case.design_groups:
-        if group.name in looked:
-            i = looked[group.name]
+    design = read_design(CASES / "designs" / "lander.txt", case_of("lander").n_design)
+    for looked in ("struts", "crush"):
+        limits = {f"constraints[{i}].response": {"member_force": {"group": f"{side}_{looked}"}} for i, side in SIDES}
+        case = case_of("lander", **limits)
+        found = evaluate(case, design, gradient=False)
+        for i, side in SIDES:
+            group = next(each for each in case.design_groups if each.name == f"{side}_{looked}")
             own = whole_forces(case, design, group, "level") * design[case.group_slices[group.name]]
             assert own.max() == pytest.approx(found.constraints[i] + case.constraints[i].bound, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_the_cartridges_of_the_lander_are_crushed_and_stay_so() -> None:
+    case = case_of("lander")
+    design = read_design(CASES / "designs" / "lander.txt", case.n_design)
+    for group in case.design_groups:
+        if group.name.endswith("_crush"):
+            there = design[case.group_slices[group.name]] >= PRESENT
+            assert there.any()
+            law = group.laws[0]
+            assert isinstance(law, CrushLaw)
+            far = strokes(case, design, group, "level")[there]
+            assert far.max() > 5 * law.force / law.stiffness
+            assert np.all(far < 0.7 * group.length[there])
 
 
 @pytest.mark.slow
