@@ -6,7 +6,7 @@
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
 #   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
-#   make peers                    compare with other programs, which it installs (2 GB)
+#   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
 #   make readme                   measure everything and put the numbers into the README
 #   make clean                    remove the environment and whatever was made; results stay
 
@@ -88,7 +88,7 @@ $(VENV)/.ready-peers: $(VENV)/.ready
 	@touch $@
 
 peers: $(VENV)/.ready-peers
-	$(BIN)/python -m benchmarks $(or $(SECTIONS),ring)
+	$(BIN)/python -m benchmarks $(or $(SECTIONS),peers ring forward million)
 
 readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme

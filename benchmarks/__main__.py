@@ -20,11 +20,14 @@ SECTIONS = {
     "chain": "cost of a step against the number of jointed bodies",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
-    "ring": "a closed loop of bodies beside other programs, which the extra peers installs; forward runs too",
+    "peers": "the paper's scene and others beside other programs, which the extra peers installs",
+    "ring": "a closed loop of bodies beside other programs, forward runs too",
+    "forward": "forward runs of the paper's bodies beside other programs",
+    "million": "a million members beside JAX",
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
-PEERS = ("ring",)
+PEERS = ("peers", "ring", "forward", "million")
 
 #: what has no place in the README
 ELSEWHERE = (*PEERS, "applications")

@@ -50,6 +50,7 @@ class Entry:
 class Measured:
     """An entry's errors (relative; of the gradient None where there is none), medians of its rounds in seconds.
 
+    processor: the same, of what its process had of the processors, which hardly depends on what else the machine does;
     loading: seconds until its packages are there; making: until the first result; memory: peak of its process, MiB.
     """
 
@@ -57,6 +58,7 @@ class Measured:
     value_error: float
     gradient_error: float | None
     rounds: Sequence[float]
+    processor: Sequence[float]
     loading: float
     making: float
     memory: float
@@ -65,6 +67,11 @@ class Measured:
     def seconds(self) -> float:
         """The median."""
         return median(self.rounds)
+
+    @property
+    def processor_seconds(self) -> float:
+        """The median of processor times."""
+        return median(self.processor)
 
     @property
     def quartiles(self) -> tuple[float, float]:
@@ -98,7 +105,7 @@ def race(
         made: list[_Made] = []
         for name in dict.fromkeys(entry.peer for entry in entries):
             why = _unable(peers[name], course.problem)
-            process = None if why else stack.enter_context(_Process(name, folder, core))
+            process = None if why else stack.enter_context(_Process(peers[name].module, folder, core))
             if process is None or process.failed:
                 tell(f"{name} is left out: {why or (process and process.failed)}")
                 continue
@@ -126,19 +133,20 @@ def _make(process: "_Process", entries: Sequence[Entry], tell: Callable[[str], N
 
 
 def _timed(made: Sequence[_Made], design: int, rounds: int, seconds: float) -> list[Measured]:
-    found: list[list[float]] = [[] for _ in made]
+    found: list[tuple[list[float], list[float]]] = [([], []) for _ in made]
     for _ in range(rounds):
         for each, own in zip(made, found, strict=True):
             answer = each.process.ask(do="time", which=each.which, design=design, seconds=seconds)
             if "failed" not in answer:
-                own.append(median(answer["times"]))
+                own[0].append(median(answer["times"]))
+                own[1].append(median(answer["processor"]))
     return [
         Measured(
-            each.entry, *each.answer["errors"][design], own, each.process.loading, each.answer["seconds"],
+            each.entry, *each.answer["errors"][design], *own, each.process.loading, each.answer["seconds"],
             each.answer["memory"],
         )
         for each, own in zip(made, found, strict=True)
-        if own
+        if own[0]
     ]  # fmt: skip
 
 
@@ -169,7 +177,7 @@ def _plain(value: Any) -> str:
 class _Process:
     """A worker and what is said to it."""
 
-    def __init__(self, peer: str, folder: str, core: int | None) -> None:
+    def __init__(self, module: str, folder: str, core: int | None) -> None:
         root = str(Path(__file__).resolve().parent.parent.parent)
         threads = {} if core is None else dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
         path = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
@@ -183,7 +191,7 @@ class _Process:
             env=os.environ | threads | {"PYTHONPATH": path},
         )
         self._made = -1
-        answer = self.ask(do="open", peer=peer, folder=folder, core=core)
+        answer = self.ask(do="open", module=module, folder=folder, core=core)
         self.failed: str = answer.get("failed", "")
         self.loading: float = answer.get("seconds", 0.0)
 

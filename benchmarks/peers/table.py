@@ -1,12 +1,10 @@
 """Which programs there are. Their modules, and with them their packages, are imported only in their own processes."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
 
-from benchmarks.peers.problem import Floats, Problem
+from benchmarks.peers.problem import Floats
 
 #: (alpha, whether the gradient is wanted) -> G and dG/dalpha (N,), or None where it is not wanted or cannot be had
 Objective = Callable[[Floats, bool], tuple[float, Floats | None]]
@@ -29,11 +27,6 @@ class Peer:
     def missing(self) -> list[str]:
         """Those of its packages that are not installed."""
         return [name for name in self.packages if find_spec(name) is None]
-
-    def make(self, problem: Problem, setting: Mapping[str, Any]) -> Objective:
-        """What is timed."""
-        made: Objective = import_module(self.module).make(problem, **setting)
-        return made
 
 
 PEERS = {

@@ -6,18 +6,22 @@ from benchmarks.peers.problem import GROUND, Problem
 from mdstopo.case.model import Case, RevoluteJoint, SpringLaw
 
 
+class NotForPeersError(ValueError):
+    """The peers were not written for what a case has; the message says what they are written for."""
+
+
 def problem_of(case: Case) -> Problem:
-    """The case, whose objective must be one energy. Raises ValueError for what the peers were not written for."""
+    """The case, whose objective must be one energy. Raises NotForPeersError."""
+    _refuse(case)
     (load_case,) = case.load_cases
     order = {"ground": GROUND} | {body.name: k for k, body in enumerate(case.bodies)}
     springs = [_spring(group.laws) for group in case.members]
-    _refuse(case)
     mass = np.array([[body.mass, body.mass, body.inertia] for body in case.bodies])
     force = np.zeros_like(mass)
     force[:, :2] = mass[:, :2] * np.array(load_case.gravity)
     for load in load_case.loads:
         if load.at_local != (0.0, 0.0) or load.frame != "global":
-            raise ValueError("only forces at the centre of mass, in global axes")
+            raise NotForPeersError("only forces at the centre of mass, in global axes")
         force[order[load.body]] += np.array([*map(_constant, load.force), _constant(load.moment)])
     return Problem(
         mass=mass,
@@ -37,27 +41,29 @@ def problem_of(case: Case) -> Problem:
 
 
 def _refuse(case: Case) -> None:
+    if len(case.objectives) != 1 or len(case.load_cases) != 1:
+        raise NotForPeersError("only one objective in one load case")
     (objective,), (load_case,) = case.objectives, case.load_cases
     if objective.over_time not in ("max", "final") or objective.response.kind != "energy":
-        raise ValueError("only the energy, its maximum or the last")
+        raise NotForPeersError("only the energy, its maximum or the last")
     if not all(isinstance(joint, RevoluteJoint) for joint in case.joints):
-        raise ValueError("only revolute joints")
+        raise NotForPeersError("only revolute joints")
     if case.bushings or case.contacts or load_case.motions or load_case.start != 0.0:
-        raise ValueError("no bushings, contacts, motions, and a start at 0")
+        raise NotForPeersError("no bushings, contacts, motions, and a start at 0")
     if any(any(body.velocity) or body.angular_velocity for body in case.bodies):
-        raise ValueError("only bodies at rest")
-    if any(not group.design or group.power != 1.0 for group in case.members):
-        raise ValueError("only members that are designed, with a power of 1")
+        raise NotForPeersError("only bodies at rest")
+    if case.variables or any(not group.design or group.power != 1.0 for group in case.members):
+        raise NotForPeersError("only members that are designed, with a power of 1")
 
 
 def _spring(laws: object) -> SpringLaw:
     match laws:
         case (SpringLaw(damping=0.0, preload=0.0, free_length=None) as law,) if law.active_from is None:
             return law
-    raise ValueError("only undamped springs")
+    raise NotForPeersError("only undamped springs")
 
 
 def _constant(value: object) -> float:
     if not isinstance(value, float | int):
-        raise ValueError("only constant loads")
+        raise NotForPeersError("only constant loads")
     return float(value)

@@ -1,8 +1,8 @@
 """One program in a process of its own: `python -m benchmarks.peers.worker`, which talks JSON, a line each way.
 
-    {"do": "open", "peer", "folder", "core"}  -> {"seconds"}: the packages are loaded
-    {"do": "make", "setting", "gradient"}     -> {"seconds", "errors", "memory"}: of G and of the gradient at each design
-    {"do": "time", "which", "design", "seconds"} -> {"times"}: seconds of each call of what was made `which`-th
+    {"do": "open", "module", "folder", "core"} -> {"seconds"}: the packages are loaded
+    {"do": "make", "setting", "gradient"}     -> {"seconds", "errors", "memory"}: of G and gradient at each design
+    {"do": "time", "which", "design", "seconds"} -> {"times", "processor"}: seconds of each call
 
 An answer {"failed"} says in a sentence what did not work. The folder has what `race` wrote.
 """
@@ -26,7 +26,7 @@ class Worker:
     def __init__(self) -> None:
         self._calls: list[Callable[[int], object]] = []
 
-    def open(self, peer: str, folder: str, core: int | None) -> dict[str, Any]:
+    def open(self, module: str, folder: str, core: int | None) -> dict[str, Any]:
         """Load the data and the program's packages, on one core where one is given."""
         if core is not None and hasattr(os, "sched_setaffinity"):
             os.sched_setaffinity(0, {core})
@@ -36,10 +36,8 @@ class Worker:
         import numpy as np
 
         from benchmarks.peers.problem import Problem
-        from benchmarks.peers.table import PEERS
 
-        self._peer = PEERS[peer]
-        import_module(self._peer.module)
+        self._module = import_module(module)
         place = Path(folder)
         self._problem = Problem.load(place / "problem.npz")
         with np.load(place / "truth.npz") as truth:
@@ -51,7 +49,7 @@ class Worker:
         import numpy as np
 
         began = time.perf_counter()
-        objective = self._peer.make(self._problem, setting)
+        objective = self._module.make(self._problem, **setting)
         objective(self._alpha[0], gradient)
         seconds = time.perf_counter() - began
         errors: list[tuple[float, float | None]] = []
@@ -65,14 +63,15 @@ class Worker:
 
     def time(self, which: int, design: int, seconds: float) -> dict[str, Any]:
         """Call for so many seconds, and at least a few times."""
-        call, times = self._calls[which], []
+        call, times, processor = self._calls[which], [], []
         call(design)  # what a program keeps from the last call is of this design, as in an optimisation
         end = time.perf_counter() + seconds
         while len(times) < CALLS or time.perf_counter() < end:
-            began = time.perf_counter()
+            began, busy = time.perf_counter(), time.process_time()
             call(design)
+            processor.append(time.process_time() - busy)
             times.append(time.perf_counter() - began)
-        return {"times": times}
+        return {"times": times, "processor": processor}
 
 
 def serve(requests: TextIO, answers: TextIO) -> None:
