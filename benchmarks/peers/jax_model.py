@@ -1,4 +1,7 @@
-"""The equations of motion for JAX: all members of a group as two products with its moments."""
+"""The equations of motion for JAX: all members of a group as two products with its moments.
+
+What a member has goes in as arguments: as constants of the program XLA would compute with them while it compiles.
+"""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,42 +13,49 @@ import numpy as np
 from benchmarks.peers.problem import GROUND, Problem, coefficients, moments
 
 Array = Any
-Function = Callable[[Array, Array], Array]
+#: stiffness (N,), length (N,), moments: of each group, or (K, 8, N / K) where the groups are of one size
+Springs = tuple[Array, Array, Any]
+Function = Callable[[Array, Springs], Array]
 
 jax.config.update("jax_enable_x64", True)
 
 
 def model_of(problem: Problem) -> tuple[Function, Function]:
-    """rate and energy, functions of the state y (6 B: coordinates, then velocities) and of stiffness (N,)."""
+    """rate and energy, functions of the state y (6 B: coordinates, then velocities) and of the springs."""
     n = 3 * problem.bodies
-    rows = [jnp.asarray(np.ascontiguousarray(moments(problem.p[s], problem.q[s]).T)) for s in problem.slices()]
-    length = jnp.asarray(problem.length)
     inverse, force = jnp.asarray(1.0 / problem.mass.ravel()), jnp.asarray(problem.force.ravel())
-    # groups of one size are one product for all of them
-    counts = {each.shape[1] for each in rows}
-    stacked = jnp.stack(rows) if len(counts) == 1 and len(rows) > 1 else None
 
-    def lengths(shape: Array) -> Array:
-        if stacked is not None:
-            return jnp.sqrt(jnp.einsum("kc,kcm->km", shape, stacked).ravel())
-        return jnp.sqrt(jnp.concatenate([shape[k] @ each for k, each in enumerate(rows)]))
+    def lengths(shape: Array, rows: Any) -> Array:
+        if len(rows) == 1:
+            return jnp.sqrt(shape[0] @ rows[0])
+        if isinstance(rows, tuple):
+            return jnp.sqrt(jnp.concatenate([shape[k] @ each for k, each in enumerate(rows)]))
+        return jnp.sqrt(jnp.einsum("kc,kcm->km", shape, rows).ravel())
 
-    def sums(share: Array) -> Array:
-        if stacked is not None:
-            return jnp.einsum("kcm,km->kc", stacked, share.reshape(len(rows), -1))
-        return jnp.stack([each @ share[part] for each, part in zip(rows, problem.slices(), strict=True)])
+    def sums(share: Array, rows: Any) -> Array:
+        if isinstance(rows, tuple):
+            return jnp.stack([each @ share[part] for each, part in zip(rows, problem.slices(), strict=True)])
+        return jnp.einsum("kcm,km->kc", rows, share.reshape(len(rows), -1))
+
+    def poses(x: Array, bodies: list[int]) -> Array:
+        # slices, because XLA has no fast way back from indices
+        return jnp.stack([jnp.zeros(3) if body == GROUND else x[3 * body : 3 * body + 3] for body in bodies])
 
     def shapes(x: Array) -> Array:
-        pose = jnp.concatenate([x, jnp.zeros(3)]).reshape(-1, 3)  # the ground is the last
-        one, two = (pose[problem.groups[:, side]].T for side in (0, 1))
+        if len(problem.groups) == 1 and GROUND not in problem.groups[0]:
+            # scalars, which XLA does not have to put in and out of arrays
+            one, two = (x[3 * body : 3 * body + 3] for body in problem.groups[0].tolist())
+            return jnp.stack([*coefficients(one, two, jnp.cos, jnp.sin)[:-1], jnp.ones(())])[None]
+        one, two = (poses(x, problem.groups[:, side].tolist()).T for side in (0, 1))
         found = coefficients(one, two, jnp.cos, jnp.sin)
         found[-1] = jnp.ones(len(problem.groups))
         return jnp.stack(found, axis=1)
 
-    def accelerations(x: Array, v: Array, stiffness: Array) -> Array:
+    def accelerations(x: Array, v: Array, springs: Springs) -> Array:
+        stiffness, length, rows = springs
         shape, back = jax.vjp(shapes, x)
-        share = 0.5 * stiffness * (1.0 - length / lengths(shape))
-        applied = force - back(sums(share))[0]
+        share = 0.5 * stiffness * (1.0 - length / lengths(shape, rows))
+        applied = force - back(sums(share, rows))[0]
         return inverse * applied if not len(problem.hinges) else held(x, v, applied)
 
     def held(x: Array, v: Array, applied: Array) -> Array:
@@ -56,22 +66,21 @@ def model_of(problem: Problem) -> tuple[Function, Function]:
         return inverse * (applied - slope.T @ jax.scipy.linalg.cho_solve(factor, scaled @ applied - wanted))
 
     def gaps(x: Array) -> Array:
-        pose = jnp.concatenate([x, jnp.zeros(3)]).reshape(-1, 3)
         ends = []
         for side in (0, 1):
-            body, at = pose[problem.hinges[:, side]], problem.at[:, side]
+            body, at = poses(x, problem.hinges[:, side].tolist()), problem.at[:, side]
             c, s = jnp.cos(body[:, 2]), jnp.sin(body[:, 2])
             turned = jnp.stack([c * at[:, 0] - s * at[:, 1], s * at[:, 0] + c * at[:, 1]], axis=1)
             ends.append(body[:, :2] + turned)
         return (ends[1] - ends[0]).ravel()
 
-    def rate(y: Array, stiffness: Array) -> Array:
-        return jnp.concatenate([y[n:], accelerations(y[:n], y[n:], stiffness)])
+    def rate(y: Array, springs: Springs) -> Array:
+        return jnp.concatenate([y[n:], accelerations(y[:n], y[n:], springs)])
 
-    def energy(y: Array, stiffness: Array) -> Array:
-        return 0.5 * jnp.sum(stiffness * (lengths(shapes(y[:n])) - length) ** 2)
+    def energy(y: Array, springs: Springs) -> Array:
+        stiffness, length, rows = springs
+        return 0.5 * jnp.sum(stiffness * (lengths(shapes(y[:n]), rows) - length) ** 2)
 
-    assert GROUND == -1
     return rate, energy
 
 
@@ -83,20 +92,27 @@ def start_of(problem: Problem) -> Array:
 def power_of(rate: Function, energy: Function) -> Function:
     """The time derivative of the energy."""
 
-    def power(y: Array, stiffness: Array) -> Array:
-        return jax.jvp(lambda u: energy(u, stiffness), (y,), (rate(y, stiffness),))[1]
+    def power(y: Array, springs: Springs) -> Array:
+        return jax.jvp(lambda u: energy(u, springs), (y,), (rate(y, springs),))[1]
 
     return power
 
 
-def objective_of(problem: Problem, function: Function) -> Any:
-    """The benchmark's objective from a function of alpha that JAX can differentiate."""
-    both, alone = jax.jit(jax.value_and_grad(function)), jax.jit(function)  # type: ignore[arg-type]
+def objective_of(problem: Problem, function: Callable[[Springs], Array]) -> Any:
+    """The benchmark's objective from a function of the springs that JAX can differentiate."""
+    rows = [np.ascontiguousarray(moments(problem.p[part], problem.q[part]).T) for part in problem.slices()]
+    alike = len({each.shape for each in rows}) == 1 and len(rows) > 1
+    fixed = jax.device_put((problem.stiffness, problem.length, np.stack(rows) if alike else tuple(rows)))
+
+    def of_design(alpha: Array, whole: Springs) -> Array:
+        return function((whole[0] * alpha, *whole[1:]))
+
+    both, alone = jax.jit(jax.value_and_grad(of_design)), jax.jit(of_design)
 
     def objective(alpha: Any, gradient: bool) -> tuple[float, Any]:
         if not gradient:
-            return float(alone(alpha)), None
-        value, slopes = both(alpha)
+            return float(alone(alpha, fixed)), None
+        value, slopes = both(alpha, fixed)
         return float(value), np.asarray(slopes)
 
     return objective

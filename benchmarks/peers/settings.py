@@ -12,7 +12,7 @@ def two_bodies(at_end: bool) -> Iterator[Entry]:
     """The paper's scene; at_end: whether the peak is known to be at the end, so that none looks for it inside."""
     yield from ours(("gauss", "runge_kutta"))
     for steps in (2, 3, 4, 6, 8, 10) if at_end else (4, 8, 12, 16):
-        yield Entry("jax", {"steps": steps})
+        yield Entry("jax", {"steps": steps, "refine": not at_end})
     for tolerance in (1e-6, 1e-8, 1e-10):
         yield Entry("diffrax", {"tolerance": tolerance, "refine": not at_end})
         yield Entry("casadi", {"tolerance": tolerance})
@@ -60,7 +60,7 @@ def million() -> Iterator[Entry]:
     """Members by the million, on all cores."""
     yield from ours(("gauss",), (1e-3, 1e-4, 1e-5, 1e-6, 1e-7))
     for steps in (2, 3, 4):
-        yield Entry("jax", {"steps": steps})
+        yield Entry("jax", {"steps": steps, "refine": False})
 
 
 def ours(integrators: Sequence[str], tolerances: Sequence[float] = TOLERANCES) -> Iterator[Entry]:
