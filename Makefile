@@ -6,7 +6,7 @@
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
 #   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
-#   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
+#   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
 #   make readme                   measure everything and put the numbers into the README
 #   make clean                    remove the environment and whatever was made; results stay
 
@@ -21,13 +21,11 @@ ARGS ?=
 TESTS ?=
 JOBS ?= 2
 SECTIONS ?=
-PEERS ?=
-PEERS_PYTHON ?= $(BIN)/python
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test lint types docs reproduce bench readme clean
+.PHONY: help run test lint types docs reproduce bench peers readme clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,11p
@@ -83,7 +81,15 @@ $(VENV)/.ready-bench: $(VENV)/.ready
 	@touch $@
 
 bench: $(VENV)/.ready-bench
-	$(BIN)/python -m benchmarks $(SECTIONS) $(if $(PEERS),--peers '$(PEERS)' --peers-python '$(PEERS_PYTHON)')
+	$(BIN)/python -m benchmarks $(SECTIONS)
+
+# The programs to compare with, beside mdstopo in one environment.
+$(VENV)/.ready-peers: $(VENV)/.ready
+	$(BIN)/python -m pip install --quiet --editable '.[peers]'
+	@touch $@
+
+peers: $(VENV)/.ready-peers
+	$(BIN)/python -m benchmarks $(or $(SECTIONS),peers ring forward million)
 
 readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme

@@ -20,11 +20,17 @@ SECTIONS = {
     "chain": "cost of a step against the number of jointed bodies",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
-    "peers": "the same beside other programs (needs --peers)",
+    "peers": "the paper's scene and others beside other programs, which the extra peers installs",
+    "ring": "a closed loop of bodies beside other programs, forward runs too",
+    "forward": "forward runs of the paper's bodies beside other programs",
+    "million": "a million members beside JAX",
 }
 
+#: what compares with other programs is no part of a run without names: they compile for minutes
+PEERS = ("peers", "ring", "forward", "million")
+
 #: what has no place in the README
-ELSEWHERE = ("peers", "applications")
+ELSEWHERE = (*PEERS, "applications")
 
 
 def main() -> int:
@@ -35,28 +41,24 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but peers")
+    parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but those with other programs")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
     parser.add_argument(
         "--pages",
         action="store_true",
         help="write the applications' tables into docs/applications, their designs into cases/designs",
     )
-    parser.add_argument("--peers", metavar="DIR", help="folder of the programs to compare with")
-    parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     chosen = parser.parse_args()
     unknown = [name for name in chosen.sections if name not in SECTIONS]
     if unknown:
         parser.error(f"no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}")
-    sections = chosen.sections or (["peers"] if chosen.peers else [name for name in SECTIONS if name != "peers"])
-    if "peers" in sections and not chosen.peers:
-        parser.error("the section peers needs --peers DIR")
+    sections = chosen.sections or [name for name in SECTIONS if name not in PEERS]
     machine = f"Measured on: {description()}."
     print(machine + "\n", flush=True)
     for name in sections:
         began = time.perf_counter()
         printed = []
-        for table in _tables(name, chosen.peers, chosen.peers_python, chosen.pages):
+        for table in _tables(name, chosen.pages):
             text = table.markdown()
             printed.append(text)
             print(text, flush=True)
@@ -68,10 +70,9 @@ def main() -> int:
     return 0
 
 
-def _tables(name: str, peers: str | None, python: str, pages: bool) -> Iterator[Table]:
-    section: Callable[..., Iterator[Table]] = getattr(import_module(f"benchmarks.{name}"), name)
-    if name == "peers":
-        return section(peers, python)
+def _tables(name: str, pages: bool) -> Iterator[Table]:
+    module = "benchmarks.peers.sections" if name in PEERS else f"benchmarks.{name}"
+    section: Callable[..., Iterator[Table]] = getattr(import_module(module), name)
     return section(folder=Path("cases/designs")) if name == "applications" and pages else section()
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 @click.option("--members", type=click.IntRange(0), metavar="N", help="scaling: at most so many members.")
 @click.option("--bodies", type=click.IntRange(0), metavar="N", help="scaling: at most so many bodies.")
 @click.option("--picture", type=FILE, metavar="FILE", help="work-precision: draw it, as PNG, SVG or PDF.")
+@click.option("--peers", is_flag=True, help="work-precision: beside other programs, in a checkout of the project.")
 @output_options
 def command(
     what: str,
@@ -29,20 +30,29 @@ def command(
     members: int | None,
     bodies: int | None,
     picture: Path | None,
+    peers: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
     """Measure the program on this machine.
 
     scaling: time and memory against the number of members, up to a million, and of bodies. work-precision: run time
-    against error, over integrators, tolerances and sensitivity methods, of CASE or the paper's scene. skip: what is
-    left out where nothing asks for it, and what that is worth.
+    against error, over integrators, tolerances and sensitivity methods, of CASE or the paper's scene; with --peers
+    beside JAX, diffrax, CasADi and SciPy, those of them that are installed. skip: what is left out where nothing asks
+    for it, and what that is worth.
     """
     if case_path is not None and what != "work-precision":
         raise click.UsageError(f"bench {what} takes no case")
+    if peers and what != "work-precision":
+        raise click.UsageError(f"bench {what} takes no --peers")
     output = Output(json=as_json, quiet=quiet)
     tables = []
-    for table in _tables(what, case_path, overrides, members, bodies, picture, output):
+    found = (
+        _beside_peers(case_path, overrides, picture, output)
+        if peers
+        else _tables(what, case_path, overrides, members, bodies, picture, output)
+    )
+    for table in found:
         tables.append(table)
         output.say(table.markdown())
     from mdstopo.bench.machine import description
@@ -81,6 +91,24 @@ def _tables(
         if picture is not None:
             draw(case, points, picture)
             output.say(str(picture))
+
+
+def _beside_peers(
+    case_path: Path | None, overrides: dict[str, str], picture: Path | None, output: Output
+) -> "Iterator[Table]":
+    from mdstopo.bench.peers import NotACheckoutError, load
+    from mdstopo.cli.options import open_case
+
+    try:
+        comparison = load()
+    except NotACheckoutError as error:
+        raise click.UsageError(str(error)) from None
+    if case_path is None and overrides:
+        raise click.UsageError("--set needs CASE where other programs are asked for")
+    case = None if case_path is None else open_case(case_path, overrides)
+    yield from comparison(case, output.notice, picture)
+    if picture is not None:
+        output.say(str(picture))
 
 
 def _plain(table: "Table") -> dict[str, Any]:

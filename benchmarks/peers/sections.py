@@ -1,0 +1,106 @@
+"""The comparisons: two bodies, any case, a closed loop, a million members."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+
+from benchmarks.peers import scenes, settings
+from benchmarks.peers.problem import Floats
+from benchmarks.peers.race import Entry, Field, Measured, race
+from benchmarks.peers.tables import LEVELS, against_each, every_setting, standings
+from benchmarks.peers.translate import problem_of
+from benchmarks.scenes import DESIGNS, SCENES, design, scene
+from mdstopo.bench.reference import Reference, solution
+from mdstopo.bench.scenes import plate
+from mdstopo.bench.tables import Table
+from mdstopo.bench.work_precision import TIGHTEST, with_solver
+from mdstopo.case.model import Case
+from mdstopo.case.reader import read_case
+
+#: shares of the peers' times that are allowed
+BAR, BAR_LOOP, BAR_FORWARD, BAR_MILLION = 0.2, 0.1, 0.02, 0.05
+MILLION = 1_000_000
+
+#: a named scene and design, with what was measured there
+Group = tuple[str, Sequence[Measured]]
+Tell = Callable[[str], None]
+
+
+def _tell(text: str) -> None:
+    """What is being done goes where it does not mix with tables."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def peers() -> Iterator[Table]:
+    """The paper's two bodies and their variants with an inner peak."""
+    yield from compared(paper_groups(_tell))
+
+
+def paper_groups(tell: Tell) -> Iterator[Group]:
+    """Both scenes at both designs."""
+    for name in SCENES:
+        course = field_of(scene(name), "runge_kutta")
+        tell(f"{name}:")
+        found = race(course, list(settings.two_bodies(at_end=name == "fig6")), tell)
+        yield from zip((f"{name}, {own}" for own in DESIGNS), found, strict=True)
+
+
+def case_groups(case: Case, tell: Tell) -> Iterator[Group]:
+    """Any case that the peers can compute, at its initial design. Raises NotForPeersError for others."""
+    problem = problem_of(case)
+    entries: list[Entry] = list(settings.any_case(hinges=bool(len(problem.hinges))))
+    truth = Reference(*solution(with_solver(case, "runge_kutta", TIGHTEST), case.initial))
+    (found,) = race(Field(problem, [np.array(case.initial)], [truth]), entries, tell)
+    yield case.title or case.name, found
+
+
+def compared(groups: Iterator[Group]) -> Iterator[Table]:
+    """A table for each group, and one of the fastest."""
+    known: list[Group] = []
+    for name, found in groups:
+        yield every_setting(f"Work and precision beside other programs: {name}", found)
+        known.append((name, found))
+    yield standings("Objective and exact gradient beside the fastest peer", known, LEVELS, BAR)
+
+
+def ring() -> Iterator[Table]:
+    """A closed loop of ten bodies: with gradients beside CasADi and JAX, forward runs beside Exudyn and MuJoCo."""
+    course = field_of(read_case(scenes.ring()), "runge_kutta")
+    whole = race(course, list(settings.ring()), _tell)
+    forward = race(course, list(settings.forward(hinges=True)), _tell, seconds=0.02)
+    for name, *both in zip(DESIGNS, whole, forward, strict=True):
+        kinds = ("objective and gradient", BAR_LOOP), ("forward runs", BAR_FORWARD)
+        for (what, bar), found in zip(kinds, both, strict=True):
+            title = f"A ring of ten links, 1,000 members, {name} design: {what}"
+            yield every_setting(title, found)
+            yield against_each(f"{title}, at equal error", found, bar)
+
+
+def forward() -> Iterator[Table]:
+    """Forward runs of the paper's two bodies beside Exudyn and MuJoCo."""
+    course = field_of(scene("end"), "runge_kutta")
+    for name, found in zip(DESIGNS, race(course, list(settings.forward(hinges=False)), _tell), strict=True):
+        title = f"Two bodies, {name} design: forward runs"
+        yield every_setting(title, found)
+        yield against_each(f"{title}, at equal error", found, BAR_FORWARD)
+
+
+def million() -> Iterator[Table]:
+    """A million members between the two bodies beside JAX, each on all processors."""
+    case = read_case(plate(MILLION))
+    course = field_of(case, "runge_kutta", designs=DESIGNS[:1], one_core=False)
+    (found,) = race(course, list(settings.million()), _tell, rounds=5, seconds=0.3)
+    title = f"Two bodies, {case.n_design:,} members"
+    yield every_setting(title, found)
+    yield standings(f"{title}, beside the fastest peer", [("plate, uniform", found)], LEVELS[:2], BAR_MILLION)
+
+
+def field_of(case: Case, integrator: str, designs: Sequence[str] = DESIGNS, one_core: bool = True) -> Field:
+    """What all run on; the truth is our result by an integrator at its tightest tolerance.
+
+    For the paper's scenes that is what two independent ways gave (SciPy's sensitivities, JAX), to 4e-13.
+    """
+    tight = with_solver(case, integrator, TIGHTEST)
+    alphas: list[Floats] = [design(name, case.n_design) for name in designs]
+    return Field(problem_of(case), alphas, [Reference(*solution(tight, each)) for each in alphas], one_core)

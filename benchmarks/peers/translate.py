@@ -1,0 +1,69 @@
+"""A case of mdstopo as the plain arrays that the other programs are given."""
+
+import numpy as np
+
+from benchmarks.peers.problem import GROUND, Problem
+from mdstopo.case.model import Case, RevoluteJoint, SpringLaw
+
+
+class NotForPeersError(ValueError):
+    """The peers were not written for what a case has; the message says what they are written for."""
+
+
+def problem_of(case: Case) -> Problem:
+    """The case, whose objective must be one energy. Raises NotForPeersError."""
+    _refuse(case)
+    (load_case,) = case.load_cases
+    order = {"ground": GROUND} | {body.name: k for k, body in enumerate(case.bodies)}
+    springs = [_spring(group.laws) for group in case.members]
+    mass = np.array([[body.mass, body.mass, body.inertia] for body in case.bodies])
+    force = np.zeros_like(mass)
+    force[:, :2] = mass[:, :2] * np.array(load_case.gravity)
+    for load in load_case.loads:
+        if load.at_local != (0.0, 0.0) or load.frame != "global":
+            raise NotForPeersError("only forces at the centre of mass, in global axes")
+        force[order[load.body]] += np.array([*map(_constant, load.force), _constant(load.moment)])
+    return Problem(
+        mass=mass,
+        start=np.array([[*body.position, body.angle] for body in case.bodies]),
+        force=force,
+        groups=np.array([[order[group.body_from], order[group.body_to]] for group in case.members]),
+        first=np.concatenate([[0], np.cumsum([len(group) for group in case.members])]),
+        p=np.concatenate([group.p_local for group in case.members]),
+        q=np.concatenate([group.q_local for group in case.members]),
+        length=np.concatenate([group.length for group in case.members]),
+        stiffness=np.repeat([law.stiffness for law in springs], [len(group) for group in case.members]),
+        hinges=np.array([[order[name] for name in each.bodies] for each in case.joints], dtype=np.intp).reshape(-1, 2),
+        at=np.array([[joint.at_first, joint.at_second] for joint in case.joints]).reshape(-1, 2, 2),
+        end=load_case.end,
+        peak=case.objectives[0].over_time == "max",
+    )
+
+
+def _refuse(case: Case) -> None:
+    if len(case.objectives) != 1 or len(case.load_cases) != 1:
+        raise NotForPeersError("only one objective in one load case")
+    (objective,), (load_case,) = case.objectives, case.load_cases
+    if objective.over_time not in ("max", "final") or objective.response.kind != "energy":
+        raise NotForPeersError("only the energy, its maximum or the last")
+    if not all(isinstance(joint, RevoluteJoint) for joint in case.joints):
+        raise NotForPeersError("only revolute joints")
+    if case.bushings or case.contacts or load_case.motions or load_case.start != 0.0:
+        raise NotForPeersError("no bushings, contacts, motions, and a start at 0")
+    if any(any(body.velocity) or body.angular_velocity for body in case.bodies):
+        raise NotForPeersError("only bodies at rest")
+    if case.variables or any(not group.design or group.power != 1.0 for group in case.members):
+        raise NotForPeersError("only members that are designed, with a power of 1")
+
+
+def _spring(laws: object) -> SpringLaw:
+    match laws:
+        case (SpringLaw(damping=0.0, preload=0.0, free_length=None) as law,) if law.active_from is None:
+            return law
+    raise NotForPeersError("only undamped springs")
+
+
+def _constant(value: object) -> float:
+    if not isinstance(value, float | int):
+        raise NotForPeersError("only constant loads")
+    return float(value)
