@@ -52,8 +52,9 @@ from mdstopo.integrators.steps import (
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, add_loads, add_turning, forces, scale_members, subtract_products
+from mdstopo.mechanics.assembly import add_loads, add_turning, forces, subtract_products
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, scale_members
 from mdstopo.scene.packing import unpack
 
 GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
@@ -171,7 +172,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     n_level = tables.shape[0]
     turning = model.load_body.shape[0] > 0
     steps = GaussSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
-    scale_members(model.block, model.power, model.member, alpha, strength)
+    scale_members(model, alpha, strength)
     pair = model.pair
     inv_mass = model.inv_mass
     times = model.times

@@ -10,7 +10,7 @@ from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, integrate, lo
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start
 from mdstopo.integrators.steps import carve
 from mdstopo.jit import entry
-from mdstopo.mechanics.assembly import scale_members
+from mdstopo.mechanics.passes import scale_members
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.look import dense, look
 
@@ -25,7 +25,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     steps = AlphaSteps(
         *carve(room, room_ints, model.q0.shape[0], model.pair.shape[0], limits[1], limits[2], damped, turning)
     )
-    scale_members(model.block, model.power, model.member, alpha, strength)
+    scale_members(model, alpha, strength)
     step = longest_step(model, strength, damped, settings[2])
     code, count = integrate(model, tables, strength, damped, settings[1], step, limits[0], steps, work)
     return code, count, steps.t[count]

@@ -31,8 +31,9 @@ from mdstopo.integrators.steps import (
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, forces, member_sums, scale_members
+from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, member_sums, scale_members
 from mdstopo.scene.packing import unpack
 
 RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)  # type: ignore[misc]
@@ -157,7 +158,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     n_pair = model.pair.shape[0]
     turning = model.load_body.shape[0] > 0
     steps = RungeKuttaSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
-    scale_members(model.block, model.power, model.member, alpha, strength)
+    scale_members(model, alpha, strength)
     method = 1 if damped else 0
     s = STAGES[method]
     order = ORDERS[method]
@@ -190,7 +191,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
     # a pair that starts strained moves on the scale of its mean strain
     relative_pose(pair, q0, v0, rel[0])
-    member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(False), sums)
+    member_sums(model, strength, rel, np.int64(1), np.bool_(False), sums)
     work[FORCES] += 1
     for p in range(n_pair):
         stiffness = 0.0

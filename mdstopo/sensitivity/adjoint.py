@@ -10,8 +10,8 @@ import numpy as np
 
 from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
 from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import SUMS, design_gradient, energy_gradient
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
@@ -64,7 +64,6 @@ def energy_rows(  # type: ignore[no-untyped-def]
     pair = model.pair
     turning = model.load_body.shape[0] > 0
     integral = reduction in (MEAN, INTEGRAL)
-    unit = model.member[5:8]
     stages = steps.index[count, 0]
     point = np.empty((1, 3, n))
     q = point[0, 0]
@@ -114,7 +113,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     v[d] = state[1, d]
             else:
                 w, c_w = reach(model, tables, strength, steps, count, k, c, damped, q, v, work)
-            value, _ = energy_at(pair, model.block, model.member, strength, q, v, rel, sums)
+            value, _ = energy_at(model, strength, q, v, rel, sums)
             work[0] += 1
             if reduction == FINAL:
                 rows[0, 1] = value
@@ -131,9 +130,9 @@ def energy_rows(  # type: ignore[no-untyped-def]
             z = np.empty((reached, n))
             used = np.zeros(reached, np.int64)
             reverse_sweep(pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, work)
-            design_gradient(pair, model.block, model.member, steps.stage, z, used, out, work)
+            design_gradient(model, steps.stage, z, used, out, work)
         if integral:
-            energy_gradient(pair, model.block, model.member, unit, steps.stage, weight, out)
+            energy_gradient(model, steps.stage, weight, out)
         else:
-            energy_gradient(pair, model.block, model.member, unit, point, weight, out)
+            energy_gradient(model, point, weight, out)
     return found

@@ -9,9 +9,10 @@ import numpy as np
 from mdstopo.integrators.contract import point_of, steps_of
 from mdstopo.integrators.steps import carve, copy_rows, deflection, step_at
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, add_loads, member_sums, unscale_gradient
+from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
+from mdstopo.mechanics.passes import SUMS, member_sums, unscale_gradient
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -55,7 +56,7 @@ def look(  # type: ignore[no-untyped-def]
         )
         if gradient:
             for r in range(found[j]):
-                unscale_gradient(model.block, model.power, alpha, padded[r], gradients[j, r])
+                unscale_gradient(model, alpha, padded[r], gradients[j, r])
 
 
 @kernel
@@ -141,7 +142,7 @@ def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, str
         else:
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
         relative_pose(model.pair, q, v, rel[0])
-        member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(False), sums)
+        member_sums(model, strength, rel, np.int64(1), np.bool_(False), sums)
         f[:] = 0.0
         add_loads(model, steps.index[k, 2], t, q, f)
         for p in range(n_pair):
