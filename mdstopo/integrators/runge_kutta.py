@@ -32,6 +32,7 @@ from mdstopo.integrators.steps import (
 )
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import forces
+from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, scale_members
 from mdstopo.scene.packing import unpack
@@ -149,16 +150,17 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     In: the packed model; tangent: whether tangents are kept for a reverse sweep; settings: tolerance, the error of a
     step relative to the motion; -; fixed step (> 0: no error control); limits: steps allowed, room for steps, for
     stages. Room: room, room_ints, where the steps stay, and two more than are taken (`point_of`); strength
-    (3, M_padded). work: counts, added to. NEEDS_ROOM asks for more room.
+    (3 or more, M_padded), see `carrying`. work: counts, added to. NEEDS_ROOM asks for more room.
     """
-    model = unpack(ints, floats)
+    whole = unpack(ints, floats)
+    scale_members(whole, alpha, strength)
+    model, strength, _ = carrying(whole, strength, np.bool_(True))
     tolerance = MARGIN * settings[0]
     fixed_step = settings[2]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     turning = model.load_body.shape[0] > 0
     steps = RungeKuttaSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
-    scale_members(model, alpha, strength)
     method = 1 if damped else 0
     s = STAGES[method]
     order = ORDERS[method]

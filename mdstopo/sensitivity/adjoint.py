@@ -51,11 +51,12 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
 
 @kernel
 def energy_rows(  # type: ignore[no-untyped-def]
-    model, tables, strength, steps, count, damped, reduction, closeness, gradient, rows, padded, work
+    model, motion, tables, strength, steps, count, damped, reduction, closeness, gradient, rows, padded, work
 ):
     """Value, time and gradient of the stored energy reduced over time.
 
-    In: reduction (MAX..FINAL), closeness (how near to the highest a peak competes, relative), gradient (wanted or not).
+    In: motion, strength: the members that the motion was computed with (`carrying`); reduction (MAX..FINAL), closeness
+    (how near to the highest a peak competes, relative), gradient (wanted or not).
     Out: rows (R, 4) time, value, step, fraction (time NaN for mean and integral); padded (R, M_padded) gradients with
     respect to alpha^mu. Returns how many rows there are.
     """
@@ -95,7 +96,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
         rows[0, 3] = 1.0
     else:
         sign = 1.0 if reduction == MAX else -1.0
-        found = find_peaks(model, tables, strength, steps, count, damped, sign, closeness, rows, work)
+        found = find_peaks(motion, tables, strength, steps, count, damped, sign, closeness, rows, work)
     if not gradient and reduction != FINAL:
         return found
     for r in range(found):
@@ -112,8 +113,8 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     q[d] = state[0, d]
                     v[d] = state[1, d]
             else:
-                w, c_w = reach(model, tables, strength, steps, count, k, c, damped, q, v, work)
-            value, _ = energy_at(model, strength, q, v, rel, sums)
+                w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
+            value, _ = energy_at(motion, strength, q, v, rel, sums)
             work[0] += 1
             if reduction == FINAL:
                 rows[0, 1] = value
