@@ -121,12 +121,14 @@ def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
 def _gather(k, start, stop, block, member, strength, begin, count, room):  # type: ignore[no-untyped-def]
     """Write those of the part start..stop of block k that carry something to room (8, M_padded) from begin on."""
     viscous = block[k, 3] == 1
-    place = np.empty(count, np.int64)
+    place = np.empty(stop - start, np.int64)
     found = 0
     for i in range(start, stop):
-        if strength[0, i] != 0.0 or (viscous and (strength[1, i] != 0.0 or strength[2, i] != 0.0)):
-            place[found] = i
-            found += 1
+        place[found] = i  # without a branch: zeros come at random
+        something = strength[0, i] != 0.0
+        if viscous:
+            something |= (strength[1, i] != 0.0) | (strength[2, i] != 0.0)
+        found += something
     for row in range(8 if viscous else 6):
         source = member[row] if row < 5 else strength[row - 5]
         target = room[row]

@@ -23,14 +23,14 @@ from mdstopo.scene.model import TILE
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
 SUMS = 22
-#: members times poses from which on threads are worth making: some 0.4 ms of work
-WORTH = 200_000
+#: members times poses from which on threads are worth making: some 0.8 ms of work
+WORTH = 400_000
 
 
 @kernel
-def threads_for(model, poses):  # type: ignore[no-untyped-def]
+def threads_for(springs, poses):  # type: ignore[no-untyped-def]
     """How many threads share a pass at so many poses."""
-    return model.threads if model.member.shape[1] * poses >= WORTH else 1
+    return springs.threads if springs.member.shape[1] * poses >= WORTH else 1
 
 
 @kernel
@@ -68,13 +68,16 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
     mu = power[k]
     first = block[k, 4] + start - block[k, 1]
     count = min(stop, block[k, 1] + block[k, 5]) - start
+    a = alpha[first : first + count]
     for row in range(3 if block[k, 3] == 1 else 1):
+        whole = member[5 + row, start : start + count]
+        scaled = strength[row, start : start + count]
         if mu == 1.0:  # a loop of its own: a power that is not used would be computed all the same
             for i in range(count):
-                strength[row, start + i] = alpha[first + i] * member[5 + row, start + i]
+                scaled[i] = a[i] * whole[i]
         else:
             for i in range(count):
-                strength[row, start + i] = alpha[first + i] ** mu * member[5 + row, start + i]
+                scaled[i] = a[i] ** mu * whole[i]
     for i in range(start + count, stop):
         strength[0, i] = 0.0
         strength[1, i] = 0.0
@@ -82,21 +85,22 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
 
 
 @kernel
-def member_sums(model, strength, rel, m, tangent, sums):  # type: ignore[no-untyped-def]
-    """One pass over all members at m relative poses.
+def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-untyped-def]
+    """One pass over all members (`Springs`) at m relative poses.
 
     In: strength (3, M_padded), rel (m, n_pair, POSE), tangent (are K and C wanted). Out: sums (m, n_pair, SUMS).
     """
-    block = model.block
-    chunk = model.chunk
+    block = springs.block
+    chunk = springs.chunk
     sums[:m] = 0.0
     if chunk.shape[0] == 0:
         for k in range(block.shape[0]):
-            _sum(k, block[k, 1], block[k, 2], block, model.member, strength, rel, m, tangent, sums, block[k, 0])
+            _sum(k, block[k, 1], block[k, 2], block, springs.member, strength, rel, m, tangent, sums, block[k, 0])
         return
     counter = np.zeros(1, np.int64)
     part = np.empty((chunk.shape[0], m, 1, SUMS))
-    shared(_sum_chunks, threads_for(model, m), (counter, chunk, block, model.member, strength, rel, m, tangent, part))
+    job = (counter, chunk, block, springs.member, strength, rel, m, tangent, part)
+    shared(_sum_chunks, threads_for(springs, m), job)
     for i in range(chunk.shape[0]):
         p = block[chunk[i, 0], 0]
         for j in range(m):
@@ -326,9 +330,12 @@ def _unscale(k, start, stop, block, power, alpha, padded, out):  # type: ignore[
     mu = power[k]
     first = block[k, 4] + start - block[k, 1]
     count = min(stop, block[k, 1] + block[k, 5]) - start
+    a = alpha[first : first + count]
+    given = padded[start : start + count]
+    own = out[first : first + count]
     if mu == 1.0:
         for i in range(count):
-            out[first + i] = padded[start + i]
+            own[i] = given[i]
     else:
         for i in range(count):
-            out[first + i] = mu * alpha[first + i] ** (mu - 1.0) * padded[start + i]
+            own[i] = mu * a[i] ** (mu - 1.0) * given[i]

@@ -11,11 +11,10 @@ from mdstopo.mechanics.passes import member_sums
 
 
 @kernel
-def energy_at(model, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
+def energy_at(pair, springs, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
     """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
-    pair = model.pair
     relative_pose(pair, q, v, rel[0])
-    member_sums(model, strength, rel, np.int64(1), np.bool_(False), sums)
+    member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     value = 0.0
     rate = 0.0
     for p in range(pair.shape[0]):

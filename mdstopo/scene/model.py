@@ -30,6 +30,15 @@ MANY = 4 * CHUNK
 NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
 
 
+class Springs(NamedTuple):
+    """What a pass over the members needs of a `Model`: few arrays, because handing over many takes its time."""
+
+    block: IndexArray
+    member: FloatArray
+    chunk: IndexArray
+    threads: int
+
+
 class Model(NamedTuple):
     """What is constant during every evaluation of one load case.
 

@@ -14,6 +14,7 @@ from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
+from mdstopo.scene.model import Springs
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 
 
@@ -63,6 +64,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     pair = model.pair
+    springs = Springs(motion.block, motion.member, motion.chunk, motion.threads)
     turning = model.load_body.shape[0] > 0
     integral = reduction in (MEAN, INTEGRAL)
     stages = steps.index[count, 0]
@@ -114,7 +116,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     v[d] = state[1, d]
             else:
                 w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
-            value, _ = energy_at(motion, strength, q, v, rel, sums)
+            value, _ = energy_at(pair, springs, strength, q, v, rel, sums)
             work[0] += 1
             if reduction == FINAL:
                 rows[0, 1] = value

@@ -9,7 +9,7 @@ from mdstopo.mechanics import passes
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.native.kernel import numba as with_kernels
 from mdstopo.native.threads import VARIABLE
-from mdstopo.scene.model import CHUNK, MANY
+from mdstopo.scene.model import CHUNK, MANY, Springs
 from mdstopo.scene.packing import pack, unpack
 from tests.engine.scenes import read
 
@@ -76,7 +76,8 @@ def test_results_are_the_same_to_the_bit_for_any_number_of_threads(integrator, a
 def _summed(ints, floats, alpha, strength, rel, tangent, sums):
     model = unpack(ints, floats)
     passes.scale_members(model, alpha, strength)
-    passes.member_sums(model, strength, rel, rel.shape[0], tangent, sums)
+    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    passes.member_sums(springs, strength, rel, rel.shape[0], tangent, sums)
 
 
 @pytest.mark.parametrize("tangent", [False, True])
