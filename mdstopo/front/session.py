@@ -16,11 +16,11 @@ from mdstopo.front.jobs import Setting, perform
 from mdstopo.front.plan import Front, NoEndError, Planner, Request
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.tasks import Found, StoppedError, Task, case_key, failed
+from mdstopo.native.threads import cores
 from mdstopo.optimizer.starts import random_feasible
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even
-from mdstopo.session.crew import cores
 from mdstopo.session.engine import make_engine
 from mdstopo.session.ready import compile_apart
 from mdstopo.session.starts import NOTHING_VARIES, first_design, replaced, unshared

@@ -17,8 +17,8 @@ from mdstopo.front.jobs import Setting, Trial, first
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.session import WORTH, Snapshot
 from mdstopo.front.tasks import Found, case_key, failed
+from mdstopo.native.threads import cores
 from mdstopo.session.callbacks import ignore, never
-from mdstopo.session.crew import cores
 from mdstopo.session.ready import compile_apart
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place

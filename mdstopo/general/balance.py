@@ -26,7 +26,6 @@ from mdstopo.general.forces import (
 from mdstopo.general.structures import bundle
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import SUMS
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.joints.table import (
     joint_acceleration_slopes,
@@ -34,6 +33,7 @@ from mdstopo.mechanics.joints.table import (
     joint_rows,
     joint_stiffness,
 )
+from mdstopo.mechanics.passes import SUMS
 
 #: a pivot of the scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12

@@ -13,6 +13,7 @@ import numpy as np
 
 from mdstopo.case.memory import holds_steps
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
+from mdstopo.mechanics.carrying import ROOMY
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.packing import aligned, pack
@@ -85,7 +86,7 @@ class Driver:
         padded = scene.model.member.shape[1]
         count = len(reductions)
         self._alpha = np.zeros(n_design)  # one array for all designs: a read-only one would be another type
-        self.strength = aligned((3, padded))
+        self.strength = aligned((ROOMY, padded))
         self.padded = np.zeros((ROWS, padded))
         self.rows = np.zeros((count, ROWS, 4))
         self.found = np.zeros(count, dtype=np.int64)
@@ -206,7 +207,7 @@ class DenseSteps:
     def __init__(self, driver: Driver, count: int) -> None:
         self._driver = driver
         self._room, self._ints = driver.room.copy(), driver.room_ints.copy()
-        self._limits, self._strength = driver.limits, driver.strength.copy()
+        self._limits, self._strength = driver.limits, driver.strength[:3].copy()
         self.count = count
         n, n_pair, damped, turning = driver._shape
         arrays = carve.py_func(  # type: ignore[attr-defined]

@@ -52,8 +52,10 @@ from mdstopo.integrators.steps import (
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, add_loads, add_turning, forces, scale_members, subtract_products
+from mdstopo.mechanics.assembly import add_loads, add_turning, forces, subtract_products
+from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, scale_members
 from mdstopo.scene.packing import unpack
 
 GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
@@ -159,10 +161,12 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
 
     In: the packed model; settings: tolerance, the error of the interpolated motion relative to the motion itself;
     Newton tolerance; fixed step (> 0: windows of that length, seven nodes, no error control); limits: windows allowed,
-    room for windows, for stages. Room: room, room_ints, where the steps stay; strength (3, M_padded). work: counts,
-    added to. Tangents are always kept. NEEDS_ROOM asks for more room.
+    room for windows, for stages. Room: room, room_ints, where the steps stay; strength (3 or more, M_padded), see
+    `carrying`. work: counts, added to. Tangents are always kept. NEEDS_ROOM asks for more room.
     """
-    model = unpack(ints, floats)
+    whole = unpack(ints, floats)
+    scale_members(whole, alpha, strength)
+    model, strength, _ = carrying(whole, strength, np.bool_(True))
     tolerance = settings[0]
     newton_tolerance = settings[1]
     fixed_step = settings[2]
@@ -171,7 +175,6 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     n_level = tables.shape[0]
     turning = model.load_body.shape[0] > 0
     steps = GaussSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
-    scale_members(model.block, model.power, model.member, alpha, strength)
     pair = model.pair
     inv_mass = model.inv_mass
     times = model.times

@@ -39,8 +39,9 @@ from mdstopo.integrators.steps import (
     motion_weights,
 )
 from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import SUMS, forces
+from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.passes import SUMS
 
 AlphaSteps = namedtuple("AlphaSteps", FIELDS)  # type: ignore[misc]
 TAG = (0, 0, 0)

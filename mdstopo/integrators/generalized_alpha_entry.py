@@ -2,15 +2,18 @@
 
 In all of them: the packed model; tables (1,) the spectral radius; settings (tolerance, not used here; Newton
 tolerance; step, see `generalized_alpha.longest_step`; closeness); limits (steps allowed, room for steps, room for
-stages); room, room_ints for the steps; strength (3, M_padded); work counts, added to.
+stages); room, room_ints for the steps; strength (3 or more, M_padded), see `carrying`; work counts, added to.
 """
+
+import numpy as np
 
 import mdstopo.integrators.generalized_alpha_linear  # noqa: F401  (enters the contract's table)
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, integrate, longest_step
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start
 from mdstopo.integrators.steps import carve
 from mdstopo.jit import entry
-from mdstopo.mechanics.assembly import scale_members
+from mdstopo.mechanics.carrying import carrying
+from mdstopo.mechanics.passes import scale_members
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.look import dense, look
 
@@ -20,12 +23,13 @@ __all__ = ["TAG", "dense", "look", "rate_at_start", "simulate"]
 @entry
 def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
     """Simulate alpha (N,) once; the steps stay in room, with tangents. Returns (code, steps, time reached)."""
-    model = unpack(ints, floats)
+    whole = unpack(ints, floats)
+    scale_members(whole, alpha, strength)
+    model, strength, _ = carrying(whole, strength, np.bool_(True))
     turning = model.load_body.shape[0] > 0
     steps = AlphaSteps(
         *carve(room, room_ints, model.q0.shape[0], model.pair.shape[0], limits[1], limits[2], damped, turning)
     )
-    scale_members(model.block, model.power, model.member, alpha, strength)
     step = longest_step(model, strength, damped, settings[2])
     code, count = integrate(model, tables, strength, damped, settings[1], step, limits[0], steps, work)
     return code, count, steps.t[count]

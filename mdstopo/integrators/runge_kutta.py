@@ -31,8 +31,11 @@ from mdstopo.integrators.steps import (
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, forces, member_sums, scale_members
+from mdstopo.mechanics.assembly import forces
+from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, member_sums, scale_members
+from mdstopo.scene.model import Springs
 from mdstopo.scene.packing import unpack
 
 RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)  # type: ignore[misc]
@@ -148,16 +151,17 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     In: the packed model; tangent: whether tangents are kept for a reverse sweep; settings: tolerance, the error of a
     step relative to the motion; -; fixed step (> 0: no error control); limits: steps allowed, room for steps, for
     stages. Room: room, room_ints, where the steps stay, and two more than are taken (`point_of`); strength
-    (3, M_padded). work: counts, added to. NEEDS_ROOM asks for more room.
+    (3 or more, M_padded), see `carrying`. work: counts, added to. NEEDS_ROOM asks for more room.
     """
-    model = unpack(ints, floats)
+    whole = unpack(ints, floats)
+    scale_members(whole, alpha, strength)
+    model, strength, _ = carrying(whole, strength, np.bool_(True))
     tolerance = MARGIN * settings[0]
     fixed_step = settings[2]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     turning = model.load_body.shape[0] > 0
     steps = RungeKuttaSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
-    scale_members(model.block, model.power, model.member, alpha, strength)
     method = 1 if damped else 0
     s = STAGES[method]
     order = ORDERS[method]
@@ -190,7 +194,8 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
     # a pair that starts strained moves on the scale of its mean strain
     relative_pose(pair, q0, v0, rel[0])
-    member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(False), sums)
+    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     work[FORCES] += 1
     for p in range(n_pair):
         stiffness = 0.0

@@ -8,13 +8,13 @@ from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
-    SUMS,
     add_turning,
     add_turning_transposed,
     subtract_products,
     subtract_transposed,
 )
 from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.passes import SUMS
 
 
 @kernel

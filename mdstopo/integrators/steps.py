@@ -39,12 +39,13 @@ _STATUS = {
 }
 
 #: positions in the array of work counts: states at which forces were summed, those of them with tangents, accepted
-#: and rejected steps, Newton corrections, body-level sweeps, reverse steps, states in design gradient passes
-FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN = range(8)
-WORK = 8
+#: and rejected steps, Newton corrections, body-level sweeps, reverse steps, states in design gradient passes, and, in
+#: scenes of springs, members that were summed over all states
+FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN, SPRINGS = range(9)
+WORK = 9
 WORK_NAMES = (
     "force_sums", "tangents", "steps", "rejected_steps", "newton_corrections", "body_sweeps", "reverse_steps",
-    "design_states",
+    "design_states", "spring_states",
 )  # fmt: skip
 
 

@@ -1,144 +1,14 @@
-"""Force sum, tangents and the design gradient of all blocks, at several poses in one pass over the members.
+"""Forces and tangents of the bodies, at several states in one pass over the members (`passes`), and their products.
 
-One pass returns a few numbers a pair of bodies and pose (`SUMS`); everything else here works on those. The order of
-sums is fixed: members within a tile, tiles in order.
+One pass returns a few numbers a pair of bodies and pose (`SUMS`); everything here works on those.
 """
 
 import math
 
-import numpy as np
-
 from mdstopo.jit import inline, kernel
-from mdstopo.mechanics.geometry import (
-    POSE,
-    add_pair_force,
-    pair_displacement,
-    relative_pose,
-)
-from mdstopo.mechanics.laws.spring import (
-    elastic_design,
-    elastic_force,
-    elastic_tangent,
-    stored_energy,
-    viscous_design,
-    viscous_force,
-    viscous_tangent,
-)
-from mdstopo.scene.model import TILE
-
-#: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
-SUMS = 22
-
-
-@kernel
-def scale_members(block, power, member, alpha, strength):  # type: ignore[no-untyped-def]
-    """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12)."""
-    for k in range(block.shape[0]):
-        start = block[k, 1]
-        stop = block[k, 2]
-        first = block[k, 4]
-        viscous = block[k, 3] == 1
-        if first < 0:
-            for i in range(start, stop):
-                strength[0, i] = member[5, i]
-                strength[1, i] = member[6, i]
-                strength[2, i] = member[7, i]
-            continue
-        mu = power[k]
-        count = block[k, 5]
-        for i in range(count):
-            a = alpha[first + i]
-            s = a if mu == 1.0 else a**mu
-            strength[0, start + i] = s * member[5, start + i]
-            if viscous:
-                strength[1, start + i] = s * member[6, start + i]
-                strength[2, start + i] = s * member[7, start + i]
-        for i in range(start + count, stop):
-            strength[0, i] = 0.0
-            strength[1, i] = 0.0
-            strength[2, i] = 0.0
-
-
-@kernel
-def member_sums(block, member, strength, rel, m, tangent, sums):  # type: ignore[no-untyped-def]
-    """One pass over all members at m relative poses.
-
-    In: strength (3, M_padded), rel (m, n_pair, POSE), tangent (are K and C wanted). Out: sums (m, n_pair, SUMS).
-    """
-    sums[:m] = 0.0
-    for k in range(block.shape[0]):
-        p = block[k, 0]
-        viscous = block[k, 3] == 1
-        counted = block[k, 4] >= 0  # energy is that of design members
-        for lo in range(block[k, 1], block[k, 2], TILE):
-            hi = min(lo + TILE, block[k, 2])
-            px = member[0, lo:hi]
-            py = member[1, lo:hi]
-            qx = member[2, lo:hi]
-            qy = member[3, lo:hi]
-            l0 = member[4, lo:hi]
-            ks = strength[0, lo:hi]
-            for j in range(m):
-                r = rel[j, p]
-                o = sums[j, p]
-                if not viscous:
-                    if tangent:
-                        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(
-                            px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3]
-                        )
-                        o[7] += kxx
-                        o[8] += kxy
-                        o[9] += kxt
-                        o[10] += kxy
-                        o[11] += kyy
-                        o[12] += kyt
-                        o[13] += kxt
-                        o[14] += kyt
-                        o[15] += ktt
-                    else:
-                        x, y, t, e = elastic_force(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3])
-                    o[0] += x
-                    o[1] += y
-                    o[2] += t
-                    if counted:
-                        o[3] += e
-                        o[4] -= x
-                        o[5] -= y
-                        o[6] -= t
-                    continue
-                cs = strength[1, lo:hi]
-                ps = strength[2, lo:hi]
-                if tangent:
-                    (x, y, t, e, ex, ey, et, k0, k1, k2, k3, k4, k5, k6, k7, k8, c0, c1, c2, c3, c4, c5) = (
-                        viscous_tangent(px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6])
-                    )
-                    o[7] += k0
-                    o[8] += k1
-                    o[9] += k2
-                    o[10] += k3
-                    o[11] += k4
-                    o[12] += k5
-                    o[13] += k6
-                    o[14] += k7
-                    o[15] += k8
-                    o[16] += c0
-                    o[17] += c1
-                    o[18] += c2
-                    o[19] += c3
-                    o[20] += c4
-                    o[21] += c5
-                else:
-                    x, y, t, e, ex, ey, et = viscous_force(
-                        px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
-                    )
-                o[0] += x
-                o[1] += y
-                o[2] += t
-                if counted:
-                    o[3] += e
-                    o[4] += ex
-                    o[5] += ey
-                    o[6] += et
+from mdstopo.mechanics.geometry import add_pair_force, relative_pose
+from mdstopo.mechanics.passes import member_sums
+from mdstopo.scene.model import Springs
 
 
 @kernel
@@ -365,7 +235,8 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
     pair = model.pair
     for j in range(m):
         relative_pose(pair, q[j], v[j], rel[j])
-    member_sums(model.block, model.member, strength, rel, m, tangent, sums)
+    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    member_sums(springs, strength, rel, m, tangent, sums)
     turning = model.load_body.shape[0] > 0
     for j in range(m):
         out = f[j]
@@ -377,86 +248,3 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
             pair_tangents(pair, rel[j], q[j], sums[j], damped, k_out[j], c_out[j if damped else 0])
             if turning:
                 load_tangent(model, segment, t[j], q[j], turn[j])
-
-
-@kernel
-def design_gradient(pair, block, member, stage, z, used, out, work):  # type: ignore[no-untyped-def]
-    """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength): one pass, no histories.
-
-    In: stage (S, 3, n) with q, v, and their virtual displacements z (S, n), the adjoint of the force balance, of the
-    stages that are used (S,). The member's generalised force is -T^T b f, so each adds -f_i (b_i . T z_s). Fixed
-    members are passed over. work: counts the stages.
-    """
-    n_pair = pair.shape[0]
-    count = 0
-    for i in range(used.shape[0]):
-        count += used[i]
-    work[7] += count
-    rel = np.empty((count, n_pair, POSE))
-    u = np.empty((count, n_pair, 3))
-    j = 0
-    for i in range(used.shape[0]):
-        if used[i]:
-            relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
-            for p in range(n_pair):
-                pair_displacement(pair, rel[j], p, z[i], u[j, p])
-                for axis in range(3):
-                    u[j, p, axis] = -u[j, p, axis]
-            j += 1
-    for k in range(block.shape[0]):
-        if block[k, 4] < 0:
-            continue
-        p = block[k, 0]
-        for lo in range(block[k, 1], block[k, 2], TILE):
-            hi = min(lo + TILE, block[k, 2])
-            px = member[0, lo:hi]
-            py = member[1, lo:hi]
-            qx = member[2, lo:hi]
-            qy = member[3, lo:hi]
-            l0 = member[4, lo:hi]
-            ks = member[5, lo:hi]
-            o = out[lo:hi]
-            if block[k, 3] == 0:
-                elastic_design(px, py, qx, qy, l0, ks, rel[:, p], u[:, p], o)
-                continue
-            for j in range(count):
-                r = rel[j, p]
-                w = u[j, p]
-                viscous_design(
-                    px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
-                    r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
-                )  # fmt: skip
-
-
-@kernel
-def energy_gradient(pair, block, member, unit, stage, weight, out):  # type: ignore[no-untyped-def]
-    """out (M_padded,) += sum_s weight_s V_i(q_s): the explicit part of the energy's design gradient."""
-    rel = np.empty((pair.shape[0], POSE))
-    for j in range(weight.shape[0]):
-        if weight[j] == 0.0:
-            continue
-        relative_pose(pair, stage[j, 0], stage[j, 1], rel)
-        for k in range(block.shape[0]):
-            if block[k, 4] < 0:
-                continue
-            r = rel[block[k, 0]]
-            lo = block[k, 1]
-            hi = block[k, 2]
-            stored_energy(
-                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                unit[0, lo:hi], r[0], r[1], r[2], r[3], weight[j], out[lo:hi],
-            )  # fmt: skip
-
-
-@kernel
-def unscale_gradient(block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
-    """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
-    for k in range(block.shape[0]):
-        first = block[k, 4]
-        if first < 0:
-            continue
-        mu = power[k]
-        start = block[k, 1]
-        for i in range(block[k, 5]):
-            factor = 1.0 if mu == 1.0 else mu * alpha[first + i] ** (mu - 1.0)
-            out[first + i] = factor * padded[start + i]

@@ -3,8 +3,9 @@
 import numpy as np
 
 from mdstopo.jit import entry
-from mdstopo.mechanics.assembly import SUMS, forces
+from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.passes import SUMS
 from mdstopo.scene.packing import unpack
 
 

@@ -21,6 +21,7 @@ small elimination at the end.
 import numpy as np
 
 from mdstopo.jit import member_kernel, vector_entry
+from mdstopo.optimizer.powers import powers
 from mdstopo.optimizer.problem import Floats, Ints
 
 BLOCK = 1024
@@ -30,8 +31,8 @@ OBJECTIVE, ELASTIC, LIMIT, EQUAL = 0, 1, 2, 3
 
 @member_kernel
 def _terms(
-    step: Floats, sign: float, reach: Floats, power: float, value: Floats, first: Floats, second: Floats
-) -> None:
+    step: Floats, sign: float, reach: Floats, power: float, value: Floats, first: Floats, second: Floats, room: Ints
+) -> None:  # fmt: skip
     """Unit terms whose shifts lie `reach` away, after steps `sign * step` away from them (> -reach).
 
     Fills the primitive and the first derivative t^(xi-1), t = 1 + sign step/reach, with respect to step, and
@@ -50,8 +51,8 @@ def _terms(
             first[i] = 1.0 / (t * t)
     else:
         for i in range(n):
-            t = 1.0 + sign * step[i] / reach[i]
-            first[i] = np.exp((power - 1.0) * np.log(t))
+            second[i] = 1.0 + sign * step[i] / reach[i]
+        powers(second[:n], power - 1.0, first, room)
     for i in range(n):
         t = 1.0 + sign * step[i] / reach[i]
         second[i] = (1.0 - power) * first[i] / (t * reach[i])
@@ -130,6 +131,7 @@ def expand(
     gap, worst = 0.0, 0.0
     low, high = np.empty((3, BLOCK)), np.empty((3, BLOCK))
     v, step, diagonal = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    room = np.empty((3, BLOCK), dtype=np.int64)
     for start in range(0, N, BLOCK):
         stop = min(start + BLOCK, N)
         n = stop - start
@@ -149,7 +151,7 @@ def expand(
         for side in range(2 if R > 0 else 0):
             out = low if side == 0 else high
             power_here = 1.0 if side == 1 and linear_above else power
-            _terms(step[:n], 1.0 - 2.0 * side, frame[1 + side, start:stop], power_here, out[0], out[1], out[2])
+            _terms(step[:n], 1.0 - 2.0 * side, frame[1 + side, start:stop], power_here, out[0], out[1], out[2], room)
         for a in range(K):
             row = B[a, start:stop]
             if a < R:

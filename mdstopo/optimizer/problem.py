@@ -18,6 +18,7 @@ from mdstopo.status import Status
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Truths = NDArray[np.bool_]
 Bools = NDArray[np.bool_]
 
 

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mdstopo.native.threads import allowed
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
@@ -22,16 +23,16 @@ from mdstopo.optimizer.wide_kernels import (
     LOW,
     SAMPLE,
     SLOTS,
-    wide_adapt,
-    wide_change,
     wide_minimum,
-    wide_residual,
 )
+from mdstopo.optimizer.wide_passes import wide_adapt, wide_change, wide_residual
 
 #: variables from which on this way is taken
 MANY = 256
 #: and from which on single passes over them are compiled too
 WIDE = 10_000
+#: and from which on threads share them
+SHARED = 100_000
 _LEAST_SAMPLE = 256
 
 
@@ -73,7 +74,7 @@ def propose(
     place, live, x = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n)
     multiplier, miss, size, change, count = wide_minimum(
         alpha, slope, cost, state.shift, lower, upper, limits, bound, left + bound, bool(linear.equal[0]), _stride(n),
-        1e-12 * (2.0 * abs(bound) + abs(left)), trial, slots, place, live, x,
+        1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, live, x,
     )  # fmt: skip
     size += abs(bound)
     if not (np.isfinite(change) and np.isfinite(multiplier)) or (abs(miss) > 1e-9 * size and multiplier != 0.0):
@@ -81,7 +82,7 @@ def propose(
     _touch_up(trial, slots[:, :count], place[:count], linear, lower, upper, ROUNDING * size)
     promised = float(state.rows[row]) + change
     own = steepest if row == 0 else float(np.abs(state.gradients[0]).max())
-    residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own)
+    residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own, _threads(n))
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
     return Proposal(trial, state.objective - promised, max(residual, slack))
 
@@ -91,14 +92,17 @@ def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
     steps, shifts = np.empty_like(state.steps), np.empty_like(state.shift)
     grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
     least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
-    wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, steps, shifts)
+    threads = _threads(len(shifts))
+    wide_adapt(
+        state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, threads, steps, shifts
+    )
     return steps, shifts
 
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
     """max |x - y|, and the largest in its unit."""
     if len(x) >= WIDE:
-        plain, scaled = wide_change(x, y, unit)
+        plain, scaled = wide_change(x, y, unit, _threads(len(x)))
         return plain, scaled
     change = np.abs(x - y)
     return float(change.max(initial=0.0)), float((change / unit).max(initial=0.0))
@@ -129,3 +133,7 @@ def _stride(n: int) -> int:
     while gcd(stride, n) != 1:
         stride += 1
     return stride
+
+
+def _threads(n: int) -> int:
+    return allowed() if n >= SHARED else 1

@@ -7,15 +7,19 @@ Arrays that the passes share, one column for each variable that the multiplier's
     place (n,)    which variable it is
     x (n,)        where it is
 
-All in one thread and in a fixed order: results do not depend on the number of threads.
+Sums are added in a fixed order, so that results do not depend on the number of threads.
 """
 
 import numpy as np
 
-from mdstopo.jit import inline, member_kernel, vector_entry
-from mdstopo.optimizer.problem import Floats, Ints
+from mdstopo.jit import inline, kernel, member_kernel, vector_entry
+from mdstopo.native.threads import shared, taken
+from mdstopo.optimizer.powers import powers
+from mdstopo.optimizer.problem import Floats, Ints, Truths
 
 BLOCK = 1024
+#: blocks that a thread takes at once
+GROUP = 8
 SLOTS = 9
 COST, LOW, HIGH, ITERATE, SLOPE, REACH, KAPPA, FIRST, LAST = range(SLOTS)
 #: larger than any multiplier, small enough to be multiplied
@@ -24,61 +28,8 @@ BEYOND = 1e200
 SAMPLE = 4096
 SPREAD = 4.0
 MAX_STEPS = 200
-LN2 = 0.6931471805599453
-#: ln 2 in two parts, the first with enough trailing zeros that its product with an exponent is exact
-LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-
-
-@member_kernel
-def powers(t: Floats, exponent: float, out: Floats, room: Ints) -> None:
-    """out = t^exponent for normal t > 0, to a few units in the last place. room: (3, n).
-
-    Every loop reads and writes different memory, which is what lets the compiler vectorise it.
-    """
-    bits = t.view(np.int64)
-    near, whole, scale = room[0], room[1], room[2]
-    z, twos = near.view(np.float64), scale.view(np.float64)
-    n = len(t)
-    for i in range(n):
-        # t = 2^k z, with z between the roots of 1/2 and 2
-        k = (bits[i] - 0x3FE6A09E00000000) >> 52
-        near[i] = bits[i] - (k << 52)
-        whole[i] = k
-    for i in range(n):
-        # log z by the series of its artanh, then e^y = 2^j e^r by Taylor's
-        f = (z[i] - 1.0) / (z[i] + 1.0)
-        s = f * f
-        p = 1.0 / 23.0
-        p = p * s + 1.0 / 21.0
-        p = p * s + 1.0 / 19.0
-        p = p * s + 1.0 / 17.0
-        p = p * s + 1.0 / 15.0
-        p = p * s + 1.0 / 13.0
-        p = p * s + 1.0 / 11.0
-        p = p * s + 1.0 / 9.0
-        p = p * s + 1.0 / 7.0
-        p = p * s + 1.0 / 5.0
-        p = p * s + 1.0 / 3.0
-        y = exponent * (2.0 * f + 2.0 * f * s * p + whole[i] * LN2)
-        j = np.int64(y * (1.0 / LN2) + 4096.5) - 4096
-        r = (y - j * LN2_HIGH) - j * LN2_LOW
-        q = 1.0 / 6227020800.0
-        q = q * r + 1.0 / 479001600.0
-        q = q * r + 1.0 / 39916800.0
-        q = q * r + 1.0 / 3628800.0
-        q = q * r + 1.0 / 362880.0
-        q = q * r + 1.0 / 40320.0
-        q = q * r + 1.0 / 5040.0
-        q = q * r + 1.0 / 720.0
-        q = q * r + 1.0 / 120.0
-        q = q * r + 1.0 / 24.0
-        q = q * r + 1.0 / 6.0
-        q = q * r + 0.5
-        q = q * r + 1.0
-        out[i] = q * r + 1.0
-        scale[i] = (j + 1023) << 52
-    for i in range(n):
-        out[i] *= twos[i]
+#: the power that is taken if none is stated; its terms need no logarithms
+RECIPROCAL = -1.0
 
 
 @inline
@@ -86,7 +37,9 @@ def _steepness(x: float, iterate: float, slope: float, reach: float, kappa: floa
     """The model's derivative by one variable, and its slope."""
     side = 1.0 if slope < 0.0 else -1.0
     t = 1.0 + side * (x - iterate) / reach
-    first = 1.0 if power == 1.0 else np.exp((power - 1.0) * np.log(t))
+    first = 1.0 / (t * t)
+    if power != RECIPROCAL:
+        first = 1.0 if power == 1.0 else np.exp((power - 1.0) * np.log(t))
     return slope * first + kappa * (x - iterate), kappa + side * slope * (power - 1.0) * first / (t * reach)
 
 
@@ -260,72 +213,141 @@ def _estimate(
     return near, guess, far
 
 
-@member_kernel
+@kernel
 def _sort_out(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
-    near: float, far: float, out: Floats, slots: Floats, place: Ints, x: Floats,
+    near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, x: Floats,
 ) -> tuple[int, float, float, float]:  # fmt: skip
     """Fill `out` with the ends of the box where a multiplier in [near, far] leaves no doubt; slots for the others.
 
     Returns how many slots there are and, over the decided variables, the sums of a x and |a x| and the change of the
-    model.
+    model. Threads share the blocks; sums of the blocks are added, and slots follow each other, in order.
     """
-    power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
-    N = len(alpha)
+    blocks = (len(alpha) + BLOCK - 1) // BLOCK
+    doubted = np.empty(len(alpha), dtype=np.bool_)
+    sums = np.empty((blocks, 3))
+    begin = np.empty(blocks + 1, np.int64)
+    counter = np.zeros(2, np.int64)
+    shared(
+        _sort_blocks, threads,
+        (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, doubted, sums, begin),
+    )  # fmt: skip
     n = 0
     total, size, change = 0.0, 0.0, 0.0
-    low, high, reach, kappa = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    least, most, t, first = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
-    room = np.empty((3, BLOCK), dtype=np.int64)
-    open_ = np.empty(BLOCK, dtype=np.bool_)
-    for start in range(0, N, BLOCK):
-        stop = min(start + BLOCK, N)
-        c, s, a = alpha[start:stop], slope[start:stop], cost[start:stop]
-        sh, lo, up, y = shift[start:stop], lower[start:stop], upper[start:stop], out[start:stop]
-        m = stop - start
-        for i in range(m):
-            low[i], high[i], reach[i], span = _box(c[i], lo[i], up[i], sh[i], move, trust, share)
-            kappa[i] = convex / span
-            p, q = near * a[i], far * a[i]
-            least[i], most[i] = min(p, q), max(p, q)
-            y[i] = high[i] if s[i] + most[i] < 0.0 else low[i]
-            step = y[i] - c[i]
-            t[i] = 1.0 + (step if s[i] < 0.0 else -step) / reach[i]
-        if power == 1.0:
-            for i in range(m):
-                first[i] = 1.0
-        else:
-            powers(t[:m], power - 1.0, first, room)
-        part, held, weight = 0.0, 0.0, 0.0
-        for i in range(m):
-            step = y[i] - c[i]
-            pull = kappa[i] * step
-            g = s[i] * first[i] + pull
-            up_there = s[i] + most[i] < 0.0 and g + most[i] <= 0.0
-            down_there = s[i] + least[i] > 0.0 and g + least[i] >= 0.0
-            known = up_there or down_there
-            open_[i] = not known
-            # s < 0: d (t f - 1)/xi; else that of the other side, with its sign
-            term = (reach[i] if s[i] < 0.0 else -reach[i]) * (t[i] * first[i] - 1.0) / power
-            part += s[i] * term + 0.5 * pull * step if known else 0.0
-            spent = a[i] * y[i] if known else 0.0
-            held += spent
-            weight += abs(spent)
-        change += part
-        total += held
-        size += weight
-        for i in range(m):
-            if open_[i]:
-                _slot(slots, place, n, start + i, c[i], s[i], a[i], low[i], high[i], reach[i], kappa[i], power)
-                x[n] = y[i]
-                n += 1
+    for b in range(blocks):
+        change += sums[b, 0]
+        total += sums[b, 1]
+        size += sums[b, 2]
+        count = begin[b]
+        begin[b] = n
+        n += count
+    begin[blocks] = n
+    shared(
+        _slot_blocks, threads,
+        (counter[1:], alpha, slope, cost, shift, lower, upper, limits, out, doubted, begin, slots, place, x),
+    )  # fmt: skip
     return n, total, size, change
+
+
+@kernel
+def _sort_blocks(
+    counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
+    limits: Floats, near: float, far: float, out: Floats, doubted: Truths, sums: Floats, counts: Ints,
+) -> None:  # fmt: skip
+    """What `_sort_out` does with the blocks that are taken: sums (blocks, 3) change, a x, |a x|; counts of doubts."""
+    room = np.empty((8, BLOCK))
+    whole = np.empty((3, BLOCK), dtype=np.int64)
+    N = len(alpha)
+    group = taken(counter)
+    while group * GROUP * BLOCK < N:
+        for b in range(group * GROUP, min((group + 1) * GROUP, len(sums))):
+            start, stop = b * BLOCK, min((b + 1) * BLOCK, N)
+            counts[b] = _sort_block(
+                alpha[start:stop], slope[start:stop], cost[start:stop], shift[start:stop], lower[start:stop],
+                upper[start:stop], limits, near, far, room, whole, out[start:stop], doubted[start:stop], sums[b],
+            )  # fmt: skip
+        group = taken(counter)
+
+
+@member_kernel
+def _sort_block(
+    c: Floats, s: Floats, a: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats, near: float,
+    far: float, room: Floats, whole: Ints, y: Floats, doubted: Truths, sums: Floats,
+) -> int:  # fmt: skip
+    """One block of `_sort_blocks`; how many variables are in doubt."""
+    power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
+    low, high, reach, kappa = room[0], room[1], room[2], room[3]
+    least, most, t, first = room[4], room[5], room[6], room[7]
+    m = len(c)
+    for i in range(m):
+        low[i], high[i], reach[i], span = _box(c[i], lower[i], upper[i], shift[i], move, trust, share)
+        kappa[i] = convex / span
+        p, q = near * a[i], far * a[i]
+        least[i], most[i] = min(p, q), max(p, q)
+        y[i] = high[i] if s[i] + most[i] < 0.0 else low[i]
+        step = y[i] - c[i]
+        t[i] = 1.0 + (step if s[i] < 0.0 else -step) / reach[i]
+    if power == 1.0:
+        for i in range(m):
+            first[i] = 1.0
+    elif power == RECIPROCAL:
+        for i in range(m):
+            first[i] = 1.0 / (t[i] * t[i])
+    else:
+        powers(t[:m], power - 1.0, first, whole)
+    part, held, weight, count = 0.0, 0.0, 0.0, 0
+    for i in range(m):
+        step = y[i] - c[i]
+        pull = kappa[i] * step
+        g = s[i] * first[i] + pull
+        up_there = s[i] + most[i] < 0.0 and g + most[i] <= 0.0
+        down_there = s[i] + least[i] > 0.0 and g + least[i] >= 0.0
+        known = up_there or down_there
+        doubted[i] = not known
+        count += not known
+        # s < 0: d (t f - 1)/xi; else that of the other side, with its sign
+        term = (reach[i] if s[i] < 0.0 else -reach[i]) * (t[i] * first[i] - 1.0) / power
+        part += s[i] * term + 0.5 * pull * step if known else 0.0
+        spent = a[i] * y[i] if known else 0.0
+        held += spent
+        weight += abs(spent)
+    sums[0], sums[1], sums[2] = part, held, weight
+    return count
+
+
+@kernel
+def _slot_blocks(
+    counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
+    limits: Floats, out: Floats, doubted: Truths, begin: Ints, slots: Floats, place: Ints, x: Floats,
+) -> None:  # fmt: skip
+    """Slots for the variables in doubt, of the blocks that are taken; begin (blocks + 1): their first slots."""
+    power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
+    blocks = len(begin) - 1
+    group = taken(counter)
+    while group * GROUP < blocks:
+        for b in range(group * GROUP, min((group + 1) * GROUP, blocks)):
+            n = begin[b]
+            if begin[b + 1] == n:
+                continue
+            for i in range(b * BLOCK, min((b + 1) * BLOCK, len(alpha))):
+                if doubted[i]:
+                    low, high, reach, span = _box(alpha[i], lower[i], upper[i], shift[i], move, trust, share)
+                    _slot(slots, place, n, i, alpha[i], slope[i], cost[i], low, high, reach, convex / span, power)
+                    x[n] = out[i]
+                    n += 1
+        group = taken(counter)
 
 
 @member_kernel
 def _promise(slots: Floats, n: int, x: Floats, power: float) -> float:
     """The model's change over the slots."""
     change = 0.0
+    if power == RECIPROCAL:
+        for k in range(n):
+            step, s, d = x[k] - slots[ITERATE, k], slots[SLOPE, k], slots[REACH, k]
+            side = 1.0 if s < 0.0 else -1.0
+            change += s * step / (1.0 + side * step / d) + 0.5 * slots[KAPPA, k] * step * step
+        return change
     for k in range(n):
         step, s, d = x[k] - slots[ITERATE, k], slots[SLOPE, k], slots[REACH, k]
         side = 1.0 if s < 0.0 else -1.0
@@ -337,8 +359,8 @@ def _promise(slots: Floats, n: int, x: Floats, power: float) -> float:
 @vector_entry
 def wide_minimum(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
-    bound: float, at_iterate: float, equal: bool, stride: int, rounding: float, out: Floats, slots: Floats,
-    place: Ints, live: Ints, x: Floats,
+    bound: float, at_iterate: float, equal: bool, stride: int, rounding: float, threads: int, out: Floats,
+    slots: Floats, place: Ints, live: Ints, x: Floats,
 ) -> tuple[float, float, float, float, int]:  # fmt: skip
     """Minimise one row in its box under a x <= bound or = bound.
 
@@ -357,7 +379,7 @@ def wide_minimum(
         if attempt == 3:
             near, far = least, BEYOND
         n, total, size, change = _sort_out(
-            alpha, slope, cost, shift, lower, upper, limits, near, far, out, slots, place, x
+            alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, x
         )
         multiplier, miss = _root(slots, n, live, x, bound - total, near, guess, far, power, rounding)
         # an end of the bracket with something left: the sample has misled
@@ -372,41 +394,3 @@ def wide_minimum(
         out[place[k]] = x[k]
         size += abs(slots[COST, k] * x[k])
     return multiplier, miss, size, change + _promise(slots, n, x, power), n
-
-
-@vector_entry
-def wide_residual(
-    alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float, steepest: float
-) -> float:
-    """max |x - clip(x - (slope + multiplier cost)/steepest)|, at most what a step along -gradient moves."""
-    most = 0.0
-    for i in range(len(alpha)):
-        moved = alpha[i] - (slope[i] + multiplier * cost[i]) / steepest
-        most = max(most, abs(alpha[i] - max(lower[i], min(upper[i], moved))))
-    return most
-
-
-@vector_entry
-def wide_adapt(
-    shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float, most: float,
-    steps: Floats, shifts: Floats,
-) -> None:  # fmt: skip
-    """In one pass what follows an accepted step: `steps` (2, N), the last one and this one, and the new `shifts`."""
-    for i in range(len(shift)):
-        step = trial[i] - alpha[i]
-        agreement = last[i] * step
-        factor = grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
-        steps[0, i] = last[i]
-        steps[1, i] = step
-        shifts[i] = min(max(shift[i] * factor, least), most)
-
-
-@vector_entry
-def wide_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
-    """max |x - y|, and the largest in its unit."""
-    plain, scaled = 0.0, 0.0
-    for i in range(len(x)):
-        change = abs(x[i] - y[i])
-        plain = max(plain, change)
-        scaled = max(scaled, change / unit[i])
-    return plain, scaled

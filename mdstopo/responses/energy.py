@@ -6,15 +6,15 @@ Along the motion dg/dt = sum over pairs of E_xi . xi', and dg/dq = T^T E_xi: bot
 import numpy as np
 
 from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import member_sums
 from mdstopo.mechanics.geometry import add_pair_force, relative_pose
+from mdstopo.mechanics.passes import member_sums
 
 
 @kernel
-def energy_at(pair, block, member, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
+def energy_at(pair, springs, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
     """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
     relative_pose(pair, q, v, rel[0])
-    member_sums(block, member, strength, rel, np.int64(1), np.bool_(False), sums)
+    member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     value = 0.0
     rate = 0.0
     for p in range(pair.shape[0]):

@@ -11,9 +11,10 @@ import numpy as np
 from mdstopo.integrators.contract import point_of, sample
 from mdstopo.integrators.steps import step_at
 from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import SUMS
 from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.passes import SUMS
 from mdstopo.responses.energy import energy_at
+from mdstopo.scene.model import Springs
 
 #: columns of a peak: time, value, step, fraction of it
 TIME, VALUE, STEP, FRACTION = range(4)
@@ -118,9 +119,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     v = np.empty(n)
     rel = np.empty((1, n_pair, POSE))
     sums = np.empty((1, n_pair, SUMS))
-    pair = model.pair
-    block = model.block
-    member = model.member
+    springs = Springs(model.block, model.member, model.chunk, model.threads)
     room = steps.index[count, 0] + 2
     t = np.empty(room)
     g = np.empty(room)
@@ -135,7 +134,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     for end in range(2):
         i = end * (samples - 1)
         state = steps.state[end * count]
-        value, rate = energy_at(pair, block, member, strength, state[0], state[1], rel, sums)
+        value, rate = energy_at(model.pair, springs, strength, state[0], state[1], rel, sums)
         t[i] = steps.t[end * count]
         g[i] = sign * value
         d[i] = sign * rate
@@ -181,7 +180,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
             c = (time - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
             work[0] += 1
-            value, rate = energy_at(pair, block, member, strength, q, v, rel, sums)
+            value, rate = energy_at(model.pair, springs, strength, q, v, rel, sums)
             value *= sign
             rate *= sign
             if not crossing and not (d[i] > 0.0 and rate < 0.0) and not (d[i] < 0.0 and rate > 0.0):

@@ -157,7 +157,8 @@ def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
         load_force=load_force,
     )
     for array in model:
-        array.flags.writeable = False
+        if isinstance(array, np.ndarray):
+            array.flags.writeable = False
     return Scene(load_case, model, names, n_bodies, damped, _skipped(case, names, damped, times, turning, block))
 
 

@@ -23,6 +23,20 @@ PAIR, START, STOP, KIND, DESIGN, COUNT = range(6)
 VECTOR = 16
 #: members of one tile, few enough that all rows stay in the first-level cache while several poses pass over them
 TILE = 512
+#: members of one chunk, and how many there must be in all before they are summed in chunks
+CHUNK = 8 * TILE
+MANY = 4 * CHUNK
+#: of few members
+NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
+
+
+class Springs(NamedTuple):
+    """What a pass over the members needs of a `Model`: few arrays, because handing over many takes its time."""
+
+    block: IndexArray
+    member: FloatArray
+    chunk: IndexArray
+    threads: int
 
 
 class Model(NamedTuple):
@@ -43,6 +57,8 @@ class Model(NamedTuple):
     load_follows  (n_load,)         1 where the force turns with it, 0 where it keeps its global direction,
     load_arm      (n_load, 2)       point of attack in body coordinates,
     load_force    (n_seg, n_load, 2, 2)   and components, value and slope
+    chunk         (n_chunk, 3)      block, start, stop of parts that threads share; none of few members
+    threads                         that share a pass, if it is worth it; chunk and threads come from `packing`
     ============  ================  =====================================================================
     """
 
@@ -61,3 +77,5 @@ class Model(NamedTuple):
     load_follows: IndexArray
     load_arm: FloatArray
     load_force: FloatArray
+    chunk: IndexArray = NO_CHUNK
+    threads: int = 1

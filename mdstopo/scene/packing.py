@@ -10,25 +10,29 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.jit import kernel
-from mdstopo.scene.model import FloatArray, IndexArray, Model
+from mdstopo.native.threads import allowed
+from mdstopo.scene.model import CHUNK, MANY, FloatArray, IndexArray, Model
 
 #: numbers in a line of the cache
 _LINE = 8
+#: integers before the arrays
+SIZES = 8
 
 
 class Packed(NamedTuple):
-    """ints: sizes, pair, block, load_body, load_follows; floats: the rest, in the order of `Model`."""
+    """ints: sizes, pair, block, load_body, load_follows, chunk; floats: the rest, in the order of `Model`."""
 
     ints: IndexArray
     floats: FloatArray
 
 
-def pack(model: Model) -> Packed:
-    """Flatten a model.
+def pack(model: Model, threads: int | None = None) -> Packed:
+    """Flatten a model. threads: that share a pass over very many members; default `threads.allowed`.
 
     The arrays are not flagged read-only, although nothing writes to them: the flag is part of an array's type, and
     every kernel would be compiled twice.
     """
+    chunk = chunks_of(model.block)
     sizes = [
         len(model.inv_mass),
         len(model.pair),
@@ -36,10 +40,12 @@ def pack(model: Model) -> Packed:
         model.member.shape[1],
         len(model.times) - 1,
         len(model.load_body),
+        len(chunk),
+        allowed() if threads is None else threads,
     ]
     ints = np.concatenate(
         [np.array(sizes, dtype=np.int64)]
-        + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows)]
+        + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows, chunk)]
     ).astype(np.int64)
     before = [model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power]
     gap = -sum(len(a) for a in before) % _LINE  # members begin on a line of the cache
@@ -48,6 +54,18 @@ def pack(model: Model) -> Packed:
     floats = aligned((sum(len(part) for part in parts),))
     np.concatenate(parts, out=floats)
     return Packed(ints, floats)
+
+
+def chunks_of(block: IndexArray) -> IndexArray:
+    """(n_chunk, 3) block, start, stop of each chunk, in order; none where there are few members."""
+    if not len(block) or block[-1, 2] <= MANY:
+        return np.zeros((0, 3), dtype=np.int64)
+    chunks = [
+        (k, first, min(first + CHUNK, stop))
+        for k, (start, stop) in enumerate(block[:, 1:3].tolist())
+        for first in range(start, stop, CHUNK)
+    ]
+    return np.array(chunks, dtype=np.int64)
 
 
 def aligned(shape: tuple[int, ...]) -> FloatArray:
@@ -67,7 +85,8 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     padded = ints[3]
     n_seg = ints[4]
     n_load = ints[5]
-    i = 6
+    n_chunk = ints[6]
+    i = SIZES
     pair = ints[i : i + 2 * n_pair].reshape((n_pair, 2))
     i += 2 * n_pair
     block = ints[i : i + 6 * n_block].reshape((n_block, 6))
@@ -75,6 +94,8 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     load_body = ints[i : i + n_load]
     i += n_load
     load_follows = ints[i : i + n_load]
+    i += n_load
+    chunk = ints[i : i + 3 * n_chunk].reshape((n_chunk, 3))
     inv_mass = floats[0:n]
     q0 = floats[n : 2 * n]
     v0 = floats[2 * n : 3 * n]
@@ -97,5 +118,5 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     load_force = floats[f : f + 4 * n_seg * n_load].reshape((n_seg, n_load, 2, 2))
     return Model(
         inv_mass, q0, v0, pair, reach, shortest, block, power, member, times, force, load_body, load_follows,
-        load_arm, load_force,
+        load_arm, load_force, chunk, ints[7],
     )  # fmt: skip

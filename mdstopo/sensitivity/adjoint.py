@@ -10,10 +10,11 @@ import numpy as np
 
 from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
 from mdstopo.jit import kernel
-from mdstopo.mechanics.assembly import SUMS, design_gradient, energy_gradient
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
+from mdstopo.scene.model import Springs
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 
 
@@ -51,20 +52,21 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
 
 @kernel
 def energy_rows(  # type: ignore[no-untyped-def]
-    model, tables, strength, steps, count, damped, reduction, closeness, gradient, rows, padded, work
+    model, motion, tables, strength, steps, count, damped, reduction, closeness, gradient, rows, padded, work
 ):
     """Value, time and gradient of the stored energy reduced over time.
 
-    In: reduction (MAX..FINAL), closeness (how near to the highest a peak competes, relative), gradient (wanted or not).
+    In: motion, strength: the members that the motion was computed with (`carrying`); reduction (MAX..FINAL), closeness
+    (how near to the highest a peak competes, relative), gradient (wanted or not).
     Out: rows (R, 4) time, value, step, fraction (time NaN for mean and integral); padded (R, M_padded) gradients with
     respect to alpha^mu. Returns how many rows there are.
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     pair = model.pair
+    springs = Springs(motion.block, motion.member, motion.chunk, motion.threads)
     turning = model.load_body.shape[0] > 0
     integral = reduction in (MEAN, INTEGRAL)
-    unit = model.member[5:8]
     stages = steps.index[count, 0]
     point = np.empty((1, 3, n))
     q = point[0, 0]
@@ -96,7 +98,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
         rows[0, 3] = 1.0
     else:
         sign = 1.0 if reduction == MAX else -1.0
-        found = find_peaks(model, tables, strength, steps, count, damped, sign, closeness, rows, work)
+        found = find_peaks(motion, tables, strength, steps, count, damped, sign, closeness, rows, work)
     if not gradient and reduction != FINAL:
         return found
     for r in range(found):
@@ -113,8 +115,8 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     q[d] = state[0, d]
                     v[d] = state[1, d]
             else:
-                w, c_w = reach(model, tables, strength, steps, count, k, c, damped, q, v, work)
-            value, _ = energy_at(pair, model.block, model.member, strength, q, v, rel, sums)
+                w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
+            value, _ = energy_at(pair, springs, strength, q, v, rel, sums)
             work[0] += 1
             if reduction == FINAL:
                 rows[0, 1] = value
@@ -131,9 +133,9 @@ def energy_rows(  # type: ignore[no-untyped-def]
             z = np.empty((reached, n))
             used = np.zeros(reached, np.int64)
             reverse_sweep(pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, work)
-            design_gradient(pair, model.block, model.member, steps.stage, z, used, out, work)
+            design_gradient(model, steps.stage, z, used, out, work)
         if integral:
-            energy_gradient(pair, model.block, model.member, unit, steps.stage, weight, out)
+            energy_gradient(model, steps.stage, weight, out)
         else:
-            energy_gradient(pair, model.block, model.member, unit, point, weight, out)
+            energy_gradient(model, point, weight, out)
     return found

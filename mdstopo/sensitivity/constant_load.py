@@ -11,18 +11,18 @@ dropped. An approximation; the paper's Figure 6 shows how far it carries.
 import numpy as np
 
 from mdstopo.jit import entry
-from mdstopo.mechanics.assembly import (
+from mdstopo.mechanics.assembly import pair_tangents
+from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import (
     SUMS,
     design_gradient,
     energy_gradient,
     member_sums,
-    pair_tangents,
     scale_members,
     unscale_gradient,
 )
-from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.responses.energy import energy_slope
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, Springs
 from mdstopo.scene.packing import Packed, unpack
 
 #: singular values below this times the largest are dropped
@@ -39,10 +39,11 @@ def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):  # type
     sums = np.empty((1, n_pair, SUMS))
     k = np.empty((n_pair, 6, 6))
     pull = np.empty((n_pair, 3))
-    scale_members(model.block, model.power, model.member, alpha, strength)
+    scale_members(model, alpha, strength)
     for i in range(states.shape[0]):
         relative_pose(pair, states[i, 0], states[i, 1], rel[0])
-        member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(True), sums)
+        springs = Springs(model.block, model.member, model.chunk, model.threads)
+        member_sums(springs, strength, rel, np.int64(1), np.bool_(True), sums)
         pair_tangents(pair, rel[0], states[i, 0], sums[0], np.bool_(False), k, k)
         for p in range(n_pair):
             for j in range(3):
@@ -61,9 +62,9 @@ def _gradient(ints, floats, alpha, weights, states, z, padded, out):  # type: ig
     used = np.ones(z.shape[0], np.int64)
     work = np.zeros(8, np.int64)
     padded[:] = 0.0
-    design_gradient(model.pair, model.block, model.member, states, z, used, padded, work)
-    energy_gradient(model.pair, model.block, model.member, model.member[5:8], states, weights, padded)
-    unscale_gradient(model.block, model.power, alpha, padded, out)
+    design_gradient(model, states, z, used, padded, work)
+    energy_gradient(model, states, weights, padded)
+    unscale_gradient(model, alpha, padded, out)
 
 
 def constant_load(packed: Packed, alpha: FloatArray, poses: FloatArray, weights: FloatArray) -> FloatArray:

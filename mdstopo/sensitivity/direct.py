@@ -10,9 +10,10 @@ import numpy as np
 from mdstopo.integrators.contract import carried, parent_of, reach, stage_weights, steps_of
 from mdstopo.integrators.steps import carve
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, energy_gradient, unscale_gradient
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, energy_gradient, unscale_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
+from mdstopo.scene.model import Springs
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.propagation import apply_matrix, step_matrix
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
@@ -24,7 +25,8 @@ NOWHERE = -2
 @kernel
 def slope_at(model, strength, q, v, rel, sums, out):  # type: ignore[no-untyped-def]
     """out (n,) = dg/dq at one state."""
-    energy_at(model.pair, model.block, model.member, strength, q, v, rel, sums)
+    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    energy_at(model.pair, springs, strength, q, v, rel, sums)
     pull = np.empty((rel.shape[1], 3))
     for p in range(rel.shape[1]):
         for j in range(3):
@@ -76,7 +78,6 @@ def finish_rows(  # type: ignore[no-untyped-def]
     In: states (n_obj, R, 3, n) of the rows, padded (n_obj, R, M_padded) their implicit parts, total (1, M_padded)
     that of the integral over time with its weights (S,).
     """
-    unit = model.member[5:8]
     one = np.ones(1)
     scaled = np.empty(weight.shape[0])
     for j in range(reductions.shape[0]):
@@ -89,10 +90,10 @@ def finish_rows(  # type: ignore[no-untyped-def]
                     out[i] = scale * total[0, i]
                 for i in range(weight.shape[0]):
                     scaled[i] = scale * weight[i]
-                energy_gradient(model.pair, model.block, model.member, unit, steps.stage, scaled, out)
+                energy_gradient(model, steps.stage, scaled, out)
             else:
-                energy_gradient(model.pair, model.block, model.member, unit, states[j, r : r + 1], one, out)
-            unscale_gradient(model.block, model.power, alpha, out, gradients[j, r])
+                energy_gradient(model, states[j, r : r + 1], one, out)
+            unscale_gradient(model, alpha, out, gradients[j, r])
 
 
 @entry
@@ -176,8 +177,8 @@ def direct(  # type: ignore[no-untyped-def]
             total_line = line[0]
             total_line[:] = 0.0
             apply_matrix(pair, model.block, model.member, steps.stage, 0, matrix, 0, 1, True, S, line)
-            energy_gradient(pair, model.block, model.member, model.member[5:8], steps.state[k : k + 1], one, total_line)
-            unscale_gradient(model.block, model.power, alpha, total_line, history[k])
+            energy_gradient(model, steps.state[k : k + 1], one, total_line)
+            unscale_gradient(model, alpha, total_line, history[k])
         if k == count:
             break
         # the rows whose look begins where this step does, then the step itself

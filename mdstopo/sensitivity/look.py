@@ -7,11 +7,14 @@ method; its tag.
 import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
-from mdstopo.integrators.steps import carve, copy_rows, deflection, step_at
+from mdstopo.integrators.steps import FORCES, SPRINGS, carve, copy_rows, deflection, step_at
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import SUMS, add_loads, member_sums, unscale_gradient
+from mdstopo.mechanics.assembly import add_loads
+from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
+from mdstopo.mechanics.passes import SUMS, member_sums, unscale_gradient
+from mdstopo.scene.model import Springs
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -45,17 +48,20 @@ def look(  # type: ignore[no-untyped-def]
     (n_obj,); gradients (n_obj, R, N); meeting (2,), see `find_meeting`.
     """
     model = unpack(ints, floats)
+    motion, own, left = carrying(model, strength, np.bool_(False))
     turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
     find_meeting(model, strength, steps, count, meeting)
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
-            model, tables, strength, steps, count, damped, reductions[j], settings[3], gradient, rows[j], padded, work
-        )
+            model, motion, tables, own, steps, count, damped, reductions[j], settings[3], gradient, rows[j], padded,
+            work,
+        )  # fmt: skip
         if gradient:
             for r in range(found[j]):
-                unscale_gradient(model.block, model.power, alpha, padded[r], gradients[j, r])
+                unscale_gradient(model, alpha, padded[r], gradients[j, r])
+    work[SPRINGS] += left * work[FORCES]
 
 
 @kernel
@@ -141,7 +147,8 @@ def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, str
         else:
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
         relative_pose(model.pair, q, v, rel[0])
-        member_sums(model.block, model.member, strength, rel, np.int64(1), np.bool_(False), sums)
+        springs = Springs(model.block, model.member, model.chunk, model.threads)
+        member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
         f[:] = 0.0
         add_loads(model, steps.index[k, 2], t, q, f)
         for p in range(n_pair):

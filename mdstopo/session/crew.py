@@ -14,10 +14,7 @@ import threading
 from contextlib import suppress
 from typing import IO, Any
 
-
-def cores() -> int:
-    """How many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+from mdstopo.native.threads import VARIABLE, cores
 
 
 def streams() -> tuple[IO[bytes], IO[bytes]]:
@@ -37,12 +34,12 @@ class WorkerProcess:
     """
 
     def __init__(self, module: str, job: object, crew: int, inbox: "queue.Queue[tuple[WorkerProcess, Any]]") -> None:
-        threads = max(1, cores() // crew)
+        threads = str(max(1, cores() // crew))
         self._process = subprocess.Popen(
             [sys.executable, "-m", module],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env={**os.environ, "NUMBA_NUM_THREADS": str(threads)},
+            env={**os.environ, "NUMBA_NUM_THREADS": threads, VARIABLE: threads},
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None

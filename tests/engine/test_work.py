@@ -7,7 +7,7 @@ import mdstopo.case.reader
 import mdstopo.scene.compile
 from mdstopo import evaluate, simulate
 from mdstopo.engine import Evaluator
-from tests.engine.scenes import interior, paper, random_design, read, spring_scene, with_solver
+from tests.engine.scenes import interior, paper, random_design, random_scene, read, spring_scene, with_solver
 
 BOTH = pytest.mark.parametrize("integrator", ["gauss", "runge_kutta"])
 
@@ -96,3 +96,46 @@ def test_peaks_are_looked_for_in_the_motion_that_was_simulated():
     one, other = Evaluator(case).evaluate(alpha), Evaluator(case).evaluate(alpha)
     assert one.objectives == other.objectives
     assert np.array_equal(one.gradients["G"], other.gradients["G"])
+
+
+def _with_absent(case, share, seed=7):
+    """A design of which a share, spread at random, is absent."""
+    rng = np.random.default_rng(seed)
+    design = rng.uniform(0.1, 1.0, case.n_design)
+    design[rng.permutation(case.n_design)[: round(share * case.n_design)]] = 0.0
+    return design
+
+
+@pytest.mark.parametrize("integrator", ["gauss", "runge_kutta", "generalized_alpha"])
+@pytest.mark.parametrize("features", [(), ("damping", "preload", "several", "fixed", "ground")])
+def test_absent_members_cost_the_motion_nothing_and_have_the_same_gradient(integrator, features):
+    solver = {"tolerance": 1e-9} if integrator != "generalized_alpha" else {"step": 1e-3}
+    case = read(random_scene(11, *features, bodies=3), integrator=integrator, **solver)
+    evaluator = Evaluator(case)
+    fixed = sum(len(group) for group in case.members if not group.design)
+    total = case.n_design + fixed
+    design = _with_absent(case, 0.5 * total / case.n_design)
+    few = evaluator.evaluate(design)
+    assert few.status.ok, few.message
+    assert few.work["spring_states"] == few.work["force_sums"] * (np.count_nonzero(design) + fixed)
+    # of all members next to nothing is something
+    all_of_them = evaluator.evaluate(np.where(design == 0.0, 1e-200, design))
+    assert all_of_them.work["spring_states"] == all_of_them.work["force_sums"] * total
+    assert few.objectives["G"] == pytest.approx(all_of_them.objectives["G"], rel=1e-11)
+    gradient, other = few.gradients["G"], all_of_them.gradients["G"]
+    assert np.abs(gradient - other).max() <= 1e-8 * np.abs(other).max()
+    assert np.abs(gradient[design == 0.0]).max() > 0.0
+
+
+def test_few_absent_members_are_summed_with_the_others():
+    case = paper("fig6")
+    found = Evaluator(case).evaluate(_with_absent(case, 0.2))
+    assert found.work["spring_states"] == found.work["force_sums"] * case.n_design
+
+
+def test_where_nothing_is_left_the_bodies_move_freely():
+    case = paper("fig6")
+    found = Evaluator(case).evaluate(np.zeros(case.n_design))
+    assert found.status.ok, found.message
+    assert found.work["spring_states"] == 0
+    assert found.objectives["G"] == 0.0

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
+from mdstopo.native.threads import VARIABLE
 from mdstopo.optimizer import driver, wide
 from mdstopo.optimizer.driver import Gsao
+from mdstopo.optimizer.powers import powers
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.safeguards import next_shift
-from mdstopo.optimizer.wide_kernels import powers
 
 N = 12_000
 SIZES = [wide.MANY, 1_020, N]
@@ -81,6 +82,20 @@ def test_the_same_state_gives_the_same_bits():
     assert np.array_equal(one.trial, other.trial)
     assert one.predicted == other.predicted
     assert one.kkt == other.kkt
+
+
+def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
+    monkeypatch.setattr(wide, "SHARED", 1)
+    found = []
+    for threads in (1, 2, 3):
+        monkeypatch.setenv(VARIABLE, str(threads))
+        found.append(states(Many(3, True, 50_000), 6)[-1])
+    one, *others = found
+    for other in others:
+        assert other.kkt == one.kkt
+        assert other.predicted == one.predicted
+        for name in ("trial", "alpha", "steps", "shift"):
+            assert np.array_equal(getattr(other, name), getattr(one, name))
 
 
 def test_a_row_that_is_far_from_its_limit_has_no_price():

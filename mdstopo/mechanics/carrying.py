@@ -1,0 +1,136 @@
+"""The members that carry anything: all others are left out of the motion.
+
+A member whose strengths are zero (alpha^mu = 0) adds nothing to any sum. Where a share of all members is like that, the
+others are written behind the strengths, block by block and in their order, and the motion is computed with these. Only
+the design decides, so that results depend on nothing else. The gradient needs all members: at mu = 1 one that carries
+nothing has a slope.
+"""
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.mechanics.passes import threads_for
+from mdstopo.native.threads import shared, taken
+from mdstopo.scene.model import VECTOR, Model
+
+#: of so many members one must carry nothing
+SHARE = 4
+#: rows of strengths with room for the members that carry, as in `Model.member`
+ROOMY = 11
+
+
+@kernel
+def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
+    """The model without members that carry nothing, its strengths, and how many members are left.
+
+    In: strength (3, M_padded), or (ROOMY, M_padded) with room behind; fill: write them there, else they are there from
+    the same strengths. The model itself comes back where there is no room, or too few carry nothing.
+    """
+    block = model.block
+    parts = model.chunk.shape[0]
+    cut = parts > 0
+    count = np.zeros(parts if cut else block.shape[0], np.int64)
+    if cut:
+        counter = np.zeros(1, np.int64)
+        shared(_count_chunks, threads_for(model, 1), (counter, model.chunk, block, strength, count))
+    else:
+        for k in range(block.shape[0]):
+            count[k] = _count(k, block[k, 1], block[k, 2], block, strength)
+    left = np.sum(count)
+    members = np.sum(block[:, 5])
+    if strength.shape[0] < ROOMY or SHARE * (members - left) < members:
+        return model, strength[:3], members
+    # where each part begins among those that are left
+    begin = np.empty(count.shape[0], np.int64)
+    fewer = np.empty((block.shape[0], 6), np.int64)
+    for k in range(block.shape[0]):
+        for j in range(6):
+            fewer[k, j] = block[k, j]
+        fewer[k, 5] = 0
+    for i in range(count.shape[0]):
+        k = model.chunk[i, 0] if cut else i
+        begin[i] = block[k, 1] + fewer[k, 5]
+        fewer[k, 5] += count[i]
+    for k in range(block.shape[0]):
+        fewer[k, 2] = block[k, 1] + (fewer[k, 5] + VECTOR - 1) // VECTOR * VECTOR
+    chunk = np.empty((parts, 3), np.int64)
+    for i in range(parts):
+        k = model.chunk[i, 0]
+        chunk[i, 0] = k
+        chunk[i, 1] = model.chunk[i, 1]
+        chunk[i, 2] = min(model.chunk[i, 2], fewer[k, 2])
+    room = strength[3:ROOMY]
+    if fill:
+        if cut:
+            counter = np.zeros(1, np.int64)
+            shared(
+                _gather_chunks, threads_for(model, 1),
+                (counter, model.chunk, block, model.member, strength, begin, count, room),
+            )  # fmt: skip
+        else:
+            for k in range(block.shape[0]):
+                _gather(k, block[k, 1], block[k, 2], block, model.member, strength, begin[k], count[k], room)
+        for k in range(block.shape[0]):
+            for row in range(8):
+                for i in range(fewer[k, 1] + fewer[k, 5], fewer[k, 2]):
+                    room[row, i] = 0.0
+    return (
+        Model(
+            model.inv_mass, model.q0, model.v0, model.pair, model.reach, model.shortest, fewer, model.power, room,
+            model.times, model.force, model.load_body, model.load_follows, model.load_arm, model.load_force, chunk,
+            model.threads,
+        ),
+        room[5:8],
+        left,
+    )  # fmt: skip
+
+
+@kernel
+def _count_chunks(counter, chunk, block, strength, count):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        count[i] = _count(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, strength)
+        i = taken(counter)
+
+
+@kernel
+def _count(k, start, stop, block, strength):  # type: ignore[no-untyped-def]
+    """How many members of the part start..stop of block k carry something."""
+    s = strength[0, start:stop]
+    found = 0
+    if block[k, 3] == 0:
+        for i in range(s.shape[0]):
+            found += s[i] != 0.0
+        return found
+    c = strength[1, start:stop]
+    p = strength[2, start:stop]
+    for i in range(s.shape[0]):
+        found += (s[i] != 0.0) | (c[i] != 0.0) | (p[i] != 0.0)
+    return found
+
+
+@kernel
+def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        _gather(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, begin[i], count[i], room)
+        i = taken(counter)
+
+
+@kernel
+def _gather(k, start, stop, block, member, strength, begin, count, room):  # type: ignore[no-untyped-def]
+    """Write those of the part start..stop of block k that carry something to room (8, M_padded) from begin on."""
+    viscous = block[k, 3] == 1
+    place = np.empty(stop - start, np.int64)
+    found = 0
+    for i in range(start, stop):
+        place[found] = i  # without a branch: zeros come at random
+        something = strength[0, i] != 0.0
+        if viscous:
+            something |= (strength[1, i] != 0.0) | (strength[2, i] != 0.0)
+        found += something
+    for row in range(8 if viscous else 6):
+        source = member[row] if row < 5 else strength[row - 5]
+        target = room[row]
+        for i in range(count):
+            target[begin + i] = source[place[i]]

@@ -1,0 +1,341 @@
+"""The passes over all members: their strengths, their sums at several poses, the design gradient.
+
+A pass returns a few numbers a pair of bodies and pose (`SUMS`), or a number a member. The order of sums is fixed:
+members within a tile, tiles in order. Of very many members (`Model.chunk`) every chunk is summed by itself and the
+chunks are added in order, so that threads can share them (`native.threads`) and no bit depends on how many do.
+"""
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.laws.spring import (
+    elastic_design,
+    elastic_force,
+    elastic_tangent,
+    stored_energy,
+    viscous_design,
+    viscous_force,
+    viscous_tangent,
+)
+from mdstopo.native.threads import shared, taken
+from mdstopo.scene.model import TILE
+
+#: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
+SUMS = 22
+#: members times poses from which on threads are worth making: some 0.8 ms of work
+WORTH = 400_000
+
+
+@kernel
+def threads_for(springs, poses):  # type: ignore[no-untyped-def]
+    """How many threads share a pass at so many poses."""
+    return springs.threads if springs.member.shape[1] * poses >= WORTH else 1
+
+
+@kernel
+def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
+    """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12)."""
+    block = model.block
+    if model.chunk.shape[0] == 0:
+        for k in range(block.shape[0]):
+            _scale(k, block[k, 1], block[k, 2], block, model.power, model.member, alpha, strength)
+        return
+    counter = np.zeros(1, np.int64)
+    shared(
+        _scale_chunks, threads_for(model, 1),
+        (counter, model.chunk, block, model.power, model.member, alpha, strength),
+    )  # fmt: skip
+
+
+@kernel
+def _scale_chunks(counter, chunk, block, power, member, alpha, strength):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        _scale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, member, alpha, strength)
+        i = taken(counter)
+
+
+@kernel
+def _scale(k, start, stop, block, power, member, alpha, strength):  # type: ignore[no-untyped-def]
+    """The part start..stop of block k."""
+    if block[k, 4] < 0:
+        for i in range(start, stop):
+            strength[0, i] = member[5, i]
+            strength[1, i] = member[6, i]
+            strength[2, i] = member[7, i]
+        return
+    mu = power[k]
+    first = block[k, 4] + start - block[k, 1]
+    count = min(stop, block[k, 1] + block[k, 5]) - start
+    a = alpha[first : first + count]
+    for row in range(3 if block[k, 3] == 1 else 1):
+        whole = member[5 + row, start : start + count]
+        scaled = strength[row, start : start + count]
+        if mu == 1.0:  # a loop of its own: a power that is not used would be computed all the same
+            for i in range(count):
+                scaled[i] = a[i] * whole[i]
+        else:
+            for i in range(count):
+                scaled[i] = a[i] ** mu * whole[i]
+    for i in range(start + count, stop):
+        strength[0, i] = 0.0
+        strength[1, i] = 0.0
+        strength[2, i] = 0.0
+
+
+@kernel
+def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-untyped-def]
+    """One pass over all members (`Springs`) at m relative poses.
+
+    In: strength (3, M_padded), rel (m, n_pair, POSE), tangent (are K and C wanted). Out: sums (m, n_pair, SUMS).
+    """
+    block = springs.block
+    chunk = springs.chunk
+    sums[:m] = 0.0
+    if chunk.shape[0] == 0:
+        for k in range(block.shape[0]):
+            _sum(k, block[k, 1], block[k, 2], block, springs.member, strength, rel, m, tangent, sums, block[k, 0])
+        return
+    counter = np.zeros(1, np.int64)
+    part = np.empty((chunk.shape[0], m, 1, SUMS))
+    job = (counter, chunk, block, springs.member, strength, rel, m, tangent, part)
+    shared(_sum_chunks, threads_for(springs, m), job)
+    for i in range(chunk.shape[0]):
+        p = block[chunk[i, 0], 0]
+        for j in range(m):
+            for s in range(SUMS):
+                sums[j, p, s] += part[i, j, 0, s]
+
+
+@kernel
+def _sum_chunks(counter, chunk, block, member, strength, rel, m, tangent, part):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        out = part[i]
+        out[:] = 0.0
+        _sum(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, rel, m, tangent, out, np.int64(0))
+        i = taken(counter)
+
+
+@kernel
+def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+    """Add the part start..stop of block k to sums (m, columns, SUMS)."""
+    p = block[k, 0]
+    viscous = block[k, 3] == 1
+    counted = block[k, 4] >= 0  # energy is that of design members
+    for lo in range(start, stop, TILE):
+        hi = min(lo + TILE, stop)
+        px = member[0, lo:hi]
+        py = member[1, lo:hi]
+        qx = member[2, lo:hi]
+        qy = member[3, lo:hi]
+        l0 = member[4, lo:hi]
+        ks = strength[0, lo:hi]
+        for j in range(m):
+            r = rel[j, p]
+            o = sums[j, column]
+            if not viscous:
+                if tangent:
+                    x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(
+                        px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3]
+                    )
+                    o[7] += kxx
+                    o[8] += kxy
+                    o[9] += kxt
+                    o[10] += kxy
+                    o[11] += kyy
+                    o[12] += kyt
+                    o[13] += kxt
+                    o[14] += kyt
+                    o[15] += ktt
+                else:
+                    x, y, t, e = elastic_force(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3])
+                o[0] += x
+                o[1] += y
+                o[2] += t
+                if counted:
+                    o[3] += e
+                    o[4] -= x
+                    o[5] -= y
+                    o[6] -= t
+                continue
+            cs = strength[1, lo:hi]
+            ps = strength[2, lo:hi]
+            if tangent:
+                (x, y, t, e, ex, ey, et, k0, k1, k2, k3, k4, k5, k6, k7, k8, c0, c1, c2, c3, c4, c5) = viscous_tangent(
+                    px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
+                )
+                o[7] += k0
+                o[8] += k1
+                o[9] += k2
+                o[10] += k3
+                o[11] += k4
+                o[12] += k5
+                o[13] += k6
+                o[14] += k7
+                o[15] += k8
+                o[16] += c0
+                o[17] += c1
+                o[18] += c2
+                o[19] += c3
+                o[20] += c4
+                o[21] += c5
+            else:
+                x, y, t, e, ex, ey, et = viscous_force(
+                    px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
+                )
+            o[0] += x
+            o[1] += y
+            o[2] += t
+            if counted:
+                o[3] += e
+                o[4] += ex
+                o[5] += ey
+                o[6] += et
+
+
+@kernel
+def design_gradient(model, stage, z, used, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength): one pass, no histories.
+
+    In: stage (S, 3, n) with q, v, and their virtual displacements z (S, n), the adjoint of the force balance, of the
+    stages that are used (S,). The member's generalised force is -T^T b f, so each adds -f_i (b_i . T z_s). Fixed
+    members are passed over. work: counts the stages.
+    """
+    pair = model.pair
+    block = model.block
+    n_pair = pair.shape[0]
+    count = 0
+    for i in range(used.shape[0]):
+        count += used[i]
+    work[7] += count
+    rel = np.empty((count, n_pair, POSE))
+    u = np.empty((count, n_pair, 3))
+    j = 0
+    for i in range(used.shape[0]):
+        if used[i]:
+            relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
+            for p in range(n_pair):
+                pair_displacement(pair, rel[j], p, z[i], u[j, p])
+                for axis in range(3):
+                    u[j, p, axis] = -u[j, p, axis]
+            j += 1
+    if model.chunk.shape[0] == 0:
+        for k in range(block.shape[0]):
+            _design(k, block[k, 1], block[k, 2], block, model.member, rel, u, out)
+        return
+    counter = np.zeros(1, np.int64)
+    shared(_design_chunks, threads_for(model, count), (counter, model.chunk, block, model.member, rel, u, out))
+
+
+@kernel
+def _design_chunks(counter, chunk, block, member, rel, u, out):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, u, out)
+        i = taken(counter)
+
+
+@kernel
+def _design(k, start, stop, block, member, rel, u, out):  # type: ignore[no-untyped-def]
+    """The part start..stop of block k, at the poses rel (S, n_pair, POSE) and their changes u (S, n_pair, 3)."""
+    if block[k, 4] < 0:
+        return
+    p = block[k, 0]
+    for lo in range(start, stop, TILE):
+        hi = min(lo + TILE, stop)
+        px = member[0, lo:hi]
+        py = member[1, lo:hi]
+        qx = member[2, lo:hi]
+        qy = member[3, lo:hi]
+        l0 = member[4, lo:hi]
+        ks = member[5, lo:hi]
+        o = out[lo:hi]
+        if block[k, 3] == 0:
+            elastic_design(px, py, qx, qy, l0, ks, rel[:, p], u[:, p], o)
+            continue
+        for j in range(rel.shape[0]):
+            r = rel[j, p]
+            w = u[j, p]
+            viscous_design(
+                px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
+                r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
+            )  # fmt: skip
+
+
+@kernel
+def energy_gradient(model, stage, weight, out):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += sum_s weight_s V_i(q_s): the explicit part of the energy's design gradient."""
+    block = model.block
+    count = weight.shape[0]
+    rel = np.empty((count, model.pair.shape[0], POSE))
+    for j in range(count):
+        relative_pose(model.pair, stage[j, 0], stage[j, 1], rel[j])
+    if model.chunk.shape[0] == 0:
+        for k in range(block.shape[0]):
+            _energy(k, block[k, 1], block[k, 2], block, model.member, rel, weight, out)
+        return
+    counter = np.zeros(1, np.int64)
+    shared(_energy_chunks, threads_for(model, count), (counter, model.chunk, block, model.member, rel, weight, out))
+
+
+@kernel
+def _energy_chunks(counter, chunk, block, member, rel, weight, out):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        _energy(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, weight, out)
+        i = taken(counter)
+
+
+@kernel
+def _energy(k, lo, hi, block, member, rel, weight, out):  # type: ignore[no-untyped-def]
+    """The part lo..hi of block k, at the poses rel (S, n_pair, POSE)."""
+    if block[k, 4] < 0:
+        return
+    for j in range(weight.shape[0]):
+        if weight[j] != 0.0:
+            r = rel[j, block[k, 0]]
+            stored_energy(
+                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
+                member[5, lo:hi], r[0], r[1], r[2], r[3], weight[j], out[lo:hi],
+            )  # fmt: skip
+
+
+@kernel
+def unscale_gradient(model, alpha, padded, out):  # type: ignore[no-untyped-def]
+    """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
+    block = model.block
+    if model.chunk.shape[0] == 0:
+        for k in range(block.shape[0]):
+            _unscale(k, block[k, 1], block[k, 2], block, model.power, alpha, padded, out)
+        return
+    counter = np.zeros(1, np.int64)
+    shared(_unscale_chunks, threads_for(model, 1), (counter, model.chunk, block, model.power, alpha, padded, out))
+
+
+@kernel
+def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
+    i = taken(counter)
+    while i < chunk.shape[0]:
+        _unscale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, alpha, padded, out)
+        i = taken(counter)
+
+
+@kernel
+def _unscale(k, start, stop, block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
+    """The part start..stop of block k."""
+    if block[k, 4] < 0:
+        return
+    mu = power[k]
+    first = block[k, 4] + start - block[k, 1]
+    count = min(stop, block[k, 1] + block[k, 5]) - start
+    a = alpha[first : first + count]
+    given = padded[start : start + count]
+    own = out[first : first + count]
+    if mu == 1.0:
+        for i in range(count):
+            own[i] = given[i]
+    else:
+        for i in range(count):
+            own[i] = mu * a[i] ** (mu - 1.0) * given[i]

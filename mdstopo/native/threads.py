@@ -1,0 +1,60 @@
+"""One kernel on several threads at once: for passes over so many members that it pays (`mechanics.passes`).
+
+The threads are the system's own. They are made when a pass begins and have ended when it is over, which costs some 30
+microseconds; so none waits or spins in between, and an error or Ctrl-C finds none. Nothing here imports Numba.
+"""
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.native.kernel import when_compiling
+
+#: threads of one pass at most
+MOST = 64
+VARIABLE = "MDSTOPO_THREADS"
+
+
+class ThreadsError(Exception):
+    """The environment asks for a number of threads that is none."""
+
+    exit_status = 2
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def allowed() -> int:
+    """How many threads a pass may take: MDSTOPO_THREADS, else one a core. Raises ThreadsError."""
+    asked = os.environ.get(VARIABLE, "")
+    if not asked:
+        return min(cores(), MOST)
+    if not (asked.isascii() and asked.isdigit() and 1 <= int(asked) <= MOST):
+        raise ThreadsError(f"MDSTOPO_THREADS is {asked!r}, not a number of threads from 1 to {MOST}")
+    return int(asked)
+
+
+def shared(kernel: Callable[..., None], threads: int, job: tuple[Any, ...]) -> None:
+    """Call kernel(*job) on so many threads, of which this is one; back when all calls are.
+
+    The kernel takes pieces of the work by `taken` until there are none, so no result depends on how many threads there
+    are, and one that the system refuses is not missed. In kernels only; the kernel returns nothing.
+    """
+    raise TypeError("kernels share work; Python calls them")
+
+
+def taken(counter: NDArray[np.int64]) -> int:
+    """The next piece of work, each given once: the first number of an array, and one more there, as one operation."""
+    counter[0] += 1
+    return int(counter[0]) - 1
+
+
+@when_compiling
+def _register() -> None:
+    """Have Numba know them."""
+    import mdstopo.native.threads_lowering  # noqa: F401
