@@ -92,14 +92,12 @@ def scorer(case: Case) -> Callable[[Evaluation], float]:
 
 
 def excess(case: Case, found: Evaluation) -> float:
-    """The largest excess over a bound, relative to it; 0 where all constraints hold."""
-    return max(
-        0.0,
-        *(
-            {"limit": value, "at_least": -value, "equals": abs(value)}[row.sense] / (abs(row.bound) or 1.0)
-            for row, value in zip(case.constraints, found.constraints.tolist(), strict=True)
-        ),
-    )
+    """The largest excess over a bound, relative to it; 0 where all constraints hold, NaN where one is unknown."""
+    over = [
+        {"limit": value, "at_least": -value, "equals": abs(value)}[row.sense] / (abs(row.bound) or 1.0)
+        for row, value in zip(case.constraints, found.constraints.tolist(), strict=True)
+    ]
+    return float(np.max([0.0, *over]))
 
 
 def values(case: Case, designs: dict[str, Evaluation]) -> Table:

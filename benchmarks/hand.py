@@ -127,7 +127,7 @@ class Sizes:
         sample = self.problem.evaluate(self.design(x), gradient)
         if not len(sample.gradients):
             return sample
-        limits = sample.constraint_gradients.reshape(len(sample.constraint_rows), -1)
+        limits = sample.constraint_gradients.reshape(len(sample.constraint_rows), self.spread.shape[0])
         return replace(sample, gradients=sample.gradients @ self.spread, constraint_gradients=limits @ self.spread)
 
 

@@ -287,6 +287,8 @@ def _measure(keys: Any, default: Measure, reading: Reading) -> Measure:
             reading.mistake(inside(keys.path, key), f"{key} belongs to {owner}, not to {name}")
     factor = 1.0 if keys["factor"] is None else keys["factor"]
     level = 0.9 if keys["level"] is None else keys["level"]
+    if name == "quantile" and level == 1.0:
+        name = "worst"  # which it is, and a quantile's interval would have no upper end
     return Measure(name, factor if name == "mean_deviation" else 0.0, level if name == "quantile" else 1.0)
 
 

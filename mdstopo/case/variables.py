@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import Number
+from mdstopo.case.laws import Law
 from mdstopo.case.model import MemberGroup, Variable
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema_scene import LAW
@@ -36,6 +39,7 @@ def build_shared(top: Fields, groups: dict[str, MemberGroup] | None, reading: Re
     path = inside(design.path, "shared")
     good = _are_design(design["shared"], path, groups, reading)
     place = inside(design.path, "mirrored")
+    joined: list[set[str]] = []
     for i, names in enumerate(design["mirrored"]):
         own = f"{place}[{i}]"
         if not _are_design(names, own, groups, reading):
@@ -46,9 +50,14 @@ def build_shared(top: Fields, groups: dict[str, MemberGroup] | None, reading: Re
             told = ", ".join(f"{name} has {count:,}" for name, count in zip(names, counts, strict=True))
             reading.mistake(own, f"{told}; member k of one goes with member k of the other: equal counts are needed")
             good = False
-        low, high = max(groups[name].lower for name in names), min(groups[name].upper for name in names)
+        # what earlier lists tie to one of these counts, too
+        tied = set(names).union(*(each for each in joined if each & set(names)))
+        joined = [each for each in joined if not each & tied] + [tied]
+        low, high = max(groups[name].lower for name in tied), min(groups[name].upper for name in tied)
         if low > high:
             message = f"their bounds have nothing in common: lower {number_text(low)}, upper {number_text(high)}"
+            if len(tied) > len(names):
+                message += f" (of {listed(sorted(tied))})"
             reading.mistake(own, message)
             good = False
     return {"shared": tuple(design["shared"]), "mirrored": tuple(map(tuple, design["mirrored"]))} if good else nothing
@@ -120,7 +129,7 @@ def _build(name: str, fields: Fields, groups: dict[str, MemberGroup], reading: R
             reading.mistake(path, f"the key 'initial' is missing, and the laws {why} (the first value of {parameter})")
             return None
         initial = own.pop()
-    if not _within(fields, initial, parameter, records[0].type, reading):
+    if not _within(fields, initial, parameter, records[0].type, reading) or not _acts(fields, records, reading):
         return None
     key = _key(records[0].type, parameter)
     return Variable(
@@ -183,6 +192,23 @@ def _within(fields: Fields, initial: float, parameter: str, law: str, reading: R
         reading.mistake(inside(fields.path, "initial"), message)
         good = False
     return good
+
+
+def _acts(fields: Fields, records: Sequence[Law], reading: Reading) -> bool:
+    """Whether laws act for some time whatever the variable: where they never act, no derivative leads back."""
+    lower, upper = fields["lower"], fields["upper"]
+    for record in records:
+        begin = -math.inf if record.active_from is None else record.active_from
+        end = math.inf if record.active_until is None else record.active_until
+        if fields["parameter"] == "active_from" and upper > end:
+            text = f"found {number_text(upper)}, allowed is at most active_until, {number_text(end)}"
+            reading.mistake(inside(fields.path, "upper"), text)
+            return False
+        if fields["parameter"] == "active_until" and lower < begin:
+            text = f"found {number_text(lower)}, allowed is at least active_from, {number_text(begin)}"
+            reading.mistake(inside(fields.path, "lower"), text)
+            return False
+    return True
 
 
 def prices(variables: tuple[Variable, ...], groups: tuple[str, ...]) -> FloatArray:

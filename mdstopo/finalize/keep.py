@@ -21,17 +21,19 @@ def chosen(alpha: FloatArray, keep: int | None, threshold: float | None) -> Inde
     return np.flatnonzero(alpha >= (0.0 if threshold is None else threshold))
 
 
-def restricted(case: Case, kept: IndexArray) -> Case:
+def restricted(case: Case, kept: IndexArray, alpha: FloatArray) -> Case:
     """The case with only the design members at `kept` (K,), rising; groups that lose all of theirs are gone.
 
-    Bounds of volume rows stay the numbers that they are. It has one start, and of several powers the last.
+    alpha (N,): the design; each group's initial one is the mean of those that it keeps, because a case that settles has
+    to settle with its initial design. Bounds of volume rows stay the numbers that they are. It has one start, and of
+    several powers the last.
     """
     groups = []
     for group, own in _with_own(case, kept):
         if not group.design:
             groups.append(group)
         elif len(own):
-            groups.append(replace(_part(group, own), powers=()))
+            groups.append(replace(_part(group, own), powers=(), initial=float(_own(case, group, alpha)[own].mean())))
     names = {group.name for group in groups}
     rows = tuple(
         replace(row, groups=tuple(n for n in row.groups if n in names), coefficients=row.coefficients[kept])
@@ -40,6 +42,10 @@ def restricted(case: Case, kept: IndexArray) -> Case:
         for row in case.constraints
     )
     return replace(case, members=tuple(groups), constraints=rows, optimizer=replace(case.optimizer, starts=1))
+
+
+def _own(case: Case, group: MemberGroup, alpha: FloatArray) -> FloatArray:
+    return alpha[case.group_slices[group.name]]
 
 
 def places(case: Case, kept: IndexArray) -> list[tuple[str, int]]:

@@ -98,7 +98,7 @@ def ready(case: Case, alpha: FloatArray, keep: int | None, threshold: float | No
     kept = chosen(alpha, keep, threshold)
     if not len(kept):
         raise StoreError(f"no member has alpha of {threshold:g} or more; the largest is {alpha.max():.6g}")
-    reduced = restricted(case, kept)
+    reduced = restricted(case, kept, alpha)
     check_restricted(reduced)
     content_of(case)
     return kept, reduced

@@ -96,11 +96,12 @@ def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale,
     for k in range(model.block.shape[0]):
         if model.block[k, 3] != CRUSH:
             continue
-        if model.block[k, 6] == group and model.active[segment, k] != 0 and who < model.block[k, 5]:
-            i = model.block[k, 1] + who
+        own_i = who - model.block[k, 7]
+        if model.block[k, 6] == group and model.active[segment, k] != 0 and own_i >= 0 and own_i < model.block[k, 5]:
+            i = model.block[k, 1] + own_i
             x, _ = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
             force, _ = set_slopes(model, k, i, strength, x - strength[2, i], 0.0)
-            out[slot + who] += scale * sign * force
+            out[slot + own_i] += scale * sign * force
         slot += model.block[k, 5]
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from mdstopo.case.model import Case, Objective, Response, ResponseRow, VolumeRow
 
 
@@ -16,6 +18,10 @@ def _members(case: Case, made: Case) -> Iterator[str]:
             break
         if len(stated) != len(found):
             yield f"the group {stated.name} has {len(found)} members, not {len(stated)}: a design would not fit both"
+        elif not (
+            np.array_equal(stated.from_index, found.from_index) and np.array_equal(stated.to_index, found.to_index)
+        ):
+            yield f"the group {stated.name} has as many members, but others: a design would not fit both"
         if stated.design != found.design:
             now = "designed" if found.design else "fixed"
             yield f"the group {stated.name} is {now}, which it is not in the case: a design would not fit both"

@@ -17,7 +17,7 @@ from mdstopo.evaluation import Evaluation, FloatArray, Peak
 from mdstopo.integrators.steps import WORK_NAMES
 from mdstopo.optimizer.structure import competes, sign_of
 from mdstopo.robust.measures import rows, slopes
-from mdstopo.robust.points import case_at, name_of, nominal_case
+from mdstopo.robust.points import evaluator_at, name_of, nominal_case
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.status import Status
 
@@ -60,7 +60,7 @@ class Ensemble(Evaluator):
         self._nominal_too = any(measure.name == "nominal" for measure in measures)
         self._wanted = range(len(self.sample)) if any(m.name != "nominal" for m in measures) else range(0)
         if points is None:
-            points = {i: Evaluator(case_at(case, self.sample, i), beside=False) for i in range(len(self.sample))}
+            points = {i: evaluator_at(case, self.sample, i) for i in range(len(self.sample))}
             points[NOMINAL] = Evaluator(nominal_case(case), beside=False)
         self.points = points
 

@@ -20,6 +20,8 @@ from mdstopo.evaluation import FloatArray
 from mdstopo.robust.measures import statistic
 
 CONFIDENCE = 0.95
+#: by how much, relatively, sums of the same numbers may differ
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,9 @@ class Estimate:
     high: float
 
     def holds(self, value: float) -> bool:
-        """Whether a value lies within the interval."""
-        return self.low <= value <= self.high
+        """Whether a value lies within the interval, or outside by no more than the rounding of sums."""
+        slack = ROUNDING * abs(value)
+        return self.low - slack <= value <= self.high + slack
 
 
 def estimate(measure: Measure, y: FloatArray) -> Estimate:

@@ -8,6 +8,7 @@ from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.model import Case, Uncertainty
 from mdstopo.case.reader import read_case
 from mdstopo.case.words import inside
+from mdstopo.engine import Evaluator
 from mdstopo.robust.alike import other_problem
 from mdstopo.robust.sample import Sample
 from mdstopo.scene.refusals import refusals
@@ -23,7 +24,9 @@ def nominal_case(case: Case) -> Case:
 
 def case_at(case: Case, sample: Sample, i: int) -> Case:
     """The case at point i. Raises CaseError, at the section's place, where it would be no case, or another problem."""
-    overrides: dict[str, Any] = {**case.overrides, **settings(_uncertainty(case), sample, i)}
+    own = settings(_uncertainty(case), sample, i)
+    # those of the point come last, also where one of the same key came earlier
+    overrides: dict[str, Any] = {key: value for key, value in case.overrides.items() if key not in own} | own
     try:
         made = read_case(case.text, path=case.path, overrides=overrides, without=("uncertainty",))
     except CaseError as error:
@@ -42,6 +45,19 @@ def case_at(case: Case, sample: Sample, i: int) -> Case:
     refused = refusals(made)
     if refused:
         raise _refused(case, sample, i, refused)
+    return made
+
+
+def evaluator_at(case: Case, sample: Sample, i: int) -> Evaluator:
+    """The evaluator of point i, ready to run. Raises CaseError as `case_at`, also for joints that do not fit there."""
+    try:
+        made = Evaluator(case_at(case, sample, i), beside=False)
+        for load_case in made.scenes if made.beyond else ():
+            made.driver(load_case)
+    except CaseError as error:
+        if error.mistakes and error.mistakes[0].path_key.startswith("uncertainty"):
+            raise
+        raise _refused(case, sample, i, error.mistakes) from None
     return made
 
 
@@ -79,6 +95,8 @@ def _refused(case: Case, sample: Sample, i: int, mistakes: Sequence[Mistake]) ->
     found = []
     for mistake in mistakes:
         path = inside("uncertainty.parameters", mistake.path_key) if mistake.path_key in numbers else default
+        if place >= 0 and mistake.path_key in _uncertainty(case).scenarios[place].values:
+            path = f"uncertainty.scenarios.{_uncertainty(case).scenarios[place].name}"
         key = f"{mistake.path_key}: " if mistake.path_key else ""
         found.append(case.marks.mistake(path, f"{name_of(case, sample, i)}: {key}{mistake.message}"))
     return CaseError(found, str(case.path or case.name))

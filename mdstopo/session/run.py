@@ -186,7 +186,12 @@ class _Run:
             raise KeyboardInterrupt
         status, reason = self.conclude(best)
         if status not in (RunStatus.RUNNING, RunStatus.INTERRUPTED):
-            self.complete(engine, best)
+            try:
+                self.complete(engine, best)
+            except WorkerError as error:
+                if path is not None:
+                    self.save(path, RunStatus.INTERRUPTED, str(error))
+                raise
             status, reason = self.judge(best, status, reason)
         if path is not None:
             self.save(path, status, reason)

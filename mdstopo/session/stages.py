@@ -119,6 +119,8 @@ class _Marked:
 
     def __getattr__(self, name: str) -> Any:
         """What only some problems have."""
+        if name.startswith("_"):
+            raise AttributeError(name)
         return getattr(self._problem, name)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:

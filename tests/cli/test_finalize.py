@@ -160,7 +160,7 @@ def test_text_survives_the_reader() -> None:
 
 def final_of(case: Any, kept: np.ndarray, alpha: np.ndarray) -> tuple[Any, Any, list[str]]:
     """The reduced case, and the final one as it is read again."""
-    reduced = restricted(case, kept)
+    reduced = restricted(case, kept, case.initial)
     content, told = final_content(content_of(case), reduced, places(case, kept), alpha)
     return reduced, read_case(text_of(content)), told
 
@@ -269,7 +269,7 @@ def test_a_result_becomes_a_case_that_repeats_it(capsys: pytest.CaptureFixture[s
 
     assert call(capsys, "check", "made/final.yaml", "--quiet")[0] == 0
     assert call(capsys, "simulate", "made/final.yaml", "--out", "final.h5", "--quiet")[0] == 0
-    case = restricted(load_case("in/probe.yaml"), chosen(alpha, 7, None))
+    case = restricted(load_case("in/probe.yaml"), chosen(alpha, 7, None), alpha)
     sizes = np.array([each["alpha"] for each in told["kept"]])
     with h5py.File("final.h5") as file:
         for name in ("turn", "brake"):
@@ -384,7 +384,7 @@ def test_what_looks_at_members_that_are_gone_is_refused(capsys: pytest.CaptureFi
 
 def test_bounds_of_the_full_case_stay_for_the_members_kept() -> None:
     case = load_case("in/probe.yaml")
-    reduced = restricted(case, np.array([1, 2, 15]))
+    reduced = restricted(case, np.array([1, 2, 15]), case.initial)
     assert [row.bound for row in reduced.constraints] == [row.bound for row in case.constraints]
     assert np.array_equal(reduced.constraints[0].coefficients, case.constraints[0].coefficients[[1, 2, 15]])
     assert reduced.members[0].p_world == pytest.approx(case.members[0].p_world[[1, 2]])

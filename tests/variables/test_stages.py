@@ -246,7 +246,7 @@ def test_a_design_made_in_stages_is_finalized_at_the_last_power():
     from mdstopo.finalize.keep import restricted
 
     case = staged()
-    assert [(g.power, g.powers) for g in restricted(case, np.arange(5)).members] == [(3.0, ())]
+    assert [(g.power, g.powers) for g in restricted(case, np.arange(5), case.initial).members] == [(3.0, ())]
 
 
 def test_a_stage_that_fails_ends_the_run_and_says_which(monkeypatch):
