@@ -8,7 +8,8 @@ order in which the matrix is banded (`place`), so a chain of bodies costs what i
 
     W(w_q, w_v) = [M + w_q K + w_v C,  Phi_q^T; Phi_q + w_q G_q + w_v G_v,  0]
 
-is the matrix of an implicit step and, transposed, that of the reverse sweep. K holds the stiffness of members, loads,
+is the matrix of an implicit step and, transposed, that of the reverse sweep. Without tangents, and without inerters,
+only a matrix of the joints is factorised (`joint_matrix`). K holds the stiffness of members, loads,
 joints (d(Phi_q^T lam)/dq) and inerters, G_q and G_v the slopes of Phi_q a + gamma.
 """
 
@@ -23,6 +24,7 @@ from mdstopo.general.forces import (
     drive_state,
     general_forces,
 )
+from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, is_diagonal, solve_joints
 from mdstopo.general.structures import bundle
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.jit import kernel
@@ -35,14 +37,16 @@ from mdstopo.mechanics.joints.table import (
 )
 from mdstopo.mechanics.passes import SUMS
 
-#: a pivot of the scaled matrix below this means that joints contradict or repeat each other here
-SINGULAR = 1e-12
 #: what one balance needs and leaves: relative poses, sums, forces, K, C, slope of turning loads, inerters' mass; of the
 #: joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the scales of
-#: its unknowns, which make every row about 1 whatever the masses
+#: its unknowns, which make every row about 1 whatever the masses; of the joints' matrix the inverse masses, Phi_q M^-1,
+#: the factors and scales; and which factors were made last
 DESK = (
     "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots", "x", "scale",
+    "inverse", "pull", "gram", "root", "factors",
 )  # fmt: skip
+#: places of desk.factors: whether the mass is diagonal; whether the factors are those of the joints' matrix
+DIAGONAL, OF_JOINTS = range(2)
 
 
 class Desk:
@@ -61,6 +65,8 @@ def make_desk(model):  # type: ignore[no-untyped-def]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
     total = model.place.shape[0]
+    factors = np.zeros(2, np.int64)
+    factors[0] = 1 if is_diagonal(model) else 0
     return Desk(
         np.zeros((n_pair, POSE)),
         np.zeros((n_pair, SUMS)),
@@ -78,6 +84,11 @@ def make_desk(model):  # type: ignore[no-untyped-def]
         np.zeros(total, np.int64),
         np.zeros(total),
         np.ones(total),
+        inverse_masses(model),
+        np.zeros((n_joint, 3, 6)),
+        np.zeros((model.size[0], model.size[3] + 1)),
+        np.ones(model.size[0]),
+        factors,
     )
 
 
@@ -131,15 +142,19 @@ def joint_slopes(model, q, v, a, lam, desk):  # type: ignore[no-untyped-def]
 
 @kernel
 def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type: ignore[no-untyped-def]
-    """Factorise W(w_q, w_v), or its transpose, into desk.band; k, c, mass (n_pair, 6, 6), turn (n,).
+    """Factorise W(w_q, w_v), or its transpose, for `solve_unknowns`; k, c, mass (n_pair, 6, 6), turn (n,).
 
     The joints' Phi_q, G_q and G_v are those on the desk. Returns the place of the unknown at which it is singular, or
     -1.
     """
+    tangent = w_q != 0.0 or w_v != 0.0
+    alone = not tangent and desk.factors[0] != 0
+    desk.factors[1] = 1 if alone else 0
+    if alone:
+        return factor_joints(model, desk.inverse, desk.jac, desk.pull, desk.gram, desk.root, desk.x)
     band = desk.band
     half = model.size[1]
     n = model.mass.shape[0]
-    tangent = w_q != 0.0 or w_v != 0.0
     band[:] = 0.0
     scale = desk.scale
     for d in range(n):
@@ -218,6 +233,9 @@ def factorise_at(band, half, pivots, tangent):  # type: ignore[no-untyped-def]
 @kernel
 def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
     """Solve with the factors on the desk for the right side a (n,), lam (n_row,), in place; driven parts become 0."""
+    if desk.factors[1] != 0:
+        solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.root, desk.x, a, lam)
+        return
     n = model.mass.shape[0]
     x = desk.x
     for d in range(n):
@@ -260,14 +278,19 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
                 row = 3 * model.pair[p, i // 3] + i % 3
                 for j in range(6):
                     a[row] -= desk.mass[p, i, j] * known[3 * model.pair[p, j // 3] + j % 3]
-    for j in range(model.joint.shape[0]):
+    joint = model.joint
+    row = model.row
+    gamma = desk.gamma
+    jac = desk.jac
+    for j in range(joint.shape[0]):
+        one = 3 * joint[j, 1]
+        two = 3 * joint[j, 2]
         for r in range(3):
-            own = model.row[j, r]
-            if own >= 0:
-                value = -desk.gamma[j, r]
-                for i in range(6):
-                    value -= desk.jac[j, r, i] * known[3 * model.joint[j, 1 + i // 3] + i % 3]
-                lam[own] = value
+            if row[j, r] >= 0:
+                value = -gamma[j, r]
+                for i in range(3):
+                    value -= jac[j, r, i] * known[one + i] + jac[j, r, 3 + i] * known[two + i]
+                lam[row[j, r]] = value
     solve_unknowns(model, desk, a, lam)
     for i in range(model.driven.shape[0]):
         a[model.driven[i]] = known[model.driven[i]]
@@ -280,25 +303,36 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
 @kernel
 def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
     """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,): driven parts 0."""
-    for p in range(model.pair.shape[0]):
+    pair = model.pair
+    joint = model.joint
+    for p in range(pair.shape[0]):
+        one = 3 * pair[p, 0]
+        two = 3 * pair[p, 1]
         for i in range(6):
-            value = z[3 * model.pair[p, i // 3] + i % 3]
+            value = z[one + i] if i < 3 else z[two + i - 3]
             if value == 0.0:
                 continue
-            for j in range(6):
-                column = 3 * model.pair[p, j // 3] + j % 3
-                bar_q[column] -= k[p, i, j] * value
-                bar_v[column] -= c[p, i, j] * value
+            for j in range(3):
+                bar_q[one + j] -= k[p, i, j] * value
+                bar_q[two + j] -= k[p, i, 3 + j] * value
+                bar_v[one + j] -= c[p, i, j] * value
+                bar_v[two + j] -= c[p, i, 3 + j] * value
     for d in range(z.shape[0]):
         bar_q[d - d % 3 + 2] += turn[d] * z[d]
-    for j in range(model.joint.shape[0]):
+    by_q = desk.by_q
+    by_v = desk.by_v
+    row = model.row
+    for j in range(joint.shape[0]):
+        one = 3 * joint[j, 1]
+        two = 3 * joint[j, 2]
         for r in range(3):
-            own = model.row[j, r]
-            if own >= 0:
-                for i in range(6):
-                    column = 3 * model.joint[j, 1 + i // 3] + i % 3
-                    bar_q[column] -= desk.by_q[j, r, i] * y[own]
-                    bar_v[column] -= desk.by_v[j, r, i] * y[own]
+            if row[j, r] >= 0:
+                value = y[row[j, r]]
+                for i in range(3):
+                    bar_q[one + i] -= by_q[j, r, i] * value
+                    bar_q[two + i] -= by_q[j, r, 3 + i] * value
+                    bar_v[one + i] -= by_v[j, r, i] * value
+                    bar_v[two + i] -= by_v[j, r, 3 + i] * value
 
 
 @kernel

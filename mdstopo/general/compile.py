@@ -96,8 +96,8 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     force, turning, load_force = _loads(load_case, index, times, n)
     responses, reductions = looked_at(case, load_case.name)
     response, response_par = _responses(case, responses, index, q0)
-    rows, place, size, redundant = arrange(case, joint, joint_par, free, mass, q0, pair)
-    _refuse_redundant(case, load_case, redundant)
+    layout = arrange(case, joint, joint_par, free, mass, q0, pair)
+    _refuse_redundant(case, load_case, layout.redundant)
     damped = _damped(case, responses, reductions)
     model = GeneralModel(
         free=free, mass=mass, q0=q0, v0=v0, pair=pair, reach=reach, **members, times=times, force=force,
@@ -105,12 +105,13 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_follows=np.array([load.frame == "body" for load in turning], dtype=np.int64),
         load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
         load_force=load_force, bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
-        joint_par=joint_par, row=rows, place=place, size=np.array([*size, int(damped)], dtype=np.int64),
+        joint_par=joint_par, row=layout.row, place=layout.place,
+        size=np.array([*layout.size, int(damped), layout.width], dtype=np.int64), line=layout.line, meet=layout.meet,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
         varied=varied(case, members["block"]),
     )  # fmt: skip
     return GeneralScene(
-        load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), redundant, responses,
+        load_case, model, names, len(names) - 1, damped, _skipped(case, load_case, damped), layout.redundant, responses,
         reductions, contact_words,
     )  # fmt: skip
 

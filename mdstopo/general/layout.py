@@ -2,8 +2,10 @@
 
 A row that others imply (a parallelogram's extra link) would make the matrix singular; it is left out, and `projection`
 watches that it stays fulfilled. Unknowns are ordered so that bodies that are tied stand together (reverse
-Cuthill-McKee where there are many).
+Cuthill-McKee where there are many); so are the rows alone, for the matrix that is left of them without the bodies.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +18,18 @@ INDEPENDENT = 1e-9
 FEW = 30
 
 
+class Layout(NamedTuple):
+    """row, place, size[0:2], line, meet, size[3] of `GeneralModel`; redundant: names of joints with rows left out."""
+
+    row: IndexArray
+    place: IndexArray
+    size: tuple[int, int]
+    line: IndexArray
+    meet: IndexArray
+    width: int
+    redundant: tuple[str, ...]
+
+
 def arrange(
     case: Case,
     joint: IndexArray,
@@ -24,8 +38,8 @@ def arrange(
     mass: FloatArray,
     q0: FloatArray,
     pair: IndexArray,
-) -> tuple[IndexArray, IndexArray, tuple[int, int], tuple[str, ...]]:
-    """row (n_joint, 3), place (n + n_row,), (n_row, half width), and the names of joints with rows left out."""
+) -> Layout:
+    """Which rows are solved, and every order."""
     row = np.full((len(joint), 3), -1, dtype=np.int64)
     redundant: list[str] = []
     columns: list[list[int]] = []
@@ -50,7 +64,9 @@ def arrange(
                 row[j, r] = len(columns)
                 columns.append([d for d in coordinates if free[d]])
     place, half = _order(len(free), free, pair, columns)
-    return row, place, (len(columns), half), tuple(dict.fromkeys(redundant))
+    meet = _meetings(joint, free)
+    line, width = _order_rows(row, meet, len(columns), many=len(place) > FEW)
+    return Layout(row, place, (len(columns), half), line, meet, width, tuple(dict.fromkeys(redundant)))
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, q0: FloatArray) -> FloatArray:
@@ -73,13 +89,46 @@ def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]])
         links.update((i, j) for i in own for j in own)
     for r, coordinates in enumerate(columns):
         links.update((n + r, d) for d in coordinates)
-    place = np.arange(total, dtype=np.int64)
-    if total > FEW:
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import reverse_cuthill_mckee
+    place = _reordered(links, total) if total > FEW else np.arange(total, dtype=np.int64)
+    return place, _width(links, place)
 
-        rows, cols = (np.array(side) for side in zip(*(links | {(j, i) for i, j in links}), strict=True))
-        graph = coo_array((np.ones(len(rows)), (rows, cols)), shape=(total, total)).tocsr()
-        place[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(total)
-    half = max((abs(int(place[i] - place[j])) for i, j in links), default=0)
-    return place, half
+
+def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
+    """(n_meet, 4): a joint, its side, another joint or itself, its side, where both are on one body that can move."""
+    on: dict[int, list[tuple[int, int]]] = {}
+    for j, (_, a, b, *_) in enumerate(joint.tolist()):
+        on.setdefault(a, []).append((j, 0))
+        on.setdefault(b, []).append((j, 1))
+    found = [
+        (*one, *other)
+        for body, sides in on.items()
+        if free[3 * body : 3 * body + 3].any()
+        for i, one in enumerate(sides)
+        for other in sides[: i + 1]
+    ]
+    return np.array(found, dtype=np.int64).reshape(-1, 4)
+
+
+def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, int]:
+    """Place of each row among the rows, and the distance from the diagonal to the farthest entry."""
+    links = {
+        (r, s) for j, _, k, _ in meet.tolist() for r in row[j].tolist() for s in row[k].tolist() if r >= 0 and s >= 0
+    }
+    line = _reordered(links, count) if many and links else np.arange(count, dtype=np.int64)
+    return line, _width(links, line)
+
+
+def _reordered(links: set[tuple[int, int]], total: int) -> IndexArray:
+    """Place of each of `total` unknowns so that those that are linked stand together."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import reverse_cuthill_mckee
+
+    rows, cols = (np.array(side) for side in zip(*(links | {(j, i) for i, j in links}), strict=True))
+    graph = coo_array((np.ones(len(rows)), (rows, cols)), shape=(total, total)).tocsr()
+    place = np.empty(total, dtype=np.int64)
+    place[reverse_cuthill_mckee(graph, symmetric_mode=True)] = np.arange(total)
+    return place
+
+
+def _width(links: set[tuple[int, int]], place: IndexArray) -> int:
+    return max((abs(int(place[i] - place[j])) for i, j in links), default=0)

@@ -7,6 +7,7 @@ Geometry as in `mechanics.laws.spring`: with r = d + R q - p, L = |r|, e = r/L,
 and a law f(Delta, dDelta/dt, t) with its partials gives Q = -sum s f b, K = sum s (b (f_D b + f_Dd B2 xi')^T + f B2),
 C = sum s f_Dd b b^T, E = sum s V, E_xi = sum s V' b, where s = alpha^mu. A law that switches is taken in the mode that
 the member is in (`strength` row 1); the integrators keep modes fixed within a step and land on their ends (`events`).
+Blocks of springs, which neither switch nor remember, take the vectors of `mechanics.laws.alike` instead.
 """
 
 import math
@@ -14,8 +15,9 @@ import math
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
+from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.mechanics.laws.table import CRUSH, law, law_first_set, law_start
+from mdstopo.mechanics.laws.table import CRUSH, SPRING, law, law_first_set, law_start
 
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
 SCALE, MODE, SET = range(3)
@@ -57,9 +59,13 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
     p = model.law[k]
     code = model.block[k, 3]
     member = model.member
+    counted = model.block[k, 4] >= 0
+    if code == SPRING:
+        add_springs(member, strength, model.block[k, 1], model.block[k, 2], p, r, counted, tangent, o)
+        return
+    curves = model.curves
     tau = t - model.times[segment]
     value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
-    counted = model.block[k, 4] >= 0
     vx = r[4]
     vy = r[5]
     vt = r[6]
@@ -71,7 +77,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
         rate = bx * vx + by * vy + bt * vt
         scale = strength[0, i]
         x = length - member[4, i] - strength[2, i]
-        f, fd, fr, energy, pull = law(code, p, x, rate, int(strength[1, i]), t, value, model.curves)
+        f, fd, fr, energy, pull = law(code, p, x, rate, int(strength[1, i]), t, value, curves)
         f *= scale
         o[0] -= f * bx
         o[1] -= f * by
@@ -110,6 +116,19 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
         o[19] += fr * bx * bt
         o[20] += fr * by * bt
         o[21] += fr * bt * bt
+
+
+@kernel
+def add_springs(member, strength, start, stop, p, r, counted, tangent, o):  # type: ignore[no-untyped-def]
+    """`add_block` of springs, which are places start to stop of member (5, M_padded) and strength, padding included."""
+    width = member.shape[1]
+    rows = member.reshape(5 * width)
+    scale = strength.reshape(strength.size)
+    alike_sums(rows, width, scale, start, stop, p, r, counted, o)
+    if tangent:
+        alike_tangent(rows, width, scale, start, stop, p, r, o)
+        if p[1] != 0.0:
+            alike_damping(rows, width, scale, start, stop, p, r, o)
 
 
 @kernel
@@ -181,16 +200,21 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
     p = model.law[k]
     code = model.block[k, 3]
     member = model.member
+    lo = model.block[k, 1]
+    if code == SPRING:
+        width = member.shape[1]
+        alike_design(member.reshape(5 * width), width, lo, model.block[k, 2], p, r, u, weight, out)
+        return
+    curves = model.curves
     tau = t - model.times[segment]
     value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
-    lo = model.block[k, 1]
     for i in range(lo, lo + model.block[k, 5]):
         length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
         if length == 0.0:
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
         x = length - member[4, i] - strength[2, i]
-        f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, model.curves)
+        f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, curves)
         out[i] += f * (bx * u[0] + by * u[1] + bt * u[2]) + weight * energy
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
+from mdstopo.general.first_step import first_step, motion_scale
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general, set_modes
@@ -264,7 +265,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         strength[1, strength.shape[1] - 1] = events
     last_time = times[times.shape[0] - 1]
     span = last_time - t
-    wanted = fixed_step if fixed_step > 0.0 else span
+    wanted = fixed_step
+    if not fixed_step > 0.0:
+        wanted = first_step(
+            model, strength, times[1], q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q[0], v[0], a[0],
+            work,
+        )  # fmt: skip
     keep_state(track, 0, t, q0, v0, push[0], push[1])
     track.index[0, 0] = 0
     count = np.int64(0)
@@ -312,12 +318,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 work[REJECTED] += 1
                 continue
             relative_pose(pair, ends[0], ends[1], rel)
-            widest = 0.0
-            for p in range(n_pair):
-                scale[p] = max(motion[p], deflection(rel, rel0, reach, p))
-                widest = max(widest, scale[p])
-            for p in range(n_pair):
-                scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+            motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
             error = _error(table[2], s, h, a, weight)
             finite = True

@@ -93,24 +93,20 @@ def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
 def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-untyped-def]
     """Store stage o, and with `tangent` the tangents on the desk."""
     track.when[o] = t
+    stage = track.stage[o]
     for d in range(q.shape[0]):
-        track.stage[o, 0, d] = q[d]
-        track.stage[o, 1, d] = v[d]
-        track.stage[o, 2, d] = a[d]
-    for r in range(lam.shape[0]):
-        track.lam[o, r] = lam[r]
+        stage[0, d] = q[d]
+        stage[1, d] = v[d]
+        stage[2, d] = a[d]
+    copy_vector(lam, track.lam[o])
     if not tangent:
         return
-    inertial = track.mass.shape[0] > 1
-    for d in range(q.shape[0]):
-        track.turn[o, d] = desk.turn[d]
-    for p in range(desk.k.shape[0]):
-        for i in range(6):
-            for j in range(6):
-                track.K[o, p, i, j] = desk.k[p, i, j]
-                track.C[o, p, i, j] = desk.c[p, i, j]
-                if inertial:
-                    track.mass[o, p, i, j] = desk.mass[p, i, j]
+    copy_vector(desk.turn, track.turn[o])
+    size = desk.k.size
+    copy_vector(desk.k.reshape(size), track.K[o].reshape(size))
+    copy_vector(desk.c.reshape(size), track.C[o].reshape(size))
+    if track.mass.shape[0] > 1:
+        copy_vector(desk.mass.reshape(size), track.mass[o].reshape(size))
 
 
 @kernel

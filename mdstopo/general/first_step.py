@@ -1,0 +1,79 @@
+"""How long the first adaptive step of a general scene may be: a few balances instead of steps that are rejected.
+
+A step that is far too long gives no estimate of how far. What the parabola through the start's accelerations neglects
+does: theta(h), the change of the accelerations over it times h^2/2, relative to the motion as the error of a step is.
+It grows as (h/tau)^2 (where the accelerations have a slope, as h/tau), which gives tau, the time in which the motion
+bends; the error of a step is about FIRST (h/tau)^order.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import balance
+from mdstopo.integrators.steps import FORCES, TURN, deflection, largest_turn, motion_weights
+from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import POSE, relative_pose
+
+#: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,
+#: linkages and landings, from 2e-7 to 2e-5 for the second
+FIRST = 1e-8, 4e-6
+#: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
+#: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it
+PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
+
+
+@kernel
+def motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale):  # type: ignore[no-untyped-def]
+    """scale (n_pair,): what the errors of a pair's motion are measured against, m; rel (n_pair, POSE): where it is.
+
+    motion (n_pair,): how far it has moved so far; noise: what rounding leaves; tolerance: of a step.
+    """
+    widest = 0.0
+    for p in range(pair.shape[0]):
+        scale[p] = max(motion[p], deflection(rel, rel0, reach, p))
+        widest = max(widest, scale[p])
+    for p in range(pair.shape[0]):
+        scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+
+
+@kernel
+def first_step(  # type: ignore[no-untyped-def]
+    model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q, v, a, work
+):
+    """Length of a first step from the state q0, v0 (n,) at the start, whose accelerations are a0, towards time `end`.
+
+    rel0, motion, noise, tolerance as of `motion_scale`. Scratch: lam (n_row,); q, v, a (n,).
+    """
+    n = q0.shape[0]
+    n_pair = model.pair.shape[0]
+    t = model.times[0]
+    rel = np.empty((n_pair, POSE))
+    scale = np.empty(n_pair)
+    weight = np.empty(n)
+    h = end - t
+    for _ in range(PROBES):
+        for d in range(n):
+            q[d] = q0[d] + h * (v0[d] + 0.5 * h * a0[d])
+            v[d] = v0[d] + h * a0[d]
+        singular = balance(model, strength, np.int64(0), t + h, q, v, np.bool_(False), desk, a, lam)
+        work[FORCES] += 1
+        finite = True
+        for d in range(n):
+            finite = finite and np.isfinite(a[d])
+            if model.free[d] != 0:  # with a slope of the accelerations: the size of a motion that begins with nothing
+                q[d] += h * h / 6.0 * (a[d] - a0[d])
+        if singular >= 0 or not finite:
+            h *= 0.1
+            continue
+        relative_pose(model.pair, q, v, rel)
+        motion_scale(model.pair, rel, rel0, model.reach, motion, noise, tolerance, scale)
+        motion_weights(model.pair, rel, model.reach, scale, weight)
+        theta = 0.0
+        for d in range(n):
+            theta = max(theta, 0.5 * h * h * weight[d] * abs(a[d] - a0[d]))
+        if theta <= ENOUGH:
+            tau = h / np.sqrt(max(theta, 1e-30))
+            turned = largest_turn(model.pair, q0, q) / h
+            allowed = tau * (tolerance / FIRST[1 if model.size[2] != 0 else 0]) ** (1.0 / order)
+            return min(allowed, TURN / max(turned, 1e-300))
+        h *= max(np.sqrt(AIM / theta), 0.1) if theta < HOPELESS else 0.1
+    return end - t  # the motion looks the same at every scale

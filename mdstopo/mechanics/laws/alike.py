@@ -1,0 +1,184 @@
+"""The spring law over members that share its parameters: what `general.members` does member by member, in vectors.
+
+The geometry and the sums are those of `mechanics.laws.spring`, with f = k x + c x' + preload, x = Delta, times
+s = alpha^mu of each member. Arguments: member (5 M,), the rows P, Q and free length of all members behind each other,
+width M of each; scale, s from member 0 on; start, stop: the members meant, padding included, where s = 0; p: k, c,
+preload; r (POSE,): the relative pose. A member of zero length has no direction: no force, but the energy that its
+elongation has.
+"""
+
+from mdstopo.jit import kernel
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
+
+
+@kernel
+def _seen(member, width, i, r):  # type: ignore[no-untyped-def]
+    """R q, 1/L, b and Delta of the members from i on."""
+    u = load(member, 2 * width + i)
+    v = load(member, 3 * width + i)
+    ax = r[2] * u - r[3] * v
+    ay = r[3] * u + r[2] * v
+    rx = ax - (load(member, i) - r[0])
+    ry = ay - (load(member, width + i) - r[1])
+    r2 = rx * rx + ry * ry
+    y = inverse_root(r2, ZERO_LENGTH_SQUARED)
+    bx = y * rx
+    by = y * ry
+    return ax, ay, y, bx, by, ax * by - ay * bx, r2 * y - load(member, 4 * width + i)
+
+
+@kernel
+def alike_sums(member, width, scale, start, stop, p, r, counted, o):  # type: ignore[no-untyped-def]
+    """o (SUMS,) += Q, and where they are counted E and E_xi."""
+    sum_x = zero()
+    sum_y = zero()
+    sum_t = zero()
+    energy = zero()
+    ex = zero()
+    ey = zero()
+    et = zero()
+    for i in range(start, stop, lanes()):
+        _, _, _, bx, by, bt, x = _seen(member, width, i, r)
+        s = load(scale, i)
+        pull = p[0] * s * x
+        f = pull + s * (p[2] + p[1] * (bx * r[4] + by * r[5] + bt * r[6]))
+        sum_x += f * bx
+        sum_y += f * by
+        sum_t += f * bt
+        energy += pull * x
+        ex += pull * bx
+        ey += pull * by
+        et += pull * bt
+    o[0] -= total(sum_x)
+    o[1] -= total(sum_y)
+    o[2] -= total(sum_t)
+    if counted:
+        o[3] += 0.5 * total(energy)
+        o[4] += total(ex)
+        o[5] += total(ey)
+        o[6] += total(et)
+
+
+@kernel
+def alike_tangent(member, width, scale, start, stop, p, r, o):  # type: ignore[no-untyped-def]
+    """o (SUMS,) += the part of K without damping: sum s (k b b^T + f B2), which is symmetric.
+
+    With w = f/L, f B2 = w (g^T g - b b^T) - f (e . R q) on theta, g = [I, J R q].
+    """
+    kxx = zero()
+    kxy = zero()
+    kyy = zero()
+    kxt = zero()
+    kyt = zero()
+    ktt = zero()
+    sum_w = zero()
+    sum_wx = zero()
+    sum_wy = zero()
+    for i in range(start, stop, lanes()):
+        ax, ay, y, bx, by, bt, x = _seen(member, width, i, r)
+        s = load(scale, i)
+        f = s * (p[0] * x + (p[2] + p[1] * (bx * r[4] + by * r[5] + bt * r[6])))
+        w = f * y
+        g = p[0] * s - w
+        kxx += g * bx * bx
+        kxy += g * bx * by
+        kyy += g * by * by
+        kxt += g * bx * bt
+        kyt += g * by * bt
+        ktt += g * bt * bt + w * (ax * ax + ay * ay) - f * (bx * ax + by * ay)
+        sum_w += w
+        sum_wx += w * ax
+        sum_wy += w * ay
+    w = total(sum_w)
+    xy = total(kxy)
+    xt = total(kxt) - total(sum_wy)
+    yt = total(kyt) + total(sum_wx)
+    o[7] += total(kxx) + w
+    o[8] += xy
+    o[9] += xt
+    o[10] += xy
+    o[11] += total(kyy) + w
+    o[12] += yt
+    o[13] += xt
+    o[14] += yt
+    o[15] += total(ktt)
+
+
+@kernel
+def alike_damping(member, width, scale, start, stop, p, r, o):  # type: ignore[no-untyped-def]
+    """o (SUMS,) += what damping adds: sum s c b (B2 xi')^T to K, C = sum s c b b^T."""
+    kxx = zero()
+    kxy = zero()
+    kxt = zero()
+    kyx = zero()
+    kyy = zero()
+    kyt = zero()
+    ktx = zero()
+    kty = zero()
+    ktt = zero()
+    cxx = zero()
+    cxy = zero()
+    cyy = zero()
+    cxt = zero()
+    cyt = zero()
+    ctt = zero()
+    vx = r[4]
+    vy = r[5]
+    vt = r[6]
+    for i in range(start, stop, lanes()):
+        ax, ay, y, bx, by, bt, _ = _seen(member, width, i, r)
+        c = p[1] * load(scale, i)
+        rate = bx * vx + by * vy + bt * vt
+        # B2 xi': the velocity of the end, less its part along the member, over the length
+        ux = vx - ay * vt
+        uy = vy + ax * vt
+        hx = y * (ux - bx * rate)
+        hy = y * (uy - by * rate)
+        ht = y * (ax * uy - ay * ux - bt * rate) - (bx * ax + by * ay) * vt
+        cx = c * bx
+        cy = c * by
+        ct = c * bt
+        kxx += cx * hx
+        kxy += cx * hy
+        kxt += cx * ht
+        kyx += cy * hx
+        kyy += cy * hy
+        kyt += cy * ht
+        ktx += ct * hx
+        kty += ct * hy
+        ktt += ct * ht
+        cxx += cx * bx
+        cxy += cx * by
+        cyy += cy * by
+        cxt += cx * bt
+        cyt += cy * bt
+        ctt += ct * bt
+    o[7] += total(kxx)
+    o[8] += total(kxy)
+    o[9] += total(kxt)
+    o[10] += total(kyx)
+    o[11] += total(kyy)
+    o[12] += total(kyt)
+    o[13] += total(ktx)
+    o[14] += total(kty)
+    o[15] += total(ktt)
+    o[16] += total(cxx)
+    o[17] += total(cxy)
+    o[18] += total(cyy)
+    o[19] += total(cxt)
+    o[20] += total(cyt)
+    o[21] += total(ctt)
+
+
+@kernel
+def alike_design(member, width, start, stop, p, r, u, weight, out):  # type: ignore[no-untyped-def]
+    """out (M or more,) += f (b . u) + weight V of each member at s = 1; u (3,): virtual change of the relative pose.
+
+    Padding in `out` becomes something that nobody reads.
+    """
+    half = 0.5 * weight * p[0]
+    for i in range(start, stop, lanes()):
+        _, _, _, bx, by, bt, x = _seen(member, width, i, r)
+        f = p[0] * x + (p[2] + p[1] * (bx * r[4] + by * r[5] + bt * r[6]))
+        store(out, i, load(out, i) + f * (bx * u[0] + by * u[1] + bt * u[2]) + half * (x * x))

@@ -1,0 +1,159 @@
+"""The joints' own matrix: what it gives is the solution of the whole balance; where it is singular, it says so."""
+
+import numba
+import numpy as np
+import pytest
+
+from mdstopo.case.reader import read_case
+from mdstopo.general.balance import OF_JOINTS, factor_matrix, joint_state, make_desk, solve_unknowns
+from mdstopo.general.compile import compile_general
+from mdstopo.general.joint_matrix import cholesky, weakest
+from mdstopo.general.model import pack_general, unpack_general
+
+#: every kind of joint; two of them share both bodies, one body is driven in part and one in all
+MECHANISM = """
+format: 1
+time: {end: 1}
+bodies:
+  a: {mass: 2, inertia: 0.3, position: [0, 0]}
+  b: {mass: 1, inertia: 0.1, position: [1, 0.2]}
+  c: {mass: 30, inertia: 4, position: [2, -0.3]}
+  d: {mass: 0.01, inertia: 0.002, position: [2.5, 0.5]}
+  e: {mass: 1, inertia: 1, position: [3, 1]}
+  f: {mass: 1, inertia: 1, position: [4, 1]}
+joints:
+  - {type: revolute, bodies: [ground, a], at: [-0.5, 0]}
+  - {type: revolute, bodies: [a, b], at: [0.5, 0.1]}
+  - {type: distance, bodies: [b, a], at: {a: [0.1, 0.4], b: [1.1, 0.5]}}
+  - {type: prismatic, bodies: [b, c], at: [1.5, 0], axis: [1, 0.3]}
+  - {type: fixed, bodies: [c, d], at: [2.2, 0.1]}
+  - {type: distance, bodies: [d, e], at: {d: [2.5, 0.4], e: [3, 1]}}
+  - {type: revolute, bodies: [e, f], at: [3.5, 1]}
+motions:
+  - {body: e, x: {velocity: 0.3}}
+  - {body: f, x: {velocity: 0}, y: {velocity: 0}, angle: {velocity: 0}}
+members:
+  m: {from: {body: a, at: [0, 0.3]}, to: {body: c, at: [2, 0.3]}, law: LAW}
+"""
+PARALLELOGRAM = """
+format: 1
+time: {end: 1}
+bodies:
+  crank: {mass: 1, inertia: 0.1, position: [0, 0.5]}
+  coupler: {mass: 1, inertia: 0.1, position: [1, 1]}
+  rocker: {mass: 1, inertia: 0.1, position: [2, 0.5]}
+joints:
+  - {type: revolute, bodies: [ground, crank], at: [0, 0]}
+  - {type: revolute, bodies: [crank, coupler], at: [0, 1]}
+  - {type: revolute, bodies: [coupler, rocker], at: [2, 1]}
+  - {type: revolute, bodies: [rocker, ground], at: [2, 0]}
+"""
+
+
+@numba.njit
+def _solve(ints, floats, q, transposed, a, lam, jac, factors):
+    model = unpack_general(ints, floats)
+    desk = make_desk(model)
+    joint_state(model, q, np.zeros_like(q), desk)
+    singular = factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, transposed)
+    jac[:] = desk.jac
+    factors[:] = desk.factors
+    if singular < 0:
+        solve_unknowns(model, desk, a, lam)
+        solve_unknowns(model, desk, a, lam)  # the factors stay
+    return singular
+
+
+def model_of(text):
+    case = read_case(text)
+    return compile_general(case, case.load_cases[0]).model
+
+
+def solved(model, q, a, lam, transposed=False):
+    """The place at which the balance is singular, Phi_q (n_row, n) and which factors were made; a, lam in place."""
+    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(2, np.int64)
+    singular = _solve(*pack_general(model), q, transposed, a, lam, jac, factors)
+    dense = np.zeros((len(lam), len(a)))
+    for j, (_, one, two, *_) in enumerate(model.joint.tolist()):
+        columns = [*range(3 * one, 3 * one + 3), *range(3 * two, 3 * two + 3)]
+        for r, own in enumerate(model.row[j].tolist()):
+            if own >= 0:
+                dense[own, columns] += jac[j, r]
+    dense[:, model.free == 0] = 0.0
+    return singular, dense, factors
+
+
+@pytest.mark.parametrize("law", ["{type: spring, stiffness: 1}", "{type: inerter, inertance: 1}"])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_it_solves_the_whole_balance(law, transposed):
+    """With an inerter the whole balance is factorised, as the mass is full then; here its part of it is left out."""
+    model = model_of(MECHANISM.replace("LAW", law))
+    rng = np.random.default_rng(5)
+    n, n_row = len(model.mass), int(model.size[0])
+    f, g = rng.normal(size=n), rng.normal(size=n_row)
+    q = model.q0 + 0.1 * rng.normal(size=n)
+    a, lam = f.copy(), g.copy()
+    singular, jac, factors = solved(model, q, a, lam, transposed)
+    assert singular == -1
+    assert factors[OF_JOINTS] == ("spring" in law)
+    whole = np.block([[np.diag(model.mass), jac.T], [jac, np.zeros((n_row, n_row))]])
+    right = np.concatenate([f, g])
+    for _ in range(2):
+        right[:n][model.free == 0] = 0.0
+        right = np.linalg.solve(whole, right)
+    size = np.abs(right)
+    assert a == pytest.approx(right[:n], abs=1e-11 * size[:n].max())
+    assert lam == pytest.approx(right[n:], abs=1e-11 * size[n:].max())
+    assert not a[model.free == 0].any()
+
+
+@pytest.mark.parametrize(("angle", "regular"), [(0.0, False), (1e-7, False), (1e-4, True)])
+def test_a_parallelogram_is_singular_where_it_lies_flat_and_a_joint_is_to_blame(angle, regular):
+    model = model_of(PARALLELOGRAM)
+    c, s = np.cos(angle), np.sin(angle)
+    turn = angle - np.pi / 2
+    q = np.array([0.5 * c, 0.5 * s, turn, 1 + c, s, 0, 2 + 0.5 * c, 0.5 * s, turn, 0, 0, 0])
+    singular, _, _ = solved(model, q, np.ones(12), np.ones(8))
+    assert (singular == -1) == regular
+    if not regular:
+        assert int(np.flatnonzero(model.place == singular)[0]) >= 12  # a row, no coordinate
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(("least", "regular"), [(1e-9, True), (1e-13, False)])
+def test_a_small_eigenvalue_is_found_whatever_row_it_belongs_to(seed, least, regular):
+    """The last pivots stay above the bound, because the last rows have next to no part in it."""
+    rng = np.random.default_rng(seed)
+    n = 8
+    part = np.append(rng.normal(size=n - 2), [1e-4, 1e-4])
+    part /= np.linalg.norm(part)
+    rest = np.linalg.qr(np.column_stack([part, rng.normal(size=(n, n - 1))]))[0]
+    values = np.append(least, rng.uniform(0.5, 2.0, n - 1))
+    dense = (rest * values) @ rest.T
+    scale = 1.0 / np.sqrt(np.diag(dense))
+    dense *= np.outer(scale, scale)
+    gram = np.zeros((n, n))
+    for i in range(n):
+        gram[i, n - 1 - i :] = dense[i, : i + 1]
+    found = cholesky.py_func(gram)
+    if found < 0:
+        found = weakest.py_func(gram, np.zeros(n))
+    assert (found < 0) == regular
+
+
+def test_its_band_stays_narrow_however_long_a_closed_loop_is():
+    widths = []
+    for count in (12, 48):
+        turn = 2 * np.pi * np.arange(count + 1) / count
+        x, y = np.cos(turn), np.sin(turn)
+        bodies = "".join(
+            f"  b{i}: {{mass: 1, inertia: 1, position: [{(x[i] + x[i + 1]) / 2}, {(y[i] + y[i + 1]) / 2}]}}\n"
+            for i in range(count)
+        )
+        joints = "".join(
+            f"  - {{type: revolute, bodies: [b{i - 1 if i else count - 1}, b{i}], at: [{x[i]}, {y[i]}]}}\n"
+            for i in range(count)
+        )
+        joints += f"  - {{type: revolute, bodies: [ground, b0], at: [{x[0]}, {y[0]}]}}\n"
+        widths.append(int(model_of(f"format: 1\ntime: {{end: 1}}\nbodies:\n{bodies}joints:\n{joints}").size[3]))
+    assert widths[0] == widths[1] <= 9
