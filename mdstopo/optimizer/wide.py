@@ -32,7 +32,7 @@ MANY = 256
 #: and from which on single passes over them are compiled too
 WIDE = 10_000
 #: and from which on threads share them
-SHARED = 100_000
+SHARED = 50_000
 _LEAST_SAMPLE = 256
 
 

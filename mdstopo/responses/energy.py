@@ -15,11 +15,17 @@ def energy_at(pair, springs, strength, q, v, rel, sums):  # type: ignore[no-unty
     """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
     relative_pose(pair, q, v, rel[0])
     member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
+    return energy_of(rel[0], sums[0])
+
+
+@kernel
+def energy_of(rel, sums):  # type: ignore[no-untyped-def]
+    """g and dg/dt from the relative poses (n_pair, POSE) of a state and their sums (n_pair, SUMS)."""
     value = 0.0
     rate = 0.0
-    for p in range(pair.shape[0]):
-        value += sums[0, p, 3]
-        rate += sums[0, p, 4] * rel[0, p, 4] + sums[0, p, 5] * rel[0, p, 5] + sums[0, p, 6] * rel[0, p, 6]
+    for p in range(rel.shape[0]):
+        value += sums[p, 3]
+        rate += sums[p, 4] * rel[p, 4] + sums[p, 5] * rel[p, 5] + sums[p, 6] * rel[p, 6]
     return value, rate
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from mdstopo.integrators.contract import point_of, sample
 from mdstopo.integrators.steps import step_at
 from mdstopo.jit import kernel
-from mdstopo.mechanics.geometry import POSE
-from mdstopo.mechanics.passes import SUMS
-from mdstopo.responses.energy import energy_at
+from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.passes import SUMS, member_sums
+from mdstopo.responses.energy import energy_at, energy_of
 from mdstopo.scene.model import Springs
 
 #: columns of a peak: time, value, step, fraction of it
@@ -131,10 +131,16 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     for i in range(1, samples - 1):
         g[i] *= sign
         d[i] *= sign
+    # both ends in one pass: of very many members the pass costs what reading them does
+    ends = np.empty((2, n_pair, POSE))
+    end_sums = np.empty((2, n_pair, SUMS))
+    for end in range(2):
+        state = steps.state[end * count]
+        relative_pose(model.pair, state[0], state[1], ends[end])
+    member_sums(springs, strength, ends, np.int64(2), np.bool_(False), end_sums)
     for end in range(2):
         i = end * (samples - 1)
-        state = steps.state[end * count]
-        value, rate = energy_at(model.pair, springs, strength, state[0], state[1], rel, sums)
+        value, rate = energy_of(ends[end], end_sums[end])
         t[i] = steps.t[end * count]
         g[i] = sign * value
         d[i] = sign * rate
