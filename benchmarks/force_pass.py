@@ -7,8 +7,8 @@ import numpy as np
 from mdstopo.case.model import Case
 from mdstopo.engine import Evaluator
 from mdstopo.jit import entry
-from mdstopo.mechanics.assembly import SUMS, member_sums, scale_members
 from mdstopo.mechanics.geometry import relative_pose
+from mdstopo.mechanics.passes import SUMS, member_sums, scale_members
 from mdstopo.scene.packing import pack, unpack
 
 #: poses in one pass over the members, about as many as a step of collocation has
@@ -20,13 +20,13 @@ REPEATS = 50
 @entry
 def _passes(ints, floats, alpha, strength, rel, sums, repeats):  # type: ignore[no-untyped-def]
     model = unpack(ints, floats)
-    scale_members(model.block, model.power, model.member, alpha, strength)
+    scale_members(model, alpha, strength)
     for j in range(rel.shape[0]):
         relative_pose(model.pair, model.q0, model.v0, rel[j])
         for p in range(rel.shape[1]):
             rel[j, p, 0] += 1e-3 * j
     for _ in range(repeats):
-        member_sums(model.block, model.member, strength, rel, np.int64(rel.shape[0]), np.bool_(False), sums)
+        member_sums(model, strength, rel, np.int64(rel.shape[0]), np.bool_(False), sums)
 
 
 def force_pass(case: Case) -> tuple[Callable[[], None], int]:

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from mdstopo.mechanics.assembly import SUMS
+from mdstopo.mechanics.passes import SUMS
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.laws import alike
 from mdstopo.native.kernel import numba as with_vectors

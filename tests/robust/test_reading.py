@@ -207,6 +207,39 @@ def test_what_has_a_distribution_is_not_set_as_part_of_a_whole():
     assert found[1] == "bodies.torso.mass has a distribution; it varies by itself or by scenario, not both"
 
 
+def test_as_many_but_other_members_at_a_point_are_refused():
+    members = {"belts": {**scene()["members"]["belts"], "max_length": 1.2}}
+    points = {
+        "edge": {"body": "torso", "grid": {"list": [[0, 0]]}},
+        "deck": {"body": "vehicle", "grid": {"list": [[-0.5, -1], [1.5, -1]]}},
+    }
+    other = {"points.deck.grid.list": [[-1.5, -1], [0.5, -1]]}
+    case = read({"scenarios": {"usual": {}, "other": {"set": other}}}, members=members, points=points)
+    assert len(case.members[0]) == 1
+    with pytest.raises(CaseError, match="the group belts has as many members, but others"):
+        evaluator_of(case)
+
+
+def test_joints_that_come_apart_at_a_point_are_refused_with_the_point():
+    joint = [{"type": "revolute", "bodies": ["torso", "vehicle"], "at": [0, -0.5]}]
+    speeds = {"bodies.torso.velocity[0]": {"uniform": {"from": 0.5, "to": 1.5}}}
+    bodies = {name: {**body, "velocity": [1, 0]} for name, body in scene()["bodies"].items()}
+    with pytest.raises(CaseError, match=r"at point \d+ of the sample .*velocit"):
+        evaluator_of(read(uncertain(parameters=speeds, sample=2), joints=joint, bodies=bodies))
+
+
+def test_what_is_set_from_outside_yields_to_the_point():
+    whole = {"bodies.torso.mass": 61, "bodies.torso": {"mass": 60, "inertia": 10, "position": [0, 0]}}
+    case = read(uncertain(parameters={"bodies.torso.mass": {"discrete": [[50, 0.5], [70, 0.5]]}}, sample=8), whole)
+    found = {evaluator.case.bodies[0].mass for i, evaluator in evaluator_of(case).points.items() if i >= 0}
+    assert found == {50.0, 70.0}
+
+
+def test_the_quantile_of_level_1_is_the_worst():
+    case = read(uncertain({"measure": "quantile", "level": 1}))
+    assert case.uncertainty.objectives["G"] == Measure("worst")
+
+
 def test_without_distributions_what_belongs_to_a_sample_is_ignored_with_a_warning():
     case = read(uncertain(parameters=None, scenarios=SCENARIOS))
     assert sorted(warning.path_key for warning in case.warnings) == ["uncertainty.sample", "uncertainty.validation"]

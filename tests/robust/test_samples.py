@@ -108,3 +108,10 @@ def test_an_interval_of_a_quantile_that_the_sample_is_too_small_for_is_open():
 def test_students_distribution():
     for degrees in (29, 59, 255):
         assert student(degrees) == pytest.approx(stats.t(degrees).ppf(0.975), rel=2e-4)
+
+
+def test_what_does_not_vary_is_held_by_its_interval_whatever_its_sums_round_to():
+    for value in np.random.default_rng(0).uniform(1.0, 1e6, 200):
+        of_the_sample = float(np.full(64, value) @ np.full(64, 1.0 / 64.0))
+        assert estimate(Measure("mean"), np.full(100, value)).holds(of_the_sample)
+    assert not estimate(Measure("mean"), np.full(100, 1.0)).holds(1.0 + 1e-9)

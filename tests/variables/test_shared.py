@@ -198,3 +198,12 @@ def test_what_cannot_be_shared_is_refused_at_its_place(sharing, place, words):
         read_case(text.replace("SHARING", sharing))
     found = [(mistake.path_key, mistake.message) for mistake in caught.value.mistakes]
     assert any(path == place and words in message for path, message in found), found
+
+
+def test_bounds_that_only_a_chain_of_mirrors_ties_have_to_go_together():
+    text = SCENE.replace("initial: 0.2", "initial: {lefts: 0.012, rights: 0.2, more: 0.2}")
+    with pytest.raises(CaseError) as caught:
+        read_case(text.replace("SHARING", "upper: {lefts: 0.015}, mirrored: [[rights, more], [more, lefts]]"))
+    (mistake,) = caught.value.mistakes
+    assert mistake.path_key == "design.mirrored[1]"
+    assert "nothing in common: lower 0.02, upper 0.015 (of " in mistake.message
