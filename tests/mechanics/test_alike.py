@@ -4,9 +4,9 @@ import numba
 import numpy as np
 import pytest
 
-from mdstopo.mechanics.passes import SUMS
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.laws import alike
+from mdstopo.mechanics.passes import SUMS
 from mdstopo.native.kernel import numba as with_vectors
 
 with_vectors()
