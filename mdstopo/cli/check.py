@@ -40,6 +40,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     output.say(f"{case.title or case.name} ({case_path})")
     _say_bodies(output, case)
     _say_joints(output, case)
+    _say_contacts(output, case)
     _say_members(output, case)
     _say_variables(output, case)
     stages = _say_stages(output, case)
@@ -108,6 +109,20 @@ def _say_joints(output: Output, case: "Case") -> None:
         at = ", ".join(number(value) for value in joint.at_first)
         rows.append([joint.name, joint.type, ", ".join(joint.bodies), f"({at}) on {joint.bodies[0]}"])
     output.say(f"{len(case.joints)} joints")
+    output.table(rows)
+
+
+def _say_contacts(output: Output, case: "Case") -> None:
+    """Which side of an edge is free is easily drawn the wrong way round: so how deep points are in it is told."""
+    if not case.contacts:
+        return
+    from mdstopo.cli.check_numbers import depths
+
+    rows = [["contact", "points of", "on the edge of", "points", "in it at the start, m"]]
+    for contact, own in zip(case.contacts, depths(case), strict=True):
+        inside = f"{int((own > 0.0).sum())}, up to {number(float(own.max()))}" if (own > 0.0).any() else "none"
+        rows.append([contact.name, contact.body, contact.edge_body, str(len(own)), inside])
+    output.say(f"{len(case.contacts)} contacts")
     output.table(rows)
 
 

@@ -116,3 +116,26 @@ def _at(signal: float | Table, time: float) -> float:
     t0, t1 = signal.times[after - 1 : after + 1]
     v0, v1 = signal.values[after - 1 : after + 1, 0]
     return float(v0 + (v1 - v0) * (time - t0) / (t1 - t0))
+
+
+def depths(case: Case) -> list[Floats]:
+    """(n,) of each contact: how deep its points are in it at the start, m; below 0 in front of it, -inf beside it."""
+    found = []
+    for contact in case.contacts:
+        points = _global(case, contact.body, contact.points)
+        first, second = _global(case, contact.edge_body, np.array([contact.edge_from, contact.edge_to]))
+        along = (second - first) / np.hypot(*(second - first))
+        off = points - first
+        beside = (off @ along < 0.0) | (off @ along > np.hypot(*(second - first)))
+        # the left of the way from the first end to the second is free
+        found.append(np.where(beside, -np.inf, along[1] * off[:, 0] - along[0] * off[:, 1]))
+    return found
+
+
+def _global(case: Case, name: str, points: Floats) -> Floats:
+    """Points (n, 2) of a body at the start."""
+    if name == GROUND:
+        return points
+    body = case.body(name)
+    c, s = np.cos(body.angle), np.sin(body.angle)
+    return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array(body.position))

@@ -20,7 +20,7 @@ from mdstopo.cli.options import (
     result_path,
     set_option,
 )
-from mdstopo.cli.output import Output, duration, number
+from mdstopo.cli.output import Output, duration, number, write
 from mdstopo.cli.progress import display
 from mdstopo.cli.uncertain import document_of, lines_of
 
@@ -88,7 +88,10 @@ def command(
         output.notice(f"warning: {warning}")
     if outcome.status == "interrupted":
         output.notice(f"interrupted; to go on: {again}")
-    return EXIT[outcome.status]
+    failed = EXIT[outcome.status] == 1 or (EXIT[outcome.status] == 0 and not outcome.keeps_constraints)
+    if failed and quiet:
+        write(sys.stderr, f"{case_path}: {outcome.reason}")
+    return 1 if failed else EXIT[outcome.status]
 
 
 def resume_command(

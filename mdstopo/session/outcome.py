@@ -94,3 +94,9 @@ class Outcome:
     integrator_reason: str
     conclusion: "Conclusion | None" = None
     variables: Mapping[str, Floats] = field(default_factory=dict)
+
+    @property
+    def keeps_constraints(self) -> bool:
+        """Whether the best design does, to the optimiser's tolerance."""
+        state = self.states[self.best_start]
+        return state is not None and state.best_violation <= self.case.optimizer.tolerance

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from mdstopo.case.reader import read_case
-from mdstopo.cli.check_numbers import frequencies, material, totals
+from mdstopo.cli.check_numbers import depths, frequencies, material, totals
 from mdstopo.cli.gradient_numbers import chosen_members, differences, disagreement
 
 Floats = NDArray[np.float64]
@@ -115,3 +115,18 @@ def test_the_repository_cases_can_be_summed_up() -> None:
 
     for path in sorted((Path(__file__).parents[2] / "cases").glob("fig*.yaml")):
         assert {name: value for name, value, _ in totals(load_case(path))}["mass"] == 2060.0, path.name
+
+
+def test_points_behind_an_edge_at_the_start_are_told():
+    case = read_case("""
+format: 1
+time: {end: 1}
+bodies: {box: {mass: 1, inertia: 1, position: [0, 0.4], angle: 1.5}}
+points: {corners: {body: box, grid: {list: [[0.3, -0.1], [-0.3, 0.9], [5, -1]]}}}
+contacts:
+  - {points: corners, on: {body: ground, from: [-1, 0], to: [1, 0]}, stiffness: 1000}
+  - {points: corners, on: {body: ground, from: [1, 0.2], to: [-1, 0.2]}, stiffness: 1000}
+""")
+    floor, ceiling = depths(case)
+    assert floor == pytest.approx([0.1, -0.9, -np.inf])
+    assert ceiling == pytest.approx([-0.3, 0.7, -np.inf])
