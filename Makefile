@@ -6,6 +6,7 @@
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
 #   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
+#   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
 #   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
 #   make readme                   measure everything and put the numbers into the README
 #   make clean                    remove the environment and whatever was made; results stay
@@ -21,6 +22,8 @@ ARGS ?=
 TESTS ?=
 JOBS ?= 2
 SECTIONS ?=
+PEERS ?=
+PEERS_PYTHON ?= $(BIN)/python
 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
@@ -28,7 +31,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 .PHONY: help run test lint types docs reproduce bench peers readme clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,11p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,12p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -81,7 +84,7 @@ $(VENV)/.ready-bench: $(VENV)/.ready
 	@touch $@
 
 bench: $(VENV)/.ready-bench
-	$(BIN)/python -m benchmarks $(SECTIONS)
+	$(BIN)/python -m benchmarks $(SECTIONS) $(if $(PEERS),--peers '$(PEERS)' --peers-python '$(PEERS_PYTHON)')
 
 # The programs to compare with, beside mdstopo in one environment.
 $(VENV)/.ready-peers: $(VENV)/.ready

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from importlib import import_module
 from pathlib import Path
 
+from benchmarks.outside import outside
 from benchmarks.readme import replace_block, write_pages
 from mdstopo.bench.machine import description
 from mdstopo.bench.tables import Table
@@ -42,6 +43,8 @@ def main() -> int:
         epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
     parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but those with other programs")
+    parser.add_argument("--peers", metavar="DIR", help="a folder of other programs to compare with, with its bench.py")
+    parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
     parser.add_argument(
         "--pages",
@@ -52,9 +55,11 @@ def main() -> int:
     unknown = [name for name in chosen.sections if name not in SECTIONS]
     if unknown:
         parser.error(f"no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}")
-    sections = chosen.sections or [name for name in SECTIONS if name not in PEERS]
+    sections = chosen.sections or ([] if chosen.peers else [name for name in SECTIONS if name not in PEERS])
     machine = f"Measured on: {description()}."
     print(machine + "\n", flush=True)
+    for table in outside(chosen.peers, chosen.peers_python) if chosen.peers else ():
+        print(table.markdown(), flush=True)
     for name in sections:
         began = time.perf_counter()
         printed = []

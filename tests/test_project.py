@@ -7,6 +7,7 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import mdstopo
@@ -107,6 +108,27 @@ def test_benchmarks_have_their_place_in_the_readme(tmp_path, monkeypatch):
         assert f"<!-- benchmarks: {name} -->\n\nthe new {name}\n\n<!-- end -->" in copy.read_text(encoding="utf-8")
     with pytest.raises(ValueError, match="has no block"):
         replace_block(copy, "weather", "fine")
+
+
+def test_joining_the_peers_is_the_same_problem(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT))
+    from types import SimpleNamespace
+
+    from benchmarks.join_peers import make
+
+    case = mdstopo.load_case(ROOT / "cases" / "fig6.yaml")
+    (group,) = case.members
+    at = np.zeros(12)
+    at[4] = -1.0
+    theirs = SimpleNamespace(
+        T=0.2, m=[60.0, 10.0, 2000.0, 6000.0], y0=at, P=group.from_local, Q=group.to_local, k=225.0,
+        ext=np.array([0.0, -9.8, 0.0, 9.8, -9.8, 20.0]),
+    )  # fmt: skip
+    alpha = np.random.default_rng(1).uniform(0.01, 1.0, case.n_design)
+    value, gradient = make(theirs, tolerance=1e-9)(alpha)
+    expected = mdstopo.evaluate(case, alpha)
+    np.testing.assert_allclose(value, expected.objectives["G"], rtol=1e-8)
+    np.testing.assert_allclose(gradient, expected.gradients["G"], atol=1e-7 * np.abs(gradient).max())
 
 
 def test_version_agrees_with_the_changelog():
