@@ -393,23 +393,21 @@ class Evaluator:
         status: Status,
         message: str,
     ) -> Evaluation:
-        names = self._names
         if not status.usable:
             lost = (Peak(np.nan, np.nan, None),)
-            keys = [*names, *self._limited.values()]
+            keys = [*self._names, *self._limited.values()]
             looked = {key: looked.get(key, lost) if status is Status.NO_GRADIENT else lost for key in keys}
         objectives: dict[str, float] = {}
         times: dict[str, float] = {}
         peaks: dict[str, tuple[Peak, ...]] = {}
         slopes: dict[str, FloatArray] = {}
-        for name in names:
+        for name in self._names:
             peaks[name] = looked[name]
             times[name], objectives[name], slope = looked[name][0]
             if gradient and slope is not None:
                 slopes[name] = slope
-        constraints, rows = self._bounds, self._rows
-        if len(rows):
-            constraints = np.einsum("ij,j->i", rows, design) - self._bounds
+        rows = self._rows
+        constraints = np.einsum("ij,j->i", rows, design) - self._bounds if len(rows) else self._bounds
         if self._limited:
             rows = rows.copy()
             for i, key in self._limited.items():

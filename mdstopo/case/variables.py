@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import Number
-from mdstopo.case.laws import Law
 from mdstopo.case.model import MemberGroup, Variable
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.schema_scene import LAW
@@ -129,7 +126,7 @@ def _build(name: str, fields: Fields, groups: dict[str, MemberGroup], reading: R
             reading.mistake(path, f"the key 'initial' is missing, and the laws {why} (the first value of {parameter})")
             return None
         initial = own.pop()
-    if not _within(fields, initial, parameter, records[0].type, reading) or not _acts(fields, records, reading):
+    if not _within(fields, initial, parameter, records[0].type, reading):
         return None
     key = _key(records[0].type, parameter)
     return Variable(
@@ -192,23 +189,6 @@ def _within(fields: Fields, initial: float, parameter: str, law: str, reading: R
         reading.mistake(inside(fields.path, "initial"), message)
         good = False
     return good
-
-
-def _acts(fields: Fields, records: Sequence[Law], reading: Reading) -> bool:
-    """Whether laws act for some time whatever the variable: where they never act, no derivative leads back."""
-    lower, upper = fields["lower"], fields["upper"]
-    for record in records:
-        begin = -math.inf if record.active_from is None else record.active_from
-        end = math.inf if record.active_until is None else record.active_until
-        if fields["parameter"] == "active_from" and upper > end:
-            text = f"found {number_text(upper)}, allowed is at most active_until, {number_text(end)}"
-            reading.mistake(inside(fields.path, "upper"), text)
-            return False
-        if fields["parameter"] == "active_until" and lower < begin:
-            text = f"found {number_text(lower)}, allowed is at least active_from, {number_text(begin)}"
-            reading.mistake(inside(fields.path, "lower"), text)
-            return False
-    return True
 
 
 def prices(variables: tuple[Variable, ...], groups: tuple[str, ...]) -> FloatArray:

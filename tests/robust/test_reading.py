@@ -214,7 +214,8 @@ def test_as_many_but_other_members_at_a_point_are_refused():
         "deck": {"body": "vehicle", "grid": {"list": [[-0.5, -1], [1.5, -1]]}},
     }
     other = {"points.deck.grid.list": [[-1.5, -1], [0.5, -1]]}
-    case = read({"scenarios": {"usual": {}, "other": {"set": other}}}, members=members, points=points)
+    section = {"scenarios": {"usual": {}, "other": {"set": other}}}
+    case = read(section, members=members, points=points, constraints=[])
     assert len(case.members[0]) == 1
     with pytest.raises(CaseError, match="the group belts has as many members, but others"):
         evaluator_of(case)
