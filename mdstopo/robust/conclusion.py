@@ -78,9 +78,11 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, crew: Crew 
     usable = [trial for trial in trials if not trial.reason]
     lost = len(trials) - len(usable)
     warnings: tuple[str, ...] = ()
+    if not nominal.status.usable:
+        warnings = (f"the nominal case cannot be computed: {nominal.status.value} {nominal.message}".rstrip(),)
     if lost:
         reason = next(trial.reason for trial in trials if trial.reason)
-        warnings = (f"{lost} of {len(trials)} points of the fresh sample cannot be computed: {reason}",)
+        warnings += (f"{lost} of {len(trials)} points of the fresh sample cannot be computed: {reason}",)
     enough = len(usable) > 1
     results = []
     for j, objective in enumerate(case.objectives):
