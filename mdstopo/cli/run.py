@@ -88,10 +88,12 @@ def command(
         output.notice(f"warning: {warning}")
     if outcome.status == "interrupted":
         output.notice(f"interrupted; to go on: {again}")
-    failed = EXIT[outcome.status] == 1 or (EXIT[outcome.status] == 0 and not outcome.keeps_constraints)
-    if failed and quiet:
+    status = EXIT[outcome.status]
+    if status == 0 and not outcome.keeps_constraints:
+        status = 1
+    if status == 1 and quiet:
         write(sys.stderr, f"{case_path}: {outcome.reason}")
-    return 1 if failed else EXIT[outcome.status]
+    return status
 
 
 def resume_command(

@@ -50,13 +50,12 @@ def case_at(case: Case, sample: Sample, i: int) -> Case:
 
 def evaluator_at(case: Case, sample: Sample, i: int) -> Evaluator:
     """The evaluator of point i, ready to run. Raises CaseError as `case_at`, also for joints that do not fit there."""
+    there = case_at(case, sample, i)
     try:
-        made = Evaluator(case_at(case, sample, i), beside=False)
+        made = Evaluator(there, beside=False)
         for load_case in made.scenes if made.beyond else ():
             made.driver(load_case)
     except CaseError as error:
-        if error.mistakes and error.mistakes[0].path_key.startswith("uncertainty"):
-            raise
         raise _refused(case, sample, i, error.mistakes) from None
     return made
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.engine import Evaluator
 from mdstopo.evaluation import FloatArray
-from mdstopo.robust.points import case_at, name_of
+from mdstopo.robust.points import evaluator_at, name_of
 from mdstopo.robust.sample import Sample
 
 
@@ -26,7 +25,7 @@ def tried(case: Case, sample: Sample, i: int, alpha: FloatArray) -> Trial:
     """Point i with the design alpha (N,)."""
     lost = np.full(len(case.objectives), np.nan), np.full(len(case.constraints), np.nan)
     try:
-        found = Evaluator(case_at(case, sample, i), beside=False).evaluate(alpha, gradient=False)
+        found = evaluator_at(case, sample, i).evaluate(alpha, gradient=False)
     except CaseError as error:
         return Trial(*lost, error.mistakes[0].message)
     if not found.status.usable:

@@ -6,7 +6,7 @@ from typing import Any
 
 from mdstopo.engine import Evaluator
 from mdstopo.robust.ensemble import Ensemble
-from mdstopo.robust.points import case_at, nominal_case
+from mdstopo.robust.points import evaluator_at, nominal_case
 from mdstopo.robust.sample import design_sample
 from mdstopo.robust.trial import tried
 from mdstopo.session.combining import even, problem_of
@@ -23,7 +23,7 @@ def main() -> None:
     # the kernels in the one order in which every process loads them
     get_ready(nominal, engine, problem_of(engine, even(nominal)), None)
     sample = design_sample(case.uncertainty)
-    ensemble = Ensemble(case, False, {i: Evaluator(case_at(case, sample, i), beside=False) for i in share})
+    ensemble = Ensemble(case, False, {i: evaluator_at(case, sample, i) for i in share})
     while True:
         try:
             kind, *request = pickle.load(source)

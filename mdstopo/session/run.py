@@ -1,8 +1,8 @@
 """The run itself, each step a verb: admit, restore, iterate, conclude, save."""
 
 import time
-from collections.abc import Callable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -174,28 +174,30 @@ class _Run:
         scalarisation = self.combine(engine, begin, path)
         if scalarisation is not None:
             problem = problem_of(engine, scalarisation)
-        try:
+        with self.saved_without_worker(path):
             self.iterate(make, problem, path, workers, scalarisation)
-        except WorkerError as error:
-            if path is not None and best_of(self.case, self.states) is not None:
-                self.save(path, RunStatus.INTERRUPTED, str(error))
-            raise
         ended = time.perf_counter()
         best = best_of(self.case, self.states)
         if best is None:
             raise KeyboardInterrupt
         status, reason = self.conclude(best)
         if status not in (RunStatus.RUNNING, RunStatus.INTERRUPTED):
-            try:
+            with self.saved_without_worker(path):
                 self.complete(engine, best)
-            except WorkerError as error:
-                if path is not None:
-                    self.save(path, RunStatus.INTERRUPTED, str(error))
-                raise
             status, reason = self.judge(best, status, reason)
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - opened, compiled - began)
+
+    @contextmanager
+    def saved_without_worker(self, path: Path | None) -> Iterator[None]:
+        """What has been reached is saved where a worker is lost; the WorkerError goes on."""
+        try:
+            yield
+        except WorkerError as error:
+            if path is not None and best_of(self.case, self.states) is not None:
+                self.save(path, RunStatus.INTERRUPTED, str(error))
+            raise
 
     def combine(self, engine: Engine, begin: Floats, path: Path | None) -> Scalarisation | None:
         """U of several objectives, its utopia found first; what is found is kept at once. None for one objective."""
