@@ -34,8 +34,7 @@ from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.passes import SUMS, member_sums, scale_members
-from mdstopo.scene.model import Springs
+from mdstopo.mechanics.passes import SUMS, member_sums, scale_members, springs_of
 from mdstopo.scene.packing import unpack
 
 RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)  # type: ignore[misc]
@@ -194,7 +193,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
     # a pair that starts strained moves on the scale of its mean strain
     relative_pose(pair, q0, v0, rel[0])
-    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    springs = springs_of(model)
     member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     work[FORCES] += 1
     for p in range(n_pair):

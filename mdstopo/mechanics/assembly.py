@@ -7,8 +7,7 @@ import math
 
 from mdstopo.jit import inline, kernel
 from mdstopo.mechanics.geometry import add_pair_force, relative_pose
-from mdstopo.mechanics.passes import member_sums
-from mdstopo.scene.model import Springs
+from mdstopo.mechanics.passes import member_sums, springs_of
 
 
 @kernel
@@ -235,7 +234,7 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
     pair = model.pair
     for j in range(m):
         relative_pose(pair, q[j], v[j], rel[j])
-    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    springs = springs_of(model)
     member_sums(springs, strength, rel, m, tangent, sums)
     turning = model.load_body.shape[0] > 0
     for j in range(m):

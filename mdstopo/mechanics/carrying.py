@@ -9,9 +9,9 @@ nothing has a slope.
 import numpy as np
 
 from mdstopo.jit import kernel
-from mdstopo.mechanics.passes import threads_for
+from mdstopo.mechanics.passes import springs_of, threads_for
 from mdstopo.native.threads import shared, taken
-from mdstopo.scene.model import VECTOR, Model
+from mdstopo.scene.model import VECTOR, Model, Springs
 
 #: of so many members one must carry nothing
 SHARE = 4
@@ -26,63 +26,62 @@ def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
     In: strength (3, M_padded), or (ROOMY, M_padded) with room behind; fill: write them there, else they are there from
     the same strengths. The model itself comes back where there is no room, or too few carry nothing.
     """
-    block = model.block
-    parts = model.chunk.shape[0]
-    cut = parts > 0
-    count = np.zeros(parts if cut else block.shape[0], np.int64)
-    if cut:
-        counter = np.zeros(1, np.int64)
-        shared(_count_chunks, threads_for(model, 1), (counter, model.chunk, block, strength, count))
-    else:
-        for k in range(block.shape[0]):
-            count[k] = _count(k, block[k, 1], block[k, 2], block, strength)
-    left = np.sum(count)
-    members = np.sum(block[:, 5])
+    springs, own, left = _that_carry(springs_of(model), strength, fill)
+    return (
+        Model(
+            model.inv_mass, model.q0, model.v0, model.pair, model.reach, model.shortest, springs.block, model.power,
+            springs.member, model.times, model.force, model.load_body, model.load_follows, model.load_arm,
+            model.load_force, springs.chunk, model.threads,
+        ),
+        own,
+        left,
+    )  # fmt: skip
+
+
+@kernel
+def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
+    """The same of `Springs`: few arrays to choose between."""
+    block = springs.block
+    parts = springs.chunk.shape[0]
+    count = np.zeros(parts, np.int64)
+    job = (np.zeros(1, np.int64), springs.chunk, block, strength, count)
+    shared(_count_chunks, threads_for(springs, 1), job)
+    left = 0
+    for i in range(parts):
+        left += count[i]
+    members = 0
+    for k in range(block.shape[0]):
+        members += block[k, 5]
     if strength.shape[0] < ROOMY or SHARE * (members - left) < members:
-        return model, strength[:3], members
-    # where each part begins among those that are left
-    begin = np.empty(count.shape[0], np.int64)
+        return springs, strength[:3], members
+    # where each chunk begins among those that are left
+    begin = np.empty(parts, np.int64)
     fewer = np.empty((block.shape[0], 6), np.int64)
     for k in range(block.shape[0]):
         for j in range(6):
             fewer[k, j] = block[k, j]
         fewer[k, 5] = 0
-    for i in range(count.shape[0]):
-        k = model.chunk[i, 0] if cut else i
+    for i in range(parts):
+        k = springs.chunk[i, 0]
         begin[i] = block[k, 1] + fewer[k, 5]
         fewer[k, 5] += count[i]
     for k in range(block.shape[0]):
         fewer[k, 2] = block[k, 1] + (fewer[k, 5] + VECTOR - 1) // VECTOR * VECTOR
     chunk = np.empty((parts, 3), np.int64)
     for i in range(parts):
-        k = model.chunk[i, 0]
+        k = springs.chunk[i, 0]
         chunk[i, 0] = k
-        chunk[i, 1] = model.chunk[i, 1]
-        chunk[i, 2] = min(model.chunk[i, 2], fewer[k, 2])
+        chunk[i, 1] = springs.chunk[i, 1]
+        chunk[i, 2] = min(springs.chunk[i, 2], fewer[k, 2])
     room = strength[3:ROOMY]
     if fill:
-        if cut:
-            counter = np.zeros(1, np.int64)
-            shared(
-                _gather_chunks, threads_for(model, 1),
-                (counter, model.chunk, block, model.member, strength, begin, count, room),
-            )  # fmt: skip
-        else:
-            for k in range(block.shape[0]):
-                _gather(k, block[k, 1], block[k, 2], block, model.member, strength, begin[k], count[k], room)
+        gather = (np.zeros(1, np.int64), springs.chunk, block, springs.member, strength, begin, count, room)
+        shared(_gather_chunks, threads_for(springs, 1), gather)
         for k in range(block.shape[0]):
             for row in range(8):
                 for i in range(fewer[k, 1] + fewer[k, 5], fewer[k, 2]):
                     room[row, i] = 0.0
-    return (
-        Model(
-            model.inv_mass, model.q0, model.v0, model.pair, model.reach, model.shortest, fewer, model.power, room,
-            model.times, model.force, model.load_body, model.load_follows, model.load_arm, model.load_force, chunk,
-            model.threads,
-        ),
-        room[5:8],
-        left,
-    )  # fmt: skip
+    return Springs(fewer, room, chunk, springs.threads), room[5:8], left
 
 
 @kernel

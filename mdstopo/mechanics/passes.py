@@ -1,8 +1,9 @@
 """The passes over all members: their strengths, their sums at several poses, the design gradient.
 
 A pass returns a few numbers a pair of bodies and pose (`SUMS`), or a number a member. The order of sums is fixed:
-members within a tile, tiles in order. Of very many members (`Model.chunk`) every chunk is summed by itself and the
-chunks are added in order, so that threads can share them (`native.threads`) and no bit depends on how many do.
+members within a tile, tiles in order. All passes go through the chunks of the members (`Model.chunk`): whole blocks, or
+of very many members parts of them. The sums of parts are made each by itself and added in order, so that threads can
+share them (`native.threads`) and no bit depends on how many do.
 """
 
 import numpy as np
@@ -19,7 +20,7 @@ from mdstopo.mechanics.laws.spring import (
     viscous_tangent,
 )
 from mdstopo.native.threads import shared, taken
-from mdstopo.scene.model import TILE
+from mdstopo.scene.model import TILE, Springs
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
 SUMS = 22
@@ -28,24 +29,23 @@ WORTH = 400_000
 
 
 @kernel
+def springs_of(model):  # type: ignore[no-untyped-def]
+    """What `member_sums` needs of a model."""
+    return Springs(model.block, model.member, model.chunk, model.threads)
+
+
+@kernel
 def threads_for(springs, poses):  # type: ignore[no-untyped-def]
     """How many threads share a pass at so many poses."""
-    return springs.threads if springs.member.shape[1] * poses >= WORTH else 1
+    return springs.threads if springs.threads > 0 and springs.member.shape[1] * poses >= WORTH else 1
 
 
 @kernel
 def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
     """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12)."""
-    block = model.block
-    if model.chunk.shape[0] == 0:
-        for k in range(block.shape[0]):
-            _scale(k, block[k, 1], block[k, 2], block, model.power, model.member, alpha, strength)
-        return
     counter = np.zeros(1, np.int64)
-    shared(
-        _scale_chunks, threads_for(model, 1),
-        (counter, model.chunk, block, model.power, model.member, alpha, strength),
-    )  # fmt: skip
+    job = (counter, model.chunk, model.block, model.power, model.member, alpha, strength)
+    shared(_scale_chunks, threads_for(model, 1), job)
 
 
 @kernel
@@ -93,7 +93,7 @@ def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-un
     block = springs.block
     chunk = springs.chunk
     sums[:m] = 0.0
-    if chunk.shape[0] == 0:
+    if springs.threads == 0:  # whole blocks: added where they belong at once
         for k in range(block.shape[0]):
             _sum(k, block[k, 1], block[k, 2], block, springs.member, strength, rel, m, tangent, sums, block[k, 0])
         return
@@ -204,7 +204,6 @@ def design_gradient(model, stage, z, used, out, work):  # type: ignore[no-untype
     members are passed over. work: counts the stages.
     """
     pair = model.pair
-    block = model.block
     n_pair = pair.shape[0]
     count = 0
     for i in range(used.shape[0]):
@@ -221,12 +220,9 @@ def design_gradient(model, stage, z, used, out, work):  # type: ignore[no-untype
                 for axis in range(3):
                     u[j, p, axis] = -u[j, p, axis]
             j += 1
-    if model.chunk.shape[0] == 0:
-        for k in range(block.shape[0]):
-            _design(k, block[k, 1], block[k, 2], block, model.member, rel, u, out)
-        return
     counter = np.zeros(1, np.int64)
-    shared(_design_chunks, threads_for(model, count), (counter, model.chunk, block, model.member, rel, u, out))
+    job = (counter, model.chunk, model.block, model.member, rel, u, out)
+    shared(_design_chunks, threads_for(model, count), job)
 
 
 @kernel
@@ -267,17 +263,13 @@ def _design(k, start, stop, block, member, rel, u, out):  # type: ignore[no-unty
 @kernel
 def energy_gradient(model, stage, weight, out):  # type: ignore[no-untyped-def]
     """out (M_padded,) += sum_s weight_s V_i(q_s): the explicit part of the energy's design gradient."""
-    block = model.block
     count = weight.shape[0]
     rel = np.empty((count, model.pair.shape[0], POSE))
     for j in range(count):
         relative_pose(model.pair, stage[j, 0], stage[j, 1], rel[j])
-    if model.chunk.shape[0] == 0:
-        for k in range(block.shape[0]):
-            _energy(k, block[k, 1], block[k, 2], block, model.member, rel, weight, out)
-        return
     counter = np.zeros(1, np.int64)
-    shared(_energy_chunks, threads_for(model, count), (counter, model.chunk, block, model.member, rel, weight, out))
+    job = (counter, model.chunk, model.block, model.member, rel, weight, out)
+    shared(_energy_chunks, threads_for(model, count), job)
 
 
 @kernel
@@ -305,13 +297,9 @@ def _energy(k, lo, hi, block, member, rel, weight, out):  # type: ignore[no-unty
 @kernel
 def unscale_gradient(model, alpha, padded, out):  # type: ignore[no-untyped-def]
     """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
-    block = model.block
-    if model.chunk.shape[0] == 0:
-        for k in range(block.shape[0]):
-            _unscale(k, block[k, 1], block[k, 2], block, model.power, alpha, padded, out)
-        return
     counter = np.zeros(1, np.int64)
-    shared(_unscale_chunks, threads_for(model, 1), (counter, model.chunk, block, model.power, alpha, padded, out))
+    job = (counter, model.chunk, model.block, model.power, alpha, padded, out)
+    shared(_unscale_chunks, threads_for(model, 1), job)
 
 
 @kernel

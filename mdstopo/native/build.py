@@ -36,7 +36,7 @@ def build(dispatcher: Any, types: str) -> Code | None:
     checked = llvm.parse_assembly(str(module))
     checked.verify()
     machine = library._codegen._tm
-    return Code(library.serialize_using_object_code()[2][0], machine.emit_object(checked), result)
+    return Code(machine.emit_object(library._final_module), machine.emit_object(checked), result)
 
 
 def _numba_type(kind: str) -> Any:

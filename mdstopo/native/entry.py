@@ -51,7 +51,7 @@ def types_of(arguments: tuple[Any, ...]) -> str | None:
 class Entry(Kernel):
     """A compiled function that Python calls; other compiled functions may call it too."""
 
-    _cached = False  # its machine code is kept by `native.store`
+    _inner = False
 
     def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
         super().__init__(function, fastmath)

@@ -61,7 +61,7 @@ class Kernel:
     fastmath: the flags of its floating point. `py_func` is the function as written, to be run in Python.
     """
 
-    _cached = True
+    _inner = True
 
     def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
         functools.update_wrapper(self, function)
@@ -76,23 +76,32 @@ class Kernel:
     def dispatcher(self) -> Any:
         """Numba's object for it."""
         if self._dispatcher is None:
-            # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
-            self._dispatcher = self._made(no_cpython_wrapper=True, cache=self._cached)
+            self._dispatcher = self._inside()
         return self._dispatcher
 
     @property
     def _numba_type_(self) -> Any:
         return self.dispatcher._numba_type_
 
-    def _made(self, **options: Any) -> Any:
-        """Numba's object for the function. Its disk cache serves kernels that several entries call."""
+    def _inside(self) -> Any:
+        """Numba's object for the function where compiled functions call it."""
+        compiler = numba()
+        from mdstopo.native.library import LEFT, OPTIMISED, Cache
         from mdstopo.native.store import cache_folder
 
-        compiler = numba()
-        kept, compiler.config.CACHE_DIR = compiler.config.CACHE_DIR, str(cache_folder())
-        try:
-            fastmath = set(self._fastmath) or False
-            made = compiler.njit(error_model="numpy", fastmath=fastmath, no_cfunc_wrapper=True, **options)
-            return made(self.py_func)
-        finally:
-            compiler.config.CACHE_DIR = kept
+        # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
+        whole = OPTIMISED if self._fastmath or not self._inner else LEFT
+        made = self._made(no_cpython_wrapper=True, pipeline_class=whole)
+        if self._inner:  # an entry's machine code is kept by `native.store`
+            kept, compiler.config.CACHE_DIR = compiler.config.CACHE_DIR, str(cache_folder())
+            try:
+                made._cache = Cache(self.py_func)  # type: ignore[no-untyped-call]
+            finally:
+                compiler.config.CACHE_DIR = kept
+        return made
+
+    def _made(self, **options: Any) -> Any:
+        """Numba's object for the function."""
+        fastmath = set(self._fastmath) or False
+        made = numba().njit(error_model="numpy", fastmath=fastmath, no_cfunc_wrapper=True, **options)
+        return made(self.py_func)

@@ -12,9 +12,8 @@ from mdstopo.integrators.contract import point_of, sample
 from mdstopo.integrators.steps import step_at
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.passes import SUMS, member_sums
+from mdstopo.mechanics.passes import SUMS, member_sums, springs_of
 from mdstopo.responses.energy import energy_at, energy_of
-from mdstopo.scene.model import Springs
 
 #: columns of a peak: time, value, step, fraction of it
 TIME, VALUE, STEP, FRACTION = range(4)
@@ -119,7 +118,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     v = np.empty(n)
     rel = np.empty((1, n_pair, POSE))
     sums = np.empty((1, n_pair, SUMS))
-    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    springs = springs_of(model)
     room = steps.index[count, 0] + 2
     t = np.empty(room)
     g = np.empty(room)

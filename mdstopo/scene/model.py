@@ -26,7 +26,7 @@ TILE = 512
 #: members of one chunk, and how many there must be in all before they are summed in chunks
 CHUNK = 8 * TILE
 MANY = 4 * CHUNK
-#: of few members
+#: of a model that is not `packed`
 NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
 
 
@@ -57,8 +57,9 @@ class Model(NamedTuple):
     load_follows  (n_load,)         1 where the force turns with it, 0 where it keeps its global direction,
     load_arm      (n_load, 2)       point of attack in body coordinates,
     load_force    (n_seg, n_load, 2, 2)   and components, value and slope
-    chunk         (n_chunk, 3)      block, start, stop of parts that threads share; none of few members
-    threads                         that share a pass, if it is worth it; chunk and threads come from `packing`
+    chunk         (n_chunk, 3)      block, start, stop of the parts that passes take: whole blocks of few members
+    threads                         that share a pass, if it is worth it; 0 of few members, in whole blocks. Chunk and
+                                    threads come from `packing`
     ============  ================  =====================================================================
     """
 
@@ -78,4 +79,4 @@ class Model(NamedTuple):
     load_arm: FloatArray
     load_force: FloatArray
     chunk: IndexArray = NO_CHUNK
-    threads: int = 1
+    threads: int = 0

@@ -33,6 +33,7 @@ def pack(model: Model, threads: int | None = None) -> Packed:
     every kernel would be compiled twice.
     """
     chunk = chunks_of(model.block)
+    most = allowed() if threads is None else threads
     sizes = [
         len(model.inv_mass),
         len(model.pair),
@@ -41,7 +42,7 @@ def pack(model: Model, threads: int | None = None) -> Packed:
         len(model.times) - 1,
         len(model.load_body),
         len(chunk),
-        allowed() if threads is None else threads,
+        most if many_members(model.block) else 0,
     ]
     ints = np.concatenate(
         [np.array(sizes, dtype=np.int64)]
@@ -57,15 +58,19 @@ def pack(model: Model, threads: int | None = None) -> Packed:
 
 
 def chunks_of(block: IndexArray) -> IndexArray:
-    """(n_chunk, 3) block, start, stop of each chunk, in order; none where there are few members."""
-    if not len(block) or block[-1, 2] <= MANY:
-        return np.zeros((0, 3), dtype=np.int64)
+    """(n_chunk, 3) block, start, stop of each chunk, in order: whole blocks where there are few members."""
+    most = CHUNK if many_members(block) else MANY
     chunks = [
-        (k, first, min(first + CHUNK, stop))
+        (k, first, min(first + most, stop))
         for k, (start, stop) in enumerate(block[:, 1:3].tolist())
-        for first in range(start, stop, CHUNK)
+        for first in range(start, stop, most)
     ]
-    return np.array(chunks, dtype=np.int64)
+    return np.array(chunks, dtype=np.int64).reshape(-1, 3)
+
+
+def many_members(block: IndexArray) -> bool:
+    """Whether blocks are cut into chunks, which threads may share."""
+    return len(block) > 0 and bool(block[-1, 2] > MANY)
 
 
 def aligned(shape: tuple[int, ...]) -> FloatArray:

@@ -11,10 +11,9 @@ import numpy as np
 from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient
+from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
-from mdstopo.scene.model import Springs
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 
 
@@ -64,7 +63,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     pair = model.pair
-    springs = Springs(motion.block, motion.member, motion.chunk, motion.threads)
+    springs = springs_of(motion)
     turning = model.load_body.shape[0] > 0
     integral = reduction in (MEAN, INTEGRAL)
     stages = steps.index[count, 0]

@@ -19,10 +19,11 @@ from mdstopo.mechanics.passes import (
     energy_gradient,
     member_sums,
     scale_members,
+    springs_of,
     unscale_gradient,
 )
 from mdstopo.responses.energy import energy_slope
-from mdstopo.scene.model import FloatArray, Springs
+from mdstopo.scene.model import FloatArray
 from mdstopo.scene.packing import Packed, unpack
 
 #: singular values below this times the largest are dropped
@@ -42,7 +43,7 @@ def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):  # type
     scale_members(model, alpha, strength)
     for i in range(states.shape[0]):
         relative_pose(pair, states[i, 0], states[i, 1], rel[0])
-        springs = Springs(model.block, model.member, model.chunk, model.threads)
+        springs = springs_of(model)
         member_sums(springs, strength, rel, np.int64(1), np.bool_(True), sums)
         pair_tangents(pair, rel[0], states[i, 0], sums[0], np.bool_(False), k, k)
         for p in range(n_pair):

@@ -11,9 +11,8 @@ from mdstopo.integrators.contract import carried, parent_of, reach, stage_weight
 from mdstopo.integrators.steps import carve
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.passes import SUMS, energy_gradient, unscale_gradient
+from mdstopo.mechanics.passes import SUMS, energy_gradient, springs_of, unscale_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
-from mdstopo.scene.model import Springs
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.propagation import apply_matrix, step_matrix
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
@@ -25,7 +24,7 @@ NOWHERE = -2
 @kernel
 def slope_at(model, strength, q, v, rel, sums, out):  # type: ignore[no-untyped-def]
     """out (n,) = dg/dq at one state."""
-    springs = Springs(model.block, model.member, model.chunk, model.threads)
+    springs = springs_of(model)
     energy_at(model.pair, springs, strength, q, v, rel, sums)
     pull = np.empty((rel.shape[1], 3))
     for p in range(rel.shape[1]):

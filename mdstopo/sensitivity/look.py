@@ -13,8 +13,7 @@ from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
-from mdstopo.mechanics.passes import SUMS, member_sums, unscale_gradient
-from mdstopo.scene.model import Springs
+from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -147,7 +146,7 @@ def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, str
         else:
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
         relative_pose(model.pair, q, v, rel[0])
-        springs = Springs(model.block, model.member, model.chunk, model.threads)
+        springs = springs_of(model)
         member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
         f[:] = 0.0
         add_loads(model, steps.index[k, 2], t, q, f)

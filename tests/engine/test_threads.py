@@ -9,7 +9,7 @@ from mdstopo.mechanics import passes
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.native.kernel import numba as with_kernels
 from mdstopo.native.threads import VARIABLE
-from mdstopo.scene.model import CHUNK, MANY, Springs
+from mdstopo.scene.model import CHUNK, MANY
 from mdstopo.scene.packing import pack, unpack
 from tests.engine.scenes import read
 
@@ -76,8 +76,7 @@ def test_results_are_the_same_to_the_bit_for_any_number_of_threads(integrator, a
 def _summed(ints, floats, alpha, strength, rel, tangent, sums):
     model = unpack(ints, floats)
     passes.scale_members(model, alpha, strength)
-    springs = Springs(model.block, model.member, model.chunk, model.threads)
-    passes.member_sums(springs, strength, rel, rel.shape[0], tangent, sums)
+    passes.member_sums(passes.springs_of(model), strength, rel, rel.shape[0], tangent, sums)
 
 
 @pytest.mark.parametrize("tangent", [False, True])
@@ -87,7 +86,7 @@ def test_chunks_add_up_to_what_one_sum_over_all_gives(tangent):
     packed = pack(model, threads=3)
     whole = packed.ints.copy()
     assert whole[6] > 6
-    whole[6] = 0  # no chunks
+    whole[7] = 0  # in whole blocks
     rng = np.random.default_rng(5)
     alpha = rng.uniform(0.0, 1.0, case.n_design)
     turn = rng.normal(size=4)
@@ -105,7 +104,11 @@ def test_chunks_add_up_to_what_one_sum_over_all_gives(tangent):
 
 def test_few_members_are_not_cut_into_chunks():
     few, many = read(scene(1000)), read(scene(MANY))
-    assert pack(Evaluator(few).scenes["default"].model).ints[6] == 0
+    model = Evaluator(few).scenes["default"].model
+    packed = pack(model, threads=3).ints
+    assert packed[6] == len(model.block)
+    assert packed[7] == 0
     model = Evaluator(many).scenes["default"].model
-    chunks = pack(model).ints[6]
-    assert chunks == sum(-(-(stop - start) // CHUNK) for start, stop in model.block[:, 1:3].tolist())
+    packed = pack(model, threads=3).ints
+    assert packed[7] == 3
+    assert packed[6] == sum(-(-(stop - start) // CHUNK) for start, stop in model.block[:, 1:3].tolist())

@@ -246,3 +246,46 @@ def test_types_of_general_scenes_are_found_by_processes_that_have_springs_only()
     script = "import mdstopo.general.structures as s; print(s.ModelViewStructure.__name__, s.DeskStructure.__name__)"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
     assert done.stdout.split() == ["ModelViewStructure", "DeskStructure"]
+
+
+INSIDE = """
+import numpy as np
+from mdstopo.jit import entry, kernel, member_kernel
+
+@member_kernel
+def total(x):
+    s = 0.0
+    for i in range(x.shape[0]):
+        s += x[i]
+    return s
+
+@kernel
+def mean(x):
+    return total(x) / x.shape[0]
+
+@entry
+def twice(x):
+    return 2.0 * mean(x)
+
+if __name__ == "__main__":
+    found = twice(np.arange(100.0))
+    inside = [total.dispatcher, mean.dispatcher]
+    hits = [sum(each._cache_hits.values()) for each in inside]
+    kept = [next(iter(each.overloads.values())).library for each in inside if each.overloads]
+    print(found, *hits, any(each._object_caching_enabled for each in kept), *(type(each).__name__ for each in kept))
+"""
+
+
+def test_functions_inside_entries_are_kept_without_machine_code_and_found_by_other_processes(tmp_path):
+    script = tmp_path / "inside.py"
+    script.write_text(INSIDE)
+    env = os.environ | {"PYTHONPATH": str(ROOT), "MDSTOPO_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run():
+        done = subprocess.run([sys.executable, str(script)], capture_output=True, text=True, check=True, env=env)
+        return done.stdout.split()
+
+    assert run() == ["99.0", "0", "0", "False", "Optimised", "Left"]
+    for code in (tmp_path / "cache").rglob("*.code"):
+        code.unlink()
+    assert run()[:3] == ["99.0", "0", "1"]  # what a function calls comes with it
