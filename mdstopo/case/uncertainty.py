@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
@@ -245,9 +245,22 @@ def _scenarios(fields: Fields, root: Node, numbers: set[str], reading: Reading) 
             below = f"{settled}.", f"{settled}["
             for both in sorted(each for each in numbers if each == settled or each.startswith(below)):
                 reading.mistake(here, f"{both} has a distribution; it varies by itself or by scenario, not both")
+            _include(steps_of(key)[-1], value, reading)
             values[settled] = as_yaml(value)
         built.append(Scenario(name, share, FrozenDict(values)))
     return built
+
+
+def _include(key: str | int, value: Any, reading: Reading) -> None:
+    """Read the files that a scenario's value names: they are part of the case. What cannot be read is refused there."""
+    if key == "file" and isinstance(value, str):
+        reading.include(value)
+    if isinstance(value, Mapping):
+        for name, below in value.items():
+            _include(name, below, reading)
+    elif isinstance(value, Sequence) and not isinstance(value, str):
+        for below in value:
+            _include("", below, reading)
 
 
 def _settled(key: str, root: Node) -> str:

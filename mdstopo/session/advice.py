@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, Objective, ResponseRow, VolumeRow
+from mdstopo.session.engine import Evaluation
 from mdstopo.store.contents import Motion
 
 Floats = NDArray[np.float64]
@@ -44,6 +45,29 @@ def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapp
                 "if that matters, bound a displacement"
             )
     return tuple(found)
+
+
+def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
+    """Warnings about objectives that no design variable changes at the design that was found.
+
+    To the optimiser such a design is an optimum, whatever it is: acceleration at the start, before any member carries
+    something, or a response that `constant_load` holds.
+    """
+    weights = case.combine.weights if case.combine is not None else {}
+    told = []
+    for objective in case.objectives:
+        name = objective.name
+        slopes = [found.gradients.get(name), *getattr(found, "variable_gradients", {}).get(name, {}).values()]
+        value = found.objectives.get(name, 0.0)
+        if slopes[0] is None or any(np.any(each) for each in slopes) or value == 0.0 or weights.get(name, 1.0) == 0.0:
+            continue
+        time = found.peaks[name][0].time
+        where = "" if np.isnan(time) else f" at t = {time:.6g} s"
+        told.append(
+            f"no design variable changes {name} = {value:.6g}{where}, as the sensitivity method has it: "
+            "the optimiser had nothing to go by there"
+        )
+    return tuple(told)
 
 
 def is_held(case: Case, load_case: str) -> bool:

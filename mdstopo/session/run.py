@@ -17,7 +17,7 @@ from mdstopo.front.tasks import StoppedError
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
-from mdstopo.session.advice import advise
+from mdstopo.session.advice import advise, without_slope
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import Combining, even, problem_of
 from mdstopo.session.engine import Engine, MakeEngine, make_engine
@@ -333,6 +333,8 @@ class _Run:
             if not motion.status.ok:
                 self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
         self.warnings += advise(self.case, design, self.before, after)
+        if evaluation.status.usable:
+            self.warnings += without_slope(self.case, evaluation)
         by_variable = getattr(evaluation, "variable_gradients", {})
         self.finals = trajectory_part(after) | sensitivity_part(evaluation.gradients, by_variable=by_variable)
         if self.case.uncertainty is not None and evaluation.status.usable:

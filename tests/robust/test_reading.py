@@ -6,6 +6,7 @@ import re
 import pytest
 
 from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
 from mdstopo.case.uncertain import Measure, Normal
 from mdstopo.evaluators import evaluator_of
 from mdstopo.store.compare import describe, differences
@@ -254,3 +255,20 @@ def test_a_certain_case_is_described_as_before_and_the_section_is_compared():
     plain = read_case(json.dumps(scene()))
     assert "uncertainty" not in describe(plain)
     assert text(uncertain()) != json.dumps(scene())
+
+
+@pytest.mark.parametrize(
+    "stated",
+    [
+        {"loads[0].acceleration": [{"table": {"file": "wave.csv"}}, 0]},
+        {"loads[0].acceleration": [{"table": {"file": "missing.csv"}}, 0], "points.deck.grid.file": "wave.csv"},
+    ],
+)
+def test_files_that_scenarios_name_are_part_of_the_case(tmp_path, stated):
+    (tmp_path / "wave.csv").write_text("0, 1\n1, 2\n")
+    section = {"scenarios": {"calm": {}, "storm": {"set": stated}}}
+    case = read_case(text(section), path=tmp_path / "case.yaml")
+    assert list(case.files) == ["wave.csv"]
+    before = case.files["wave.csv"]
+    (tmp_path / "wave.csv").write_text("0, 1\n1, 3\n")
+    assert read_case(text(section), path=tmp_path / "case.yaml").files["wave.csv"] != before

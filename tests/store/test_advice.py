@@ -5,9 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mdstopo import optimize
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.session.advice import advise, is_held
+from mdstopo.session.advice import advise, is_held, without_slope
 from mdstopo.status import Status
 
 CASE = """
@@ -62,3 +63,48 @@ def test_a_displacement_that_is_bounded_from_below_or_maximised_holds_nothing() 
     assert not is_held(whole, "crash")
     assert is_held(case(more=LIMIT), "crash")
     assert not is_held(case(more=LIMIT), "drop")
+
+
+def found(slope: np.ndarray, value: float = 3.0, time: float = 0.25, **more: object) -> SimpleNamespace:
+    """An evaluation with one objective."""
+    peaks = {"G": (SimpleNamespace(time=time, value=value),)}
+    return SimpleNamespace(objectives={"G": value}, gradients={"G": slope}, peaks=peaks, **more)
+
+
+def test_an_objective_that_no_variable_changes_is_told_with_its_time() -> None:
+    (told,) = without_slope(case(), found(np.zeros(1)))
+    assert "no design variable changes G = 3 at t = 0.25 s" in told
+    (told,) = without_slope(case(), found(np.zeros(1), time=np.nan))
+    assert "changes G = 3," in told
+
+
+@pytest.mark.parametrize(
+    "what",
+    [
+        found(np.array([1e-9])),
+        found(np.zeros(1), value=0.0),
+        found(np.zeros(1), variable_gradients={"G": {"stiffness": np.array([2.0])}}),
+    ],
+    ids=["slope", "identically zero", "variable"],
+)
+def test_nothing_is_said_of_an_objective_that_something_changes_or_that_is_zero(what: SimpleNamespace) -> None:
+    assert without_slope(case(), what) == ()
+
+
+PUSHED = """
+format: 1
+time: {end: 1}
+bodies: {mass: {mass: 2, inertia: 1, position: [0, 1]}}
+members:
+  spring: {from: {body: ground, at: [0, 0]}, to: {body: mass, at: [0, 1]}, law: {type: spring, stiffness: 4}}
+loads: [{body: mass, force: [0, 6]}]
+objectives: {A: {response: {acceleration: {body: mass}}}}
+design: {initial: 0.5}
+optimizer: {max_iterations: 3}
+constraints: [{volume: all, limit: 1}]
+"""
+
+
+def test_a_run_whose_peak_is_at_the_start_where_no_member_carries_says_so() -> None:
+    warnings = optimize(read_case(PUSHED)).warnings
+    assert any("no design variable changes A = 3 at t = 0 s" in each for each in warnings)
