@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mdstopo.case.errors import Mistake
-from mdstopo.case.model import Case, CrushLaw, Law, Variable
+from mdstopo.case.model import Case
 from mdstopo.scene.family import beyond_springs
 
 #: methods of the general kernels
@@ -36,11 +36,15 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
         )
     if case.variables and solver.sensitivity not in BY_PARAMETERS:
         yield "solver.sensitivity", no_parameters(solver.sensitivity)
-    if solver.settle and any(isinstance(law, CrushLaw) for each in case.variables for law in _laws(case, each)):
+    if solver.settle and _of_crush(case):
         yield "solver.settle", "a start at rest gives no derivatives by parameters of crush; leave these variables out"
 
 
-def _laws(case: Case, variable: Variable) -> list[Law]:
-    """The laws that a variable belongs to."""
-    groups = {group.name: group for group in case.members}
-    return [groups[name].laws[place] for name, place in zip(variable.groups, variable.laws, strict=True)]
+def _of_crush(case: Case) -> bool:
+    """Whether a parameter of `crush` is a variable."""
+    laws = {group.name: group.laws for group in case.members}
+    return any(
+        laws[name][place].type == "crush"
+        for each in case.variables
+        for name, place in zip(each.groups, each.laws, strict=True)
+    )
