@@ -24,7 +24,7 @@ from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
 
 #: peaks kept of one response
@@ -59,6 +59,8 @@ class GeneralDriver:
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
         varied = 0 if self._placing is None else len(self._placing.initial)
         self._alpha = np.zeros(n_design)
+        #: of the laws' variables; none before the first design
+        self._values = np.zeros(0)
         self.strength = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
         self.rows = np.zeros((count, ROWS, COLUMNS))
@@ -80,6 +82,11 @@ class GeneralDriver:
     def alpha(self) -> FloatArray:
         """(N,) of the design that was last taken."""
         return self._alpha
+
+    @property
+    def values(self) -> FloatArray:
+        """(P,) of the laws' variables in the design that was last taken."""
+        return self._values
 
     @property
     def entry(self) -> Any:
@@ -129,7 +136,7 @@ class GeneralDriver:
         self.moved = float(np.abs(q - model.q0).max())
         if move:
             self._start = q, v
-            self._place(np.zeros(0))
+            self._place()
 
     def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
@@ -236,28 +243,29 @@ class GeneralDriver:
             self.padded, out, start, self.work,
         )  # fmt: skip
         if self.start is not None and gradient:
-            self.start.pull(self._alpha, start, out)
+            self.start.pull(start, out)
         return total
 
-    def start_from(self, ints: IndexArray, floats: FloatArray) -> None:
-        """Take another start, packed."""
-        self._packed = self.ints, self.floats = ints, floats
+    def start_from(self, q: FloatArray) -> None:
+        """Take other positions q (n,) at the start."""
+        self._packed = self.ints, self.floats = pack_general(self._model._replace(q0=q))
 
     def start_slopes(self) -> FloatArray:
-        """(M_padded, n): derivatives of the start's positions by alpha^mu; no rows where it is as stated."""
-        return np.zeros((0, 0)) if self.start is None else self.start.slopes(self._alpha)
+        """(M_padded + P, n): derivatives of the start's positions by alpha^mu and values; no rows where it is as
+        stated."""
+        return np.zeros((0, 0)) if self.start is None else self.start.slopes()
 
-    def settle(self, alpha: FloatArray) -> bool:
-        """Put the start at rest with alpha (N,) where the case asks for it; False where that is not possible."""
-        return self.start is None or self.start.move(alpha)
+    def settle(self, design: FloatArray) -> bool:
+        """Take a design (`take`) and put the start at rest where the case asks for it; False where that cannot be."""
+        self.take(design)
+        return self.start is None or self.start.move()
 
     def run(self, alpha: FloatArray, tangent: bool, landings: Sequence[float] = ()) -> tuple[int, int, float]:
         """Simulate a design (as of `take`) into the driver's own room: code, number of steps, time reached.
 
         landings: times at which steps are to end, beside those of the model.
         """
-        self.take(alpha)
-        if self.start is not None and not self.start.move(self._alpha):
+        if not self.settle(alpha) and self.start is not None:
             self.room[0], self._message = self.scene.model.times[0], self.start.message
             return UNSETTLED, 0, float(self.room[0])
         self.ints, self.floats = pack_general(landed(self._with_start(), landings)) if landings else self._packed
@@ -283,7 +291,7 @@ class GeneralDriver:
         """Fastest vibration at the start, rad/s, with the design of the last run."""
         from mdstopo.general.vibration import natural_frequencies
 
-        return float(natural_frequencies(self, self._alpha).max(initial=0.0))
+        return float(natural_frequencies(self, np.concatenate([self._alpha, self._values])).max(initial=0.0))
 
     @property
     def message(self) -> str:
@@ -295,13 +303,16 @@ class GeneralDriver:
         n = len(self._alpha)
         self._alpha[:] = design[:n]
         if self._placing is not None:
-            self._place(design[n:] if len(design) > n else self._placing.initial)
+            values = design[n:] if len(design) > n else self._placing.initial
+            if not np.array_equal(values, self._values):
+                self._values = values.copy()
+                self._place()
 
-    def _place(self, values: FloatArray) -> None:
-        """The model at values of variables (P,), packed."""
+    def _place(self) -> None:
+        """The model at the present values of variables, packed."""
         q0, v0 = self._start
         model = self.scene.model._replace(q0=q0, v0=v0)
-        self._model = model if self._placing is None or not len(values) else self._placing.at(model, values)
+        self._model = model if self._placing is None or not len(self._values) else self._placing.at(model, self._values)
         self._packed = self.ints, self.floats = pack_general(self._model)
 
     def _with_start(self) -> GeneralModel:

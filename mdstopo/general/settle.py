@@ -1,10 +1,11 @@
 """The static equilibrium near the stated configuration, where a case begins with `settle`.
 
-    F(q, v = 0, t0, alpha) - Phi_q^T lam = 0,   Phi(q) = 0
+    F(q, v = 0, t0, alpha, p) - Phi_q^T lam = 0,   Phi(q) = 0
 
 is found by pseudo-dynamics: implicit steps of M q' = F on the joints, whose length grows as what is left of the force
 falls, until they are Newton's. They run downhill where there is an energy, so a stable equilibrium is found, and the
-nearest in that sense. It depends on the design by K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
+nearest in that sense. It depends on the design, alpha and the values p of laws' variables, by K dq + Phi_q^T dlam = dF,
+Phi_q dq = 0: `inverse` is that linear map.
 Every search begins at the stated configuration, whatever was found before.
 """
 
@@ -51,7 +52,10 @@ class Settled:
 
 
 def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
-    """The equilibrium of alpha (N,) from q0 (n,), or in words why there is none; size: of the scene, m."""
+    """The equilibrium of alpha (N,) from q0 (n,), with the laws as the driver has packed them; or why there is none.
+
+    size: of the scene, m.
+    """
     scene = _AtRest(driver, alpha, size)
     q = q0.copy()
     scene.at(q)

@@ -7,8 +7,10 @@ from mdstopo.general.direct import own_force
 from mdstopo.general.forces import drive_state, general_forces
 from mdstopo.general.members import scale_general, set_modes
 from mdstopo.general.model import INERTER, unpack_general
+from mdstopo.general.parameters import parameter_slopes
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.laws.table import FREE_LENGTH
 
 
 @kernel
@@ -82,3 +84,30 @@ def unit_forces(ints, floats, alpha, strength, q, out):  # type: ignore[no-untyp
             f = own_force(model, k, i, np.int64(0), model.times[0], strength, q, v, v, row, row_rate)
             for r in range(6):
                 out[i, 3 * model.pair[p, r // 3] + r % 3] -= f * row[r]
+
+
+@entry
+def value_forces(ints, floats, alpha, strength, q, out):  # type: ignore[no-untyped-def]
+    """out (P, n) = dF/dp by each value of the laws' variables at rest at q (n,): -sum s f_p B^T over its members.
+
+    By times at which laws begin or end to act there is none, nor by what multiplies rates.
+    """
+    model = unpack_general(ints, floats)
+    n = model.mass.shape[0]
+    start = np.int64(0)
+    v = np.zeros(n)
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    rest(model, alpha, strength, q, v)
+    out[:] = 0.0
+    for e in range(model.varied.shape[0]):
+        k = model.varied[e, 0]
+        place = model.varied[e, 1]
+        if place > FREE_LENGTH or model.active[0, k] == 0 or model.block[k, 3] == INERTER:
+            continue
+        p = model.block[k, 0]
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            slope, _ = parameter_slopes(model, k, i, place, start, model.times[0], strength, q, v, v, row, row_rate)
+            slope *= strength[0, i]
+            for r in range(6):
+                out[model.varied[e, 2], 3 * model.pair[p, r // 3] + r % 3] -= slope * row[r]

@@ -1,7 +1,14 @@
 """Where the motion of a general scene starts: as stated, or at rest where the case asks for `settle`.
 
-A start at rest depends on the design. So its cotangent, which the reverse sweep leaves, is pulled through the
-equilibrium (`settle.Settled.inverse`), and the direct method begins with its derivatives.
+A start at rest depends on the design: on alpha, and on the values p of laws' variables. With A = K^-1, joints included
+(`settle.Settled.inverse`), and the forces' own derivatives at rest, as they are in every balance (`parameters`),
+
+    dq0/d(alpha_i^mu) = -A B_i^T f_i,     dq0/dp = -A sum s B^T f_p.
+
+So the cotangent that the reverse sweep leaves is pulled through the equilibrium, A^T, once for all of them, and the
+direct method begins with these columns. What depends on rates has no part in it: f_p of a damping is 0 at rest. A law
+takes part if it acts at the start, so no time at which one begins or ends to act moves the equilibrium until it crosses
+the start, where the equilibrium jumps.
 """
 
 from typing import TYPE_CHECKING
@@ -10,9 +17,9 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.general.model import COUNT, DESIGN, START, pack_general
+from mdstopo.general.model import COUNT, DESIGN, START
 from mdstopo.mechanics.joints.table import describe
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
@@ -28,68 +35,89 @@ class SettledStart:
     def __init__(self, driver: "GeneralDriver") -> None:
         n = len(driver.scene.model.mass)
         self._driver = driver
-        self._stated: FloatArray = driver.floats[n : 3 * n].copy()
+        self._stated: FloatArray = driver.floats[n : 2 * n].copy()
         self._design: bytes | None = None
         self.settled: Settled | None = None
         self.message = ""
         self._refuse()
 
-    def move(self, alpha: FloatArray) -> bool:
-        """Put the driver's start where it is at rest with alpha (N,); False where there is no such place nearby."""
-        if self._design == alpha.tobytes():
+    def move(self) -> bool:
+        """Put the driver's start where it is at rest with its present design; False where there is no place nearby."""
+        driver = self._driver
+        design = driver.alpha.tobytes() + driver.values.tobytes()
+        if self._design == design:
             return True
         from mdstopo.general.settle import settle
 
-        driver, n = self._driver, len(self._stated) // 2
         self._design = None
-        ints, floats = pack_general(driver.scene.model)
-        floats[n : 3 * n] = self._stated
-        driver.start_from(ints, floats)
-        found = settle(driver, alpha.copy(), self._stated[:n], size_of(driver.case))
+        driver.start_from(self._stated)
+        found = settle(driver, driver.alpha.copy(), self._stated, size_of(driver.case))
         if isinstance(found, str):
             self.message = found
             return False
         self.settled = found
-        floats[n : 2 * n] = found.q
-        self._design = alpha.tobytes()
+        driver.start_from(found.q)
+        self._design = design
         return True
 
-    def slopes(self, alpha: FloatArray) -> FloatArray:
-        """(M_padded, n): derivatives of the start's positions by each alpha^mu."""
+    def slopes(self) -> FloatArray:
+        """(M_padded + P, n): derivatives of the start's positions by each alpha^mu, then by each value."""
         assert self.settled is not None
-        slopes: FloatArray = np.ascontiguousarray(self._unit_forces(alpha) @ self.settled.inverse.T)
+        forces = self._unit_forces()
+        if len(self._driver.values):
+            forces = np.concatenate([forces, self._value_forces()])
+        slopes: FloatArray = np.ascontiguousarray(forces @ self.settled.inverse.T)
         return slopes
 
-    def pull(self, alpha: FloatArray, start: FloatArray, out: FloatArray) -> None:
-        """out (N,) += what the start's positions, with cotangents start (n,), have of the derivative by alpha (N,)."""
+    def pull(self, start: FloatArray, out: FloatArray) -> None:
+        """out (N + P,) += what the start's positions, with cotangents start (n,), have of the design's derivative."""
         assert self.settled is not None
-        model = self._driver.scene.model
-        padded = self._unit_forces(alpha) @ (self.settled.inverse.T @ start)
+        driver = self._driver
+        model, alpha = driver.scene.model, driver.alpha
+        pulled = self.settled.inverse.T @ start
+        padded = self._unit_forces() @ pulled
         for block, mu in zip(model.block.tolist(), model.power.tolist(), strict=True):
             first, count, at = block[DESIGN], block[COUNT], block[START]
             if first >= 0:
                 out[first : first + count] += mu * alpha[first : first + count] ** (mu - 1.0) * padded[at : at + count]
+        if len(driver.values):
+            out[len(alpha) :] += self._value_forces() @ pulled
 
-    def _unit_forces(self, alpha: FloatArray) -> FloatArray:
+    def _unit_forces(self) -> FloatArray:
         """(M_padded, n): what each design member's alpha^mu adds to the forces at rest."""
         from mdstopo.general.settle_entry import unit_forces
 
+        out = np.zeros((self._driver.scene.model.member.shape[1], len(self._stated)))
+        ints, floats, alpha, strength, q = self._at_rest()
+        unit_forces(ints, floats, alpha, strength, q, out)
+        return out
+
+    def _value_forces(self) -> FloatArray:
+        """(P, n): what each value of a law's variable adds to the forces at rest."""
+        from mdstopo.general.settle_entry import value_forces
+
+        out = np.zeros((len(self._driver.values), len(self._stated)))
+        ints, floats, alpha, strength, q = self._at_rest()
+        value_forces(ints, floats, alpha, strength, q, out)
+        return out
+
+    def _at_rest(self) -> tuple[IndexArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        """The packed scene, alpha (N,), room for the members' strengths, and the equilibrium (n,)."""
         assert self.settled is not None
         driver = self._driver
-        out = np.zeros((driver.scene.model.member.shape[1], len(driver.scene.model.mass)))
-        unit_forces(driver.ints, driver.floats, alpha, np.zeros_like(driver.strength), self.settled.q.copy(), out)
-        return out
+        return driver.ints, driver.floats, driver.alpha, np.zeros_like(driver.strength), self.settled.q.copy()
 
     def _refuse(self) -> None:
         """Refuse a case whose initial design has nowhere to settle, or whose start velocities do not fit there."""
         driver, problem = self._driver, ""
         case, scene = driver.case, driver.scene
-        if not self.move(np.array(case.initial)):
+        driver.take(case.start)
+        if not self.move():
             problem = self.message
         elif len(scene.model.joint):
             from mdstopo.general.start_entry import assemble
 
-            n, count = len(self._stated) // 2, len(scene.model.joint)
+            n, count = len(self._stated), len(scene.model.joint)
             rates = np.zeros((count, 3))
             q, v = driver.floats[n : 2 * n].copy(), driver.floats[2 * n : 3 * n].copy()
             assemble(driver.ints, driver.floats, q, v, False, np.zeros((count, 3)), rates)

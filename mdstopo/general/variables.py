@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import Case, CurveLaw, Law, LoadCase, MemberGroup, PulseLaw, Variable
+from mdstopo.case.laws import ActuatorLaw, InerterLaw
+from mdstopo.case.model import Case, CurveLaw, Law, LoadCase, MemberGroup, PulseLaw, SpringLaw, Variable
 from mdstopo.general.kinks import landed
 from mdstopo.general.model import COUNT, GROUP, START, GeneralModel
 from mdstopo.integrators.choice import choose
@@ -42,6 +43,18 @@ def lasting(case: Case, group: MemberGroup) -> list[Law]:
             without["rate"] = 0.0
         found.append(replace(law, **without) if without else law)
     return found
+
+
+def carries(law: Law) -> bool:
+    """Whether a law may hold something at rest."""
+    match law:
+        case InerterLaw():
+            return False
+        case SpringLaw():
+            return law.stiffness != 0.0 or law.preload != 0.0
+        case ActuatorLaw():
+            return law.proportional != 0.0
+    return True
 
 
 def _blocks(case: Case, block: IndexArray) -> dict[tuple[str, int], list[int]]:
@@ -80,6 +93,7 @@ class Placing:
 
     def __init__(self, case: Case, load_case: LoadCase, model: GeneralModel) -> None:
         self._load_case = load_case
+        self._settles = case.solver.settle
         self._fine = choose(case.solver, "laws")[0] == "generalized_alpha"
         #: block -> its law, and which value each parameter takes
         self._taken: dict[int, tuple[Law, dict[str, int]]] = {}
@@ -100,6 +114,7 @@ class Placing:
         start, end = self._load_case.start, self._load_case.end
         times: set[float] = set()
         acts: dict[int, tuple[float, float]] = {}
+        held: set[int] = set()
         for k, (record, taken) in self._taken.items():
             changed = {name: float(values[c]) for name, c in taken.items()}
             now = replace(record, **changed)
@@ -113,6 +128,8 @@ class Placing:
                 begin = -np.inf if now.active_from is None else now.active_from
                 until = np.inf if now.active_until is None else now.active_until
                 acts[k] = begin, until
+                if self._settles and carries(now):
+                    held.add(k)
         model = landed(model._replace(law=law, member=member), sorted(times))
         if not acts:
             return model
@@ -122,5 +139,7 @@ class Placing:
             active[:, k] = (middle > begin) & (middle < until)
         for row in varied:
             begin, until = acts.get(int(row[0]), (np.nan, np.nan))
-            row[3] = (row[1] == laws.ACTIVE_FROM and begin == start) or (row[1] == laws.ACTIVE_UNTIL and until == end)
+            # what holds at rest cannot begin later than the start without another equilibrium: only earlier
+            begins = begin == start and int(row[0]) not in held
+            row[3] = (row[1] == laws.ACTIVE_FROM and begins) or (row[1] == laws.ACTIVE_UNTIL and until == end)
         return model._replace(active=active, varied=varied)

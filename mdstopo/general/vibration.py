@@ -21,9 +21,8 @@ def natural_frequencies(driver: "GeneralDriver", alpha: FloatArray) -> FloatArra
     n = len(model.mass)
     stiffness, mass = np.zeros((n, n)), np.zeros((n, n))
     rows = np.zeros((int(model.size[0]), n))
-    driver.settle(alpha)
     driver.strength[:] = 0.0
-    driver.take(alpha)
+    driver.settle(alpha)
     linearise(driver.ints, driver.floats, driver.alpha.copy(), driver.strength, stiffness, mass, rows)
     free = np.flatnonzero(model.free)
     k, m, j = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], rows[:, free]
