@@ -23,6 +23,7 @@ PARAMETERS = {
     "pulse": ("peak", "rate", "time", *_ALWAYS),
     "table": _ALWAYS,
     "actuator": ("proportional", "derivative", "target", "limit", *_ALWAYS),
+    "crush": ("stiffness", "force", "gap", "free_length", *_ALWAYS),
     "inerter": ("inertance", *_ALWAYS),
 }
 

@@ -37,8 +37,8 @@ def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, 
     """Pull cotangents behind the events of a state back to before them (saltation), in place.
 
     bar_set (slots,): those of the sets (`crush`). drops (E,): by how much an integrand falls at each event
-    (`event_drops`), or no rows. out (M_padded + P,): what parameters do to the events' times is added to it, behind the
-    members.
+    (`event_drops`), or no rows. out (M_padded + P,): what parameters do to the events' times and to the sets made there
+    is added to it, behind the members.
     """
     last = track.index[state, 3]
     first = track.index[state - 1, 3] if state > 0 else last
@@ -59,7 +59,7 @@ def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, 
                 lam_q[d] -= drops[e] * track.salt[e, 0, d]
                 lam_v[d] -= drops[e] * track.salt[e, 1, d]
         if bar_set.shape[0] > 0:
-            sets_back(model, track, e, bar_set, lam_q)
+            sets_back(model, track, e, bar_set, lam_q, out)
             time_back(model, track, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), bar_set)
     free_only(model, lam_q)
     free_only(model, lam_v)
@@ -123,7 +123,7 @@ def row_gradient(tag, model, tables, strength, track, count, j, row, desk, start
             tag, model, tables, strength, track, count, w, c, bars[0], bars[1], bar_set, none, no_rows, no_rows,
             no_drops, np.int64(-1), np.bool_(False), desk, out, work,
         )  # fmt: skip
-    keep_start(model, track, bars[0], bar_set, start)
+    keep_start(model, track, bars[0], bar_set, start, out)
 
 
 @kernel
@@ -230,7 +230,7 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
             tag, model, tables, strength, track, count, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar,
             drops, j, square, desk, out, work,
         )  # fmt: skip
-        keep_start(model, track, lam_q, bar_set, start)
+        keep_start(model, track, lam_q, bar_set, start, out)
     return total
 
 
@@ -367,7 +367,9 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
         segment = track.index[w, 2]
         weights_of(tag, model, tables, track, w, weight)
         o = track.index[w, 0]
-        inside = o + (track.index[w + 1, 0] - o) // 2
+        stages = track.index[w + 1, 0] - o
+        # a step with one stage, at its end, has begun where the one before has ended
+        inside = o + stages // 2 if stages > 1 else o - 1
         if bends:
             size, mine = at_stage(model, strength, segment, track, inside, j, -1, desk, slopes, rows)
         for i in range(track.index[w + 1, 0] - o):

@@ -9,6 +9,9 @@ from every stage with its virtual displacement z. At the event p = Delta(q(t_e))
 of the event adds nothing and dp = B dq. Before it the member carried its plateau, which no set changes. The time at
 which a member reaches its plateau, or loses contact, depends on its set as well: dt_e = -(s_q dq + s_v dv + s_p dp)/s'.
 
+A parameter of the law stands in that constant too: the set begins with the parameter's own slope, `law_set_slope`, and
+one that is made where the law begins to act (`active_from`) moves along the motion with that time.
+
 Sets are counted through the blocks of the law, in their order: slots.
 """
 
@@ -20,7 +23,7 @@ from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.crush import CRUSHING, ELASTIC
-from mdstopo.mechanics.laws.table import CRUSH, law
+from mdstopo.mechanics.laws.table import ACTIVE_FROM, CRUSH, FREE_LENGTH, law, law_set_slope
 
 
 @kernel
@@ -142,31 +145,73 @@ def time_forward(model, track, e, sets, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sets_back(model, track, e, bar, lam_q):  # type: ignore[no-untyped-def]
-    """Behind event e the cotangent of the set that it made, bar (slots,), becomes one of the pose, lam_q (n,)."""
+def own_slope(model, track, e, entry, rate):  # type: ignore[no-untyped-def]
+    """Slope of the set that event e has made by the parameter of an entry of `varied`; rate: dDelta/dt there."""
+    place = model.varied[entry, 1]
+    k = model.varied[entry, 0]
+    if place <= FREE_LENGTH:
+        return law_set_slope(model.block[k, 3], model.law[k], place)
+    if place != ACTIVE_FROM:
+        return 0.0
+    state = track.event[e, 0]
+    begins = model.active[track.index[state - 1, 2], k] == 0 if state > 0 else model.varied[entry, 3] != 0
+    return rate if begins else 0.0
+
+
+@kernel
+def begins_at_plateau(model, strength, q, v, near):  # type: ignore[no-untyped-def]
+    """A member (padded) with parameters that vary which begins within `near` (m) of its plateau and moves back, or -1.
+
+    It has a set that depends on them on one side only.
+    """
+    row = np.empty(6)
+    row_rate = np.empty(6)
+    for e in range(model.varied.shape[0]):
+        k = model.varied[e, 0]
+        if model.block[k, 3] != CRUSH or model.varied[e, 1] > FREE_LENGTH or model.active[0, k] == 0:
+            continue
+        p = model.law[k]
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            if strength[0, i] == 0.0 or int(strength[1, i]) != ELASTIC:
+                continue
+            x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+            if p[3] * rate <= 0.0 and abs(p[3] * x - p[2] - p[1] / p[0]) <= near:
+                return i
+    return -1
+
+
+@kernel
+def sets_back(model, track, e, bar, lam_q, out):  # type: ignore[no-untyped-def]
+    """Behind event e the cotangent of the set that it made, bar (slots,), becomes one of the pose, lam_q (n,), and of
+    what parameters do to it, out (M_padded + P,) behind the members.
+    """
     slot, k = made_set(model, track, e)
     if slot < 0:
         return
     row = np.empty(6)
     row_rate = np.empty(6)
     state = track.state[track.event[e, 0]]
-    member_rows(model, model.block[k, 0], track.event[e, 1], state[0], state[1], row, row_rate)
+    _, rate = member_rows(model, model.block[k, 0], track.event[e, 1], state[0], state[1], row, row_rate)
+    for entry in range(model.varied.shape[0]):
+        if model.varied[entry, 0] == k:
+            own = own_slope(model, track, e, entry, rate)
+            out[model.member.shape[1] + model.varied[entry, 2]] += bar[slot] * own
     for r in range(6):
         lam_q[3 * model.pair[model.block[k, 0], r // 3] + r % 3] += bar[slot] * row[r]
     bar[slot] = 0.0
 
 
 @kernel
-def keep_start(model, track, lam_q, bar, start):  # type: ignore[no-untyped-def]
+def keep_start(model, track, lam_q, bar, start, out):  # type: ignore[no-untyped-def]
     """start (n,) = the cotangents lam_q of the start's positions, with those of the sets that members begin with.
 
-    Nothing where start has no length.
+    Nothing where start has no length. out: as of `sets_back`.
     """
-    if start.shape[0] == 0:
+    if start.shape[0] == 0 and model.varied.shape[0] == 0:
         return
     if bar.shape[0] > 0:
         for e in range(track.index[0, 3]):
-            sets_back(model, track, e, bar, lam_q)
+            sets_back(model, track, e, bar, lam_q, out)
     for d in range(start.shape[0]):
         start[d] = lam_q[d]
 
@@ -180,11 +225,14 @@ def sets_forward(model, track, e, column, sets):  # type: ignore[no-untyped-def]
     row = np.empty(6)
     row_rate = np.empty(6)
     state = track.state[track.event[e, 0]]
-    member_rows(model, model.block[k, 0], track.event[e, 1], state[0], state[1], row, row_rate)
+    _, rate = member_rows(model, model.block[k, 0], track.event[e, 1], state[0], state[1], row, row_rate)
     for i in range(column.shape[0]):
         sets[slot, i] = 0.0
         for r in range(6):
             sets[slot, i] += row[r] * column[i, 3 * model.pair[model.block[k, 0], r // 3] + r % 3]
+    for entry in range(model.varied.shape[0]):
+        if model.varied[entry, 0] == k:
+            sets[slot, model.member.shape[1] + model.varied[entry, 2]] += own_slope(model, track, e, entry, rate)
 
 
 @kernel

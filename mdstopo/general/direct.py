@@ -237,11 +237,14 @@ def jump(model, track, strength, count, state, column, sets, drops, j, square): 
 
 @kernel
 def begin(model, track, first, column, sets):  # type: ignore[no-untyped-def]
-    """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows)."""
+    """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows).
+
+    The sets that members begin with depend on parameters besides.
+    """
     for i in range(first.shape[0]):
         for d in range(first.shape[1]):
             column[i, d] = first[i, d]
-    if first.shape[0] > 0 and sets.shape[0] > 0:
+    if (first.shape[0] > 0 or model.varied.shape[0] > 0) and sets.shape[0] > 0:
         for e in range(track.index[0, 3]):
             sets_forward(model, track, e, column, sets)
 

@@ -13,6 +13,7 @@ is left of the segment is divided anew.
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.forces import drive_state
 from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
@@ -91,6 +92,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t
+        if model.varied.shape[0] > 0:
+            where[2] = begins_at_plateau(model, strength, q, v, graze)
     singular = balance(model, strength, np.int64(0), t, q, v, np.bool_(True), desk, a0, lam)
     if singular >= 0:
         where[0] = singular

@@ -52,6 +52,7 @@ def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row
             value += row[r] * a[first + r if r < 3 else second + r - 3]
         return value, 0.0
     x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
+    x -= strength[2, i]
     level = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
     return law_slopes(model.block[k, 3], model.law[k], place, x, rate, int(strength[1, i]), t, level, model.curves)
 
@@ -117,6 +118,7 @@ def event_slope(model, track, strength, event, e):  # type: ignore[no-untyped-de
     row = np.empty(6)
     row_rate = np.empty(6)
     x, rate = member_rows(model, model.block[k, 0], who, q, v, row, row_rate)
+    x -= track.kept[event, 0]
     code = model.block[k, 3]
     mode = int(track.event[event, 2])
     by_p = law_margin_slope(code, model.law[k], place, x, rate, mode)

@@ -8,6 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale
 from mdstopo.general.forces import drive_state, pose_acceleration
@@ -231,6 +232,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t
+        if model.varied.shape[0] > 0:
+            where[2] = begins_at_plateau(model, strength, q0, v0, graze)
     singular = balance(model, strength, np.int64(0), t, q0, v0, np.bool_(True), desk, a0, lam)
     work[FORCES] += 1
     if singular >= 0:

@@ -253,6 +253,18 @@ def test_generalized_alpha_gives_the_gradient_to_its_own_order():
     assert np.max(errors[1]) < np.max(errors[0]) / 3.0
 
 
+def test_generalized_alpha_gives_the_impulse_of_a_leg_that_is_left_to_its_own_order():
+    """A step of one stage that ends where contact is lost: the force there is none, and its slope that of before."""
+    text, alpha = one(end=0.35), np.array([0.9])
+    exact = mdstopo.evaluate(read_case(text, overrides={"solver.tolerance": "1e-11"}), alpha).gradients["I"][0]
+    errors = []
+    for step in ("1e-3", "2.5e-4"):
+        case = read_case(text, overrides={"solver.integrator": "generalized_alpha", "solver.step": step})
+        errors.append(abs(mdstopo.evaluate(case, alpha).gradients["I"][0] - exact) / abs(exact))
+    assert errors[0] < 1e-2
+    assert errors[1] < errors[0] / 8.0
+
+
 def test_the_impulse_of_one_leg_is_that_of_the_momentum_in_value_and_slope():
     case = read_case(one(), overrides={"solver.tolerance": "1e-11"})
     found = mdstopo.evaluate(case, np.array([0.9]))

@@ -60,6 +60,14 @@ LAWS = {
         "{type: actuator, proportional: 80, derivative: 5, target: 0.03, limit: 8}",
         {"proportional": (80, 10, 100), "derivative": (5, 0, 9), "target": (0.03, -1, 1), "limit": (8, 1, 20)},
     ),
+    "crush": (
+        "{type: crush, stiffness: 300, force: 8, gap: 0.1}",
+        {"stiffness": (300, 10, 1000), "force": (8, 1, 20), "gap": (0.1, 0, 0.3), "free_length": (0.9, 0.5, 1)},
+    ),
+    "drawn": (  # crushed from the start
+        "{type: crush, side: tension, stiffness: 200, force: 6, gap: -0.1}",
+        {"stiffness": (200, 10, 1000), "force": (6, 1, 20), "gap": (-0.1, -0.3, 0.1), "free_length": (0.9, 0.5, 1)},
+    ),
     "inerter": ("{type: inerter, inertance: 1.5}", {"inertance": (1.5, 0, 3)}),
 }
 TIMES = {"active_from": (0.15, 0, 0.5), "active_until": (0.4, 0, 0.6)}
@@ -68,10 +76,11 @@ TIMED = {
     "gap": GAP.replace("gap: 0.1", "gap: 0.05, active_from: 0.15, active_until: 0.3"),
     "table": "{type: table, table: [[0, 10], [0.6, -20]], active_from: 0.15, active_until: 0.4}",
     "inerter": "{type: inerter, inertance: 1.5, active_from: 0.15, active_until: 0.4}",
+    "crush": "{type: crush, stiffness: 300, force: 8, gap: 0.05, active_from: 0.15, active_until: 0.4}",
 }
 SLIDE = "joints: [{type: prismatic, bodies: [ground, m], at: [0, 0], axis: [0.8, 0.3]}]"
 #: laws that switch: generalized_alpha differentiates the time of that as the motion does, not as its steps do
-SWITCHING = {"gap", "clipped", "actuator"}
+SWITCHING = {"gap", "clipped", "actuator", "crush", "drawn"}
 
 
 def case_of(law, parameters, jointed=False, **solver):
@@ -117,7 +126,7 @@ def check(case, bound, size=3e-4):
 
 
 def test_no_law_of_the_format_is_left_out():
-    parts = {"clipped": "gap"}
+    parts = {"clipped": "gap", "drawn": "crush"}
     seen: dict[str, set[str]] = {}
     for name, (_, parameters) in LAWS.items():
         seen.setdefault(parts.get(name, name), set()).update(parameters)

@@ -47,6 +47,43 @@ def crush_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
+def crush_slopes(p, slot, x, mode):  # type: ignore[no-untyped-def]
+    """df/dp, dV/dp at a fixed set."""
+    if mode == OPEN:
+        return 0.0, 0.0
+    if mode == CRUSHING:
+        if slot == 1:
+            return p[3], p[1] / p[0]
+        return 0.0, (-0.5 * p[1] * p[1] / (p[0] * p[0]) if slot == 0 else 0.0)
+    y = p[3] * x - p[2]
+    if slot == 0:
+        return p[3] * y, 0.5 * y * y
+    return (-p[3] * p[0], -p[0] * y) if slot == 2 else (0.0, 0.0)
+
+
+@inline
+def crush_margin_slope(p, slot, x, mode):  # type: ignore[no-untyped-def]
+    """Slope of the margin by a parameter, at a fixed set."""
+    if mode == CRUSHING:
+        return 0.0
+    if mode == OPEN:
+        return 1.0 if slot == 2 else 0.0
+    if p[3] * x - p[2] <= 0.5 * p[1] / p[0]:
+        return -1.0 if slot == 2 else 0.0
+    if slot == 2:
+        return 1.0
+    return 1.0 / p[0] if slot == 1 else -p[1] / (p[0] * p[0])
+
+
+@inline
+def crush_set_slope(p, slot):  # type: ignore[no-untyped-def]
+    """Slope by a parameter of the set that `crush_set` or `crush_first_set` makes at a given elongation."""
+    if slot == 2:
+        return -p[3]
+    return -p[3] / p[0] if slot == 1 else p[3] * p[1] / (p[0] * p[0])
+
+
+@inline
 def crush_next(p, x, mode):  # type: ignore[no-untyped-def]
     """The mode to go to where this one's margin is negative; the force is continuous, so there is no second look."""
     if mode != ELASTIC:

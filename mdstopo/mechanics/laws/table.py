@@ -35,9 +35,12 @@ from mdstopo.mechanics.laws.crush import (
     crush_force,
     crush_grazes,
     crush_margin,
+    crush_margin_slope,
     crush_margin_slopes,
     crush_next,
     crush_set,
+    crush_set_slope,
+    crush_slopes,
     crush_start,
 )
 from mdstopo.mechanics.laws.cubic import cubic_force, cubic_slopes
@@ -79,7 +82,7 @@ PLACES = {
     "pulse": {"peak": 0, "rate": 1, "time": 2},
     "table": {},
     "actuator": {"proportional": 0, "derivative": 1, "target": 2, "limit": 3},
-    "crush": {},
+    "crush": {"stiffness": 0, "force": 1, "gap": 2},
     "inerter": {"inertance": 0},
 }
 FREE_LENGTH, ACTIVE_FROM, ACTIVE_UNTIL = range(PARAMETERS, PARAMETERS + 3)
@@ -124,6 +127,8 @@ def law_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[n
         return pulse_slopes(p, place, t)
     if code == ACTUATOR:
         return actuator_slopes(p, place, x, xd, mode)
+    if code == CRUSH:
+        return crush_slopes(p, place, x, mode)
     return np.nan, np.nan
 
 
@@ -137,6 +142,8 @@ def law_margin_slope(code, p, place, x, xd, mode):  # type: ignore[no-untyped-de
         return gap_margin_slope(p, place, x, xd, mode)
     if code == ACTUATOR and p[3] > 0.0:
         return actuator_margin_slope(p, place, x, xd, mode)
+    if code == CRUSH:
+        return crush_margin_slope(p, place, x, mode)
     return 0.0
 
 
@@ -202,6 +209,17 @@ def law_set(code, p, x, old, new):  # type: ignore[no-untyped-def]
 def law_first_set(code, p, x, mode):  # type: ignore[no-untyped-def]
     """The permanent set of a member that begins in a mode."""
     return crush_first_set(p, x, mode) if code == CRUSH else 0.0
+
+
+@inline
+def law_set_slope(code, p, place):  # type: ignore[no-untyped-def]
+    """Slope of a permanent set, where it is made, by the parameter at a place of the law's row, or by the free length.
+
+    At fixed places of the member's ends.
+    """
+    if code != CRUSH:
+        return 0.0
+    return -1.0 if place == FREE_LENGTH else crush_set_slope(p, place)
 
 
 @inline
