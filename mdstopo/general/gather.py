@@ -6,7 +6,7 @@ from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
-from mdstopo.general.responses import MEMBER_FORCE
+from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
@@ -60,26 +60,32 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # 
     """
     if model.response[j, 0] != MEMBER_FORCE:
         return
-    _laws_force(model, segment, j, who, t, strength, q, v, a, scale, out)
+    _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out)
     if model.varied.shape[0] > 0:
         add_force_parameters(model, segment, model.response[j, 5], who, t, strength, q, v, a, scale, out)
 
 
 @kernel
 def force_sign(model, segment, j, who, t, strength, q, v, a):  # type: ignore[no-untyped-def]
-    """The sign of f* where g_j is the force of member `who`; else 1."""
+    """The sign of f* where g_j is the force of member `who`; else 1.
+
+    It is that of the very number that `response` takes the absolute value of: near zero another formula for the same
+    force may have the other sign.
+    """
     if model.response[j, 0] != MEMBER_FORCE:
         return 1.0
-    return 1.0 if _laws_force(model, segment, j, who, t, strength, q, v, a, 0.0, np.empty(0)) >= 0.0 else -1.0
+    slopes = np.empty((3, 6))
+    own = np.empty((2, 6))
+    f, _ = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+    return 1.0 if f >= 0.0 else -1.0
 
 
 @kernel
-def _laws_force(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
-    """f* of a member, all its laws together; what each has at unit strength, times scale, is added to out, if any."""
+def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += scale times the force of each law of a member at unit strength."""
     row = np.empty(6)
     rel = np.empty((model.pair.shape[0], POSE))
     relative_pose(model.pair, q, v, rel)
-    total = 0.0
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
             continue
@@ -90,10 +96,7 @@ def _laws_force(model, segment, j, who, t, strength, q, v, a, scale, out):  # ty
             f = inerter_force(model, k, i, q, v, a, row)
         else:
             f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], strength)
-        total += strength[0, i] * f
-        if out.shape[0] > 0:
-            out[i] += scale * f
-    return total
+        out[i] += scale * f
 
 
 @kernel
