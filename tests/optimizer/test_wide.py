@@ -163,7 +163,7 @@ def test_the_largest_of_numbers_with_nan_is_nan():
 
 
 class Several(Many):
-    """The same, and rows that compete: `shares` of its gradient turned about, at values so far below it."""
+    """The same, and rows that compete: with `shares` of its gradient, at values so far below it."""
 
     def __init__(self, seed, shares, drops):
         super().__init__(seed, True, 1_020)
@@ -171,14 +171,14 @@ class Several(Many):
 
     def evaluate(self, x, gradient=True):
         one = super().evaluate(x)
-        turned = [one.gradients[0], *(s * one.gradients[0][::-1] for s in self.shares)]
+        turned = [one.gradients[0], *(s * one.gradients[0] for s in self.shares)]
         rows = one.objective * np.array([1.0, *(1.0 - drop for drop in self.drops)])
         return Sample(float(rows[0]), rows, np.array(turned), one.constraint_rows, one.constraint_gradients)
 
 
-@pytest.mark.parametrize(("drops", "alone"), [((0.1, 0.14), True), ((1e-9, 0.1), False)])
-def test_the_highest_row_makes_the_step_where_it_decides_alone(drops, alone, monkeypatch):
-    problem, chosen = Several(7, (-0.1, -0.1), drops), settings()
+@pytest.mark.parametrize(("share", "drop", "alone"), [(0.95, 0.1, True), (-0.1, 0.1, False), (-0.1, 1e-9, False)])
+def test_the_highest_row_makes_the_step_where_it_decides_alone(share, drop, alone, monkeypatch):
+    problem, chosen = Several(7, (0.9, share), (0.14, drop)), settings()
     (state,) = states(problem, 1, monkeypatch)
     space = wide.Space.of(problem.lower, problem.upper, problem.linear)
     found = wide.propose(state, np.arange(3), space, chosen)
