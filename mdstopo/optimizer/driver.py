@@ -37,7 +37,7 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, adapt, is_wide, largest_change, propose
+from mdstopo.optimizer.wide import MANY, WIDE, Kept, Space, adapt, excess, is_wide, largest_change, propose
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -66,6 +66,9 @@ class Gsao:
         self.range = np.where(width > 0.0, width, 1.0)
         self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
+        self._space = Space.of(self.lower, self.upper, problem.linear)
+        self._change = Kept(lambda x, y: largest_change(x, y, self._space.unit))
+        self._excess = Kept(lambda x: excess(self._space, x))
 
     def start(self, initial: Floats | None = None) -> State:
         """Evaluate the (projected) initial design and propose a first step."""
@@ -135,7 +138,7 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
-        change, _ = largest_change(tried, origin, self.range)
+        change, _ = self._change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
 
     def reopen(self, state: State) -> State:
@@ -171,7 +174,7 @@ class Gsao:
             )
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
-            if len(state.alpha) >= WIDE:
+            if len(state.alpha) >= MANY:
                 state.steps, state.shift = adapt(state, settings)
             else:
                 state.steps = np.stack([state.steps[1], state.trial - state.alpha])
@@ -206,10 +209,15 @@ class Gsao:
     def _propose(self, state: State) -> None:
         """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
         chosen = self._competing(state)
-        if is_wide(state, len(chosen), self.problem.linear, self.settings):
-            found = propose(state, int(chosen[0]), self.lower, self.upper, self.problem.linear, self.settings)
+        if is_wide(state, self.problem.linear, self.settings):
+            left = float(self._excess(state.alpha)[0])
+            found = propose(state, chosen, self._space, self.settings, left)
             if found is not None:
-                state.trial, state.predicted, state.kkt = found
+                if len(state.charge):
+                    state.charge = next_charge(state.charge, np.zeros_like(state.charge), state.price)
+                before = merit(state.objective, state.constraint_rows, state.charge)
+                state.trial, state.kkt = found.trial, found.kkt
+                state.predicted = before - found.promised
                 return
         model = self._approximate(state, chosen)
         lower, upper = self._box(state, model)
@@ -310,7 +318,7 @@ class Gsao:
         return max(float(moved), complementarity)
 
     def _move(self, state: State) -> float:
-        return largest_change(state.trial, state.alpha, self.range)[1]
+        return self._change(state.trial, state.alpha)[1]
 
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
@@ -320,7 +328,7 @@ class Gsao:
         state.seconds += self.clock() - began
         state.history = state.history.extended(
             sample,
-            self.problem.linear.excess(design),
+            self._excess(design),
             change,
             state.evaluations,
             state.seconds,

@@ -11,6 +11,7 @@ import numpy as np
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Sample
 from mdstopo.optimizer.state import State
+from mdstopo.optimizer.wide import finite
 from mdstopo.status import RunStatus, Status
 
 CONVEX_FLOOR = 1e-6
@@ -37,13 +38,13 @@ def failure(sample: Sample) -> str:
     """Why a sample cannot be used, as a sentence; empty if it can."""
     if sample.status is Status.OK:
         numbers = (
-            sample.objective,
             sample.rows,
             sample.gradients,
             sample.constraint_rows,
             sample.constraint_gradients,
         )
-        if all(np.isfinite(number).all() for number in numbers) and len(sample.rows):
+        known = np.isfinite(sample.objective) and all(finite(number) for number in numbers if number.size)
+        if known and len(sample.rows):
             return ""
         return Status.NON_FINITE.value
     return f"{sample.status.value} ({sample.message})" if sample.message else sample.status.value
@@ -102,6 +103,8 @@ def outdated(state: State) -> bool:
 
 def merit(objective: float, constraint_rows: Floats, price: Floats) -> float:
     """What a step must decrease: the objective and the price of all violations."""
+    if not len(price):
+        return objective
     return objective + float(np.einsum("i,i->", price, np.maximum(constraint_rows, 0.0)))
 
 

@@ -1,55 +1,96 @@
-"""The step of a problem with many variables, one row and one volume row.
+"""The step of a problem with many variables and one volume row, where one function row decides it.
 
 The interior point goes through a score of arrays of N numbers some fifteen times; a million variables then cost six
 evaluations. Here the multiplier of the volume row is the only unknown: a sample of the variables gives a narrow bracket
 for it, one pass finds the variables that every multiplier in the bracket sends to the same end of their box, and the
 root is sought among the others, a few per cent. Nothing but that pass, which computes shifts, box and convex term as
 it goes, touches N numbers. It is the same subproblem, solved to rounding.
+
+Where several rows compete, the highest often decides alone: its minimiser is found, and is the solution if the other
+rows lie below it there and the limits hold.
 """
 
-from math import gcd, inf
-from typing import NamedTuple
+from collections.abc import Callable
+from math import gcd, inf, isfinite
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.native.threads import allowed
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.wide_kernels import (
-    COST,
-    HIGH,
-    LOW,
-    SAMPLE,
-    SLOTS,
-    wide_minimum,
-)
-from mdstopo.optimizer.wide_passes import wide_adapt, wide_change, wide_residual
+from mdstopo.optimizer.wide_kernels import COST, HIGH, LOW, SAMPLE, SLOTS, wide_minimum, wide_rows
+from mdstopo.optimizer.wide_passes import PIECE, wide_adapt, wide_change, wide_largest, wide_residual, wide_sum
 
-#: variables from which on this way is taken
+Indices = NDArray[np.intp]
+T = TypeVar("T")
+
+#: variables from which on this way is taken, and passes over them are compiled
 MANY = 256
-#: and from which on single passes over them are compiled too
+#: and from which on memory counts: no cuts are kept, and what is alike is not read again
 WIDE = 10_000
 #: and from which on threads share them
 SHARED = 50_000
+#: where a pass does little, so that making threads would cost as much
+LIGHT = 400_000
 _LEAST_SAMPLE = 256
 
 
 class Proposal(NamedTuple):
-    """The next design (N,), the decrease that the model promises, the KKT residual at the iterate."""
+    """The next design (N,), what the model promises of the objective there, the KKT residual at the iterate."""
 
     trial: Floats
-    predicted: float
+    promised: float
     kkt: float
 
 
-def is_wide(state: State, chosen: int, linear: LinearRows, settings: Settings) -> bool:
-    """Whether `propose` can make the next step of a state, of which `chosen` rows compete."""
+class Space(NamedTuple):
+    """Where designs are: bounds (N,), volume rows, and the ranges (N,); all but `linear` are `short`."""
+
+    lower: Floats
+    upper: Floats
+    linear: LinearRows
+    rows: tuple[Floats, ...]
+    unit: Floats
+
+    @classmethod
+    def of(cls, lower: Floats, upper: Floats, linear: LinearRows) -> "Space":
+        """That of bounds and rows."""
+        width = upper - lower
+        unit = np.where(width > 0.0, width, 1.0)
+        return cls(short(lower), short(upper), linear, tuple(short(row) for row in linear.A), short(unit))
+
+
+def short(x: Floats) -> Floats:
+    """The array, or a piece of it where it is long and all its numbers are alike."""
+    return x[:PIECE] if len(x) >= WIDE and bool((x == x[0]).all()) else x
+
+
+class Kept(Generic[T]):
+    """A function of arrays that does not compute its last two results again; arrays are never changed in place."""
+
+    def __init__(self, function: Callable[..., T]) -> None:
+        self._function = function
+        self._kept: list[tuple[tuple[Floats, ...], T]] = []
+
+    def __call__(self, *arrays: Floats) -> T:
+        """What the function gives for these arrays, the same objects."""
+        for known, result in self._kept:
+            if all(one is other for one, other in zip(known, arrays, strict=True)):
+                return result
+        result = self._function(*arrays)
+        self._kept = [(arrays, result), *self._kept[:1]]
+        return result
+
+
+def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
+    """Whether `propose` may make the next step of a state."""
     return (
         len(state.alpha) >= MANY
-        and chosen + len(state.cuts) == 1 == len(linear)
-        and not len(state.constraint_rows)
+        and len(linear) == 1
         and state.convex > 0.0
         and settings.number("power") != 0.0
         and not settings.flag("zero_shift")
@@ -58,33 +99,58 @@ def is_wide(state: State, chosen: int, linear: LinearRows, settings: Settings) -
 
 
 def propose(
-    state: State, row: int, lower: Floats, upper: Floats, linear: LinearRows, settings: Settings
+    state: State, chosen: Indices, space: Space, settings: Settings, left: float | None = None
 ) -> Proposal | None:
-    """The next step from a state, for its competing row; nothing where the subproblem resists."""
-    alpha, n = state.alpha, len(state.alpha)
-    slope, cost, bound = np.ascontiguousarray(state.gradients[row]), linear.A[0], float(linear.b[0])
-    steepest = max(float(slope.max()), -float(slope.min()))
-    if steepest == 0.0:
+    """The next step from a state, whose competing rows are `chosen`; left: what its volume row exceeds its bound by.
+
+    Nothing where more than the highest row decides, or where the subproblem resists.
+    """
+    alpha, n, row = state.alpha, len(state.alpha), int(chosen[0])
+    lower, upper, linear, (cost,), _ = space
+    slope, bound = np.ascontiguousarray(state.gradients[row]), float(linear.b[0])
+    own = _largest(slope)
+    steepest = max([own, *(_largest(np.ascontiguousarray(state.gradients[k])) for k in chosen[1:])])
+    if own == 0.0 or not isfinite(steepest):
         return None
     power = settings.number("power")
     share = inf if power == 1.0 else 1.0 - settings.number("shift_margin")
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
-    left = float(linear.excess(alpha)[0])
+    left = float(excess(space, alpha)[0]) if left is None else left
     trial, slots = np.empty(n), np.empty((SLOTS, n))
-    place, live, x = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n)
+    place, found, x = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n)
     multiplier, miss, size, change, count = wide_minimum(
         alpha, slope, cost, state.shift, lower, upper, limits, bound, left + bound, bool(linear.equal[0]), _stride(n),
-        1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, live, x,
+        1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, x,
     )  # fmt: skip
     size += abs(bound)
-    if not (np.isfinite(change) and np.isfinite(multiplier)) or (abs(miss) > 1e-9 * size and multiplier != 0.0):
+    if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > 1e-9 * size and multiplier != 0.0):
         return None
-    _touch_up(trial, slots[:, :count], place[:count], linear, lower, upper, ROUNDING * size)
-    promised = float(state.rows[row]) + change
-    own = steepest if row == 0 else float(np.abs(state.gradients[0]).max())
-    residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own, _threads(n))
+    _touch_up(trial, slots[:, :count], place[:count], space, ROUNDING * size)
+    if not _decides(state, chosen, trial, lower, upper, power):
+        return None
+    residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own, _threads(n, LIGHT))
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
-    return Proposal(trial, state.objective - promised, max(residual, slack))
+    return Proposal(trial, float(state.rows[row]) + change, max(residual, slack))
+
+
+def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper: Floats, power: float) -> bool:
+    """Whether no other row is higher than the first of `chosen` at the trial, and no limit is violated there."""
+    n = len(trial)
+    if len(chosen) + len(state.cuts) + len(state.constraint_rows) == 1:
+        return True
+    changes, values = [], []
+    for some, of in (
+        (state.gradients[chosen], state.rows[chosen]),
+        (state.cut_gradients.reshape(-1, n), state.cuts),
+        (state.constraint_gradients.reshape(-1, n), state.constraint_rows),
+    ):
+        found = np.zeros(len(of))
+        if len(of):
+            wide_rows(np.ascontiguousarray(some), state.alpha, trial, state.shift, lower, upper, power, found)
+        changes.append(found)
+        values.append(of + found)
+    objective, cuts, limits = values
+    return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())
 
 
 def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
@@ -92,38 +158,53 @@ def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
     steps, shifts = np.empty_like(state.steps), np.empty_like(state.shift)
     grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
     least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
-    threads = _threads(len(shifts))
-    wide_adapt(
-        state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, threads, steps, shifts
-    )
+    threads = _threads(len(shifts), LIGHT)
+    wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, threads, steps, shifts)
     return steps, shifts
 
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
     """max |x - y|, and the largest in its unit."""
-    if len(x) >= WIDE:
-        plain, scaled = wide_change(x, y, unit, _threads(len(x)))
+    if len(x) >= MANY:
+        plain, scaled = wide_change(x, y, unit, _threads(len(x), LIGHT))
         return plain, scaled
     change = np.abs(x - y)
     return float(change.max(initial=0.0)), float((change / unit).max(initial=0.0))
 
 
-def _touch_up(
-    trial: Floats, slots: Floats, place: Ints, linear: LinearRows,
-    lower: Floats, upper: Floats, rounding: float,
-) -> None:  # fmt: skip
+def excess(space: Space, x: Floats) -> Floats:
+    """A x - b, (m,)."""
+    if len(x) < WIDE:
+        return space.linear.excess(x)
+    return np.array([wide_sum(row, x, _threads(len(x), LIGHT)) for row in space.rows]) - space.linear.b
+
+
+def finite(numbers: Floats) -> bool:
+    """Whether all are."""
+    if numbers.size < WIDE or not numbers.flags.c_contiguous:
+        return bool(np.isfinite(numbers).all())
+    return isfinite(_largest(numbers.reshape(-1)))
+
+
+def _largest(x: Floats) -> float:
+    """max |x|; NaN where one is NaN."""
+    return wide_largest(x, _threads(len(x), LIGHT))
+
+
+def _touch_up(trial: Floats, slots: Floats, place: Ints, space: Space, rounding: float) -> None:
     """Remove the last rounding errors of the volume row from the variables inside their boxes."""
-    low, high = slots[LOW], slots[HIGH]
+    low, high, linear = slots[LOW], slots[HIGH], space.linear
     for _ in range(20):
-        excess = float(linear.excess(trial)[0])
-        if abs(excess) <= rounding or (excess < 0.0 and not linear.equal[0]):
+        left = float(excess(space, trial)[0])
+        if abs(left) <= rounding or (left < 0.0 and not linear.equal[0]):
             return
         at = trial[place]
         push = np.where((at > low) & (at < high), slots[COST], 0.0)
         square = float(np.einsum("i,i->", push, push))
         if square == 0.0:
             break
-        trial[place] = np.clip(at - excess / square * push, low, high)
+        trial[place] = np.clip(at - left / square * push, low, high)
+    lower, upper = (np.resize(end, len(trial)) for end in (space.lower, space.upper))
     trial[:] = repair(trial, lower, upper, linear)
 
 
@@ -135,5 +216,5 @@ def _stride(n: int) -> int:
     return stride
 
 
-def _threads(n: int) -> int:
-    return allowed() if n >= SHARED else 1
+def _threads(n: int, enough: int | None = None) -> int:
+    return allowed() if n >= (SHARED if enough is None else max(enough, SHARED)) else 1

@@ -7,6 +7,8 @@ Arrays that the passes share, one column for each variable that the multiplier's
     place (n,)    which variable it is
     x (n,)        where it is
 
+Costs and bounds whose numbers are all alike may be given as the first few of them (`wide_passes`).
+
 Sums are added in a fixed order, so that results do not depend on the number of threads.
 """
 
@@ -14,8 +16,9 @@ import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel, vector_entry
 from mdstopo.native.threads import shared, taken
-from mdstopo.optimizer.powers import powers
-from mdstopo.optimizer.problem import Floats, Ints, Truths
+from mdstopo.optimizer.powers import largest, primitives
+from mdstopo.optimizer.problem import Floats, Ints
+from mdstopo.optimizer.wide_passes import part
 
 BLOCK = 1024
 #: blocks that a thread takes at once
@@ -28,19 +31,10 @@ BEYOND = 1e200
 SAMPLE = 4096
 SPREAD = 4.0
 MAX_STEPS = 200
-#: the power that is taken if none is stated; its terms need no logarithms
-RECIPROCAL = -1.0
-
-
-@inline
-def _steepness(x: float, iterate: float, slope: float, reach: float, kappa: float, power: float) -> tuple[float, float]:
-    """The model's derivative by one variable, and its slope."""
-    side = 1.0 if slope < 0.0 else -1.0
-    t = 1.0 + side * (x - iterate) / reach
-    first = 1.0 / (t * t)
-    if power != RECIPROCAL:
-        first = 1.0 if power == 1.0 else np.exp((power - 1.0) * np.log(t))
-    return slope * first + kappa * (x - iterate), kappa + side * slope * (power - 1.0) * first / (t * reach)
+#: brackets that are tried, the last of them without ends
+ATTEMPTS = 6
+#: smaller than any width that counts
+TINY = 1e-300
 
 
 @inline
@@ -55,90 +49,132 @@ def _box(
 
 
 @member_kernel
-def _enter(slots: Floats, k: int, power: float) -> None:
-    """The multipliers between which the variable of a slot is inside its box."""
-    a = slots[COST, k]
-    slots[FIRST, k], slots[LAST, k] = -BEYOND, BEYOND
-    if a == 0.0:
-        return  # always inside: the multiplier does not move it
-    x, s, d, kappa = slots[ITERATE, k], slots[SLOPE, k], slots[REACH, k], slots[KAPPA, k]
-    low, _ = _steepness(slots[LOW, k], x, s, d, kappa, power)
-    high, _ = _steepness(slots[HIGH, k], x, s, d, kappa, power)
-    slots[FIRST, k] = min(-low / a, -high / a)
-    slots[LAST, k] = max(-low / a, -high / a)
+def _derivative(
+    x: Floats, iterate: Floats, slope: Floats, reach: Floats, kappa: Floats, power: float, first: Floats, z: Floats,
+    out: Floats, whole: Ints,
+) -> None:  # fmt: skip
+    """The model's derivative by each variable; first: t^(power - 1), z = t - 1, where t is how far it is stretched."""
+    n = len(x)
+    for i in range(n):
+        step = x[i] - iterate[i]
+        z[i] = (step if slope[i] < 0.0 else -step) / reach[i]
+    primitives(z[:n], power, out[:n], whole)
+    for i in range(n):
+        first[i] = (1.0 + power * out[i]) / (1.0 + z[i])
+    for i in range(n):
+        out[i] = slope[i] * first[i] + kappa[i] * (x[i] - iterate[i])
 
 
 @member_kernel
-def _inside(slots: Floats, k: int, x: float, pressure: float, power: float) -> tuple[float, float]:
-    """Where the derivative of a slot's variable is minus the pressure, from x on: a safeguarded Newton iteration."""
-    low, high = slots[LOW, k], slots[HIGH, k]
-    enough = 1e-9 * (high - low)  # what the next step would correct is that, squared
-    c, s, d, kappa = slots[ITERATE, k], slots[SLOPE, k], slots[REACH, k], slots[KAPPA, k]
-    curvature = 1.0
-    x = min(max(x, low), high)
-    for _ in range(60):
-        value, curvature = _steepness(x, c, s, d, kappa, power)
-        value += pressure
-        if value > 0.0:
-            high = x
-        else:
-            low = x
-        following = x - value / curvature
-        if not low <= following <= high:
-            following = 0.5 * (low + high)
-        moved = abs(following - x)
-        x = following
-        if moved <= enough:
-            break
-    return x, curvature
+def _enter(slots: Floats, n: int, power: float) -> None:
+    """The multipliers between which the variables of the slots are inside their boxes."""
+    room, whole = np.empty((4, BLOCK)), np.empty((3, BLOCK), dtype=np.int64)
+    first, z, low, high = room[0], room[1], room[2], room[3]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        a, c, s = slots[COST, start:stop], slots[ITERATE, start:stop], slots[SLOPE, start:stop]
+        d, k = slots[REACH, start:stop], slots[KAPPA, start:stop]
+        _derivative(slots[LOW, start:stop], c, s, d, k, power, first, z, low, whole)
+        _derivative(slots[HIGH, start:stop], c, s, d, k, power, first, z, high, whole)
+        begin, end = slots[FIRST, start:stop], slots[LAST, start:stop]
+        for i in range(stop - start):
+            if a[i] == 0.0:  # always inside: the multiplier does not move it
+                begin[i], end[i] = -BEYOND, BEYOND
+            else:
+                begin[i] = min(-low[i] / a[i], -high[i] / a[i])
+                end[i] = max(-low[i] / a[i], -high[i] / a[i])
+
+
+@member_kernel
+def _between(slots: Floats, start: int, stop: int, multiplier: float, stay: bool, share: Floats, x: Floats) -> None:
+    """Where the variables are for a multiplier if they moved evenly from one end of their box to the other; the share
+    of the way. Inside they stay where they are if `stay`."""
+    a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
+    first, last = slots[FIRST, start:stop], slots[LAST, start:stop]
+    n = stop - start
+    for i in range(n):
+        share[i] = min(max((multiplier - first[i]) / max(last[i] - first[i], TINY), 0.0), 1.0)
+    for i in range(n):
+        p, q = low[i], high[i]
+        up = share[i] if a[i] < 0.0 else 1.0 - share[i]
+        between = x[i] if stay else p + up * (q - p)
+        x[i] = q if up >= 1.0 else (p if up <= 0.0 else between)
 
 
 @member_kernel
 def _total(
-    slots: Floats, live: Ints, count: int, x: Floats, multiplier: float, power: float
+    slots: Floats, n: int, x: Floats, multiplier: float, power: float, exact: bool, room: Floats, whole: Ints
 ) -> tuple[float, float]:
-    """Sum of a x over the live slots for a multiplier, and its slope; fills x."""
+    """Sum of a x over the slots for a multiplier, and its slope; fills x.
+
+    Exact from an x that is near; otherwise as if they moved evenly.
+    """
     total, slope = 0.0, 0.0
-    for j in range(count):
-        k = live[j]
-        a = slots[COST, k]
-        if multiplier <= slots[FIRST, k]:
-            x[k] = slots[HIGH, k] if a > 0.0 else slots[LOW, k]
-        elif multiplier >= slots[LAST, k]:
-            x[k] = slots[LOW, k] if a > 0.0 else slots[HIGH, k]
+    share, first, z, g, h = room[0], room[1], room[2], room[3], room[4]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        m = stop - start
+        a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
+        y = x[start:stop]
+        _between(slots, start, stop, multiplier, exact, share, y)
+        if not exact:
+            begin, end = slots[FIRST, start:stop], slots[LAST, start:stop]
+            for i in range(m):
+                inside = share[i] * (1.0 - share[i]) > 0.0
+                slope -= abs(a[i]) * (high[i] - low[i]) / max(end[i] - begin[i], TINY) if inside else 0.0
         else:
-            share = (multiplier - slots[FIRST, k]) / (slots[LAST, k] - slots[FIRST, k])
-            begin = slots[HIGH, k] if a > 0.0 else slots[LOW, k]
-            end = slots[LOW, k] if a > 0.0 else slots[HIGH, k]
-            x[k], curvature = _inside(slots, k, begin + share * (end - begin), multiplier * a, power)
-            slope -= a * a / curvature
-        total += a * x[k]
+            c, s = slots[ITERATE, start:stop], slots[SLOPE, start:stop]
+            d, k = slots[REACH, start:stop], slots[KAPPA, start:stop]
+            # the derivative is convex or concave: Newton's iteration ends on one side, or in the box's corner
+            for _ in range(MAX_STEPS):
+                _derivative(y, c, s, d, k, power, first, z, g, whole)
+                for i in range(m):
+                    h[i] = k[i] + abs(s[i]) * (1.0 - power) * first[i] / ((1.0 + z[i]) * d[i])
+                for i in range(m):
+                    inside = share[i] * (1.0 - share[i]) > 0.0
+                    z[i] = (g[i] + multiplier * a[i]) / h[i] if inside else 0.0
+                for i in range(m):
+                    z[i] = min(max(y[i] - z[i], low[i]), high[i]) - y[i]
+                for i in range(m):
+                    y[i] += z[i]
+                for i in range(m):
+                    z[i] /= max(high[i] - low[i], TINY)
+                if not largest(z[:m]) > 1e-9:  # what the next step would correct is that, squared
+                    break
+            for i in range(m):
+                slope -= a[i] * a[i] / h[i] if share[i] * (1.0 - share[i]) > 0.0 else 0.0
+        for i in range(m):
+            total += a[i] * y[i]
     return total, slope
 
 
 @member_kernel
 def _root(
-    slots: Floats, n: int, live: Ints, x: Floats, goal: float, near: float, guess: float, far: float, power: float,
-    rounding: float,
-) -> tuple[float, float]:  # fmt: skip
-    """The multiplier in [near, far] for which the sum of a x is `goal`, or the end that comes nearest to it.
+    slots: Floats, n: int, x: Floats, goal: float, near: float, guess: float, far: float, power: float,
+    rounding: float, exact: bool, room: Floats, whole: Ints,
+) -> tuple[float, float, int]:  # fmt: skip
+    """The multiplier in [near, far] for which the sum of a x is `goal`, or an end that comes as near as any.
 
-    Returns it with what is left of the difference; x is filled for it. The sum falls with the multiplier.
+    Returns it with what is left of the difference, and whether the root must lie further on (1) or back (-1); x is
+    filled for it. The sum falls with the multiplier.
     """
     first, last = BEYOND, -BEYOND
     for k in range(n):
-        live[k] = k
         if slots[COST, k] != 0.0:
             first, last = min(first, slots[FIRST, k]), max(last, slots[LAST, k])
     near, far = max(near, min(first, far)), min(far, max(last, near))
     multiplier = guess if near <= guess <= far else 0.5 * (near + far)
     near_tried, far_tried = False, False
-    count, settled, miss, width = n, 0.0, 0.0, far - near
+    miss, width = 0.0, far - near
     for step in range(MAX_STEPS):
-        total, slope = _total(slots, live, count, x, multiplier, power)
-        miss = settled + total - goal
-        if abs(miss) <= rounding or (miss > 0.0 and multiplier >= far) or (miss < 0.0 and multiplier <= near):
+        total, slope = _total(slots, n, x, multiplier, power, exact, room, whole)
+        miss = total - goal
+        if abs(miss) <= rounding:
             break
+        if miss > 0.0 and multiplier >= far:
+            return multiplier, miss, 1
+        if miss < 0.0 and multiplier <= near:
+            return multiplier, miss, -1
         if miss > 0.0:
             near, near_tried = multiplier, True
         else:
@@ -154,36 +190,29 @@ def _root(
             following = min(max(following, near), far)
         width = far - near if step % 3 == 2 else width
         multiplier = following
-        # what the bracket decides needs no further look
-        kept = 0
-        for j in range(count):
-            k = live[j]
-            a = slots[COST, k]
-            if a != 0.0 and (far <= slots[FIRST, k] or near >= slots[LAST, k]):
-                x[k] = slots[HIGH, k] if (far <= slots[FIRST, k]) == (a > 0.0) else slots[LOW, k]
-                settled += a * x[k]
-            else:
-                live[kept] = k
-                kept += 1
-        count = kept
-    return multiplier, miss
+    return multiplier, miss, 0
+
+
+@inline
+def _one(x: Floats, n: int, i: int) -> float:
+    """x[i] of an array of n, or of one whose numbers are alike."""
+    return float(x[i if len(x) == n else 0])
 
 
 @member_kernel
 def _slot(
     slots: Floats, place: Ints, k: int, i: int, alpha: float, slope: float, cost: float, low: float, high: float,
-    reach: float, kappa: float, power: float,
+    reach: float, kappa: float,
 ) -> None:  # fmt: skip
     place[k] = i
     slots[COST, k], slots[LOW, k], slots[HIGH, k], slots[ITERATE, k] = cost, low, high, alpha
     slots[SLOPE, k], slots[REACH, k], slots[KAPPA, k] = slope, reach, kappa
-    _enter(slots, k, power)
 
 
 @member_kernel
 def _estimate(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
-    gap: float, least: float, stride: int, slots: Floats, place: Ints, live: Ints, x: Floats,
+    gap: float, least: float, stride: int, slots: Floats, place: Ints, x: Floats, room: Floats, whole: Ints,
 ) -> tuple[float, float, float]:  # fmt: skip
     """A bracket that probably holds the multiplier, the likeliest in its middle, from every stride-th variable.
 
@@ -194,29 +223,30 @@ def _estimate(
     n = 0
     goal = 0.0
     for i in range(0, N, stride):
-        low, high, reach, span = _box(alpha[i], lower[i], upper[i], shift[i], move, trust, share)
-        _slot(slots, place, n, i, alpha[i], slope[i], cost[i], low, high, reach, convex / span, power)
-        x[n] = alpha[i]
-        goal += cost[i] * alpha[i]
+        a = _one(cost, N, i)
+        low, high, reach, span = _box(alpha[i], _one(lower, N, i), _one(upper, N, i), shift[i], move, trust, share)
+        _slot(slots, place, n, i, alpha[i], slope[i], a, low, high, reach, convex / span)
+        goal += a * alpha[i]
         n += 1
+    _enter(slots, n, power)
     goal += gap * n / N
     rounding = 1e-6 * abs(goal)
-    guess, _ = _root(slots, n, live, x, goal, least, BEYOND, BEYOND, power, rounding)
+    guess, _, _ = _root(slots, n, x, goal, least, BEYOND, BEYOND, power, rounding, bool(0), room, whole)
     mean, square = 0.0, 0.0
     for k in range(n):
         moved = slots[COST, k] * (x[k] - slots[ITERATE, k])
         mean += moved / n
         square += moved * moved
     spread = SPREAD * np.sqrt(max(square - n * mean * mean, 0.0))
-    near, _ = _root(slots, n, live, x, goal + spread, least, guess, BEYOND, power, rounding)
-    far, _ = _root(slots, n, live, x, goal - spread, least, guess, BEYOND, power, rounding)
+    near, _, _ = _root(slots, n, x, goal + spread, least, guess, BEYOND, power, rounding, bool(0), room, whole)
+    far, _, _ = _root(slots, n, x, goal - spread, least, guess, BEYOND, power, rounding, bool(0), room, whole)
     return near, guess, far
 
 
 @kernel
 def _sort_out(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
-    near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, x: Floats,
+    near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, found: Ints,
 ) -> tuple[int, float, float, float]:  # fmt: skip
     """Fill `out` with the ends of the box where a multiplier in [near, far] leaves no doubt; slots for the others.
 
@@ -224,13 +254,12 @@ def _sort_out(
     model. Threads share the blocks; sums of the blocks are added, and slots follow each other, in order.
     """
     blocks = (len(alpha) + BLOCK - 1) // BLOCK
-    doubted = np.empty(len(alpha), dtype=np.bool_)
     sums = np.empty((blocks, 3))
     begin = np.empty(blocks + 1, np.int64)
     counter = np.zeros(2, np.int64)
     shared(
         _sort_blocks, threads,
-        (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, doubted, sums, begin),
+        (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, found, sums, begin),
     )  # fmt: skip
     n = 0
     total, size, change = 0.0, 0.0, 0.0
@@ -244,7 +273,7 @@ def _sort_out(
     begin[blocks] = n
     shared(
         _slot_blocks, threads,
-        (counter[1:], alpha, slope, cost, shift, lower, upper, limits, out, doubted, begin, slots, place, x),
+        (counter[1:], alpha, slope, cost, shift, lower, upper, limits, found, begin, slots, place),
     )  # fmt: skip
     return n, total, size, change
 
@@ -252,10 +281,14 @@ def _sort_out(
 @kernel
 def _sort_blocks(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
-    limits: Floats, near: float, far: float, out: Floats, doubted: Truths, sums: Floats, counts: Ints,
+    limits: Floats, near: float, far: float, out: Floats, found: Ints, sums: Floats, counts: Ints,
 ) -> None:  # fmt: skip
-    """What `_sort_out` does with the blocks that are taken: sums (blocks, 3) change, a x, |a x|; counts of doubts."""
-    room = np.empty((8, BLOCK))
+    """What `_sort_out` does with the blocks that are taken.
+
+    sums: (blocks, 3) change, a x, |a x|; counts: of variables in doubt; found: which they are, from their block's place
+    on.
+    """
+    room = np.empty((7, BLOCK))
     whole = np.empty((3, BLOCK), dtype=np.int64)
     N = len(alpha)
     group = taken(counter)
@@ -263,8 +296,9 @@ def _sort_blocks(
         for b in range(group * GROUP, min((group + 1) * GROUP, len(sums))):
             start, stop = b * BLOCK, min((b + 1) * BLOCK, N)
             counts[b] = _sort_block(
-                alpha[start:stop], slope[start:stop], cost[start:stop], shift[start:stop], lower[start:stop],
-                upper[start:stop], limits, near, far, room, whole, out[start:stop], doubted[start:stop], sums[b],
+                alpha[start:stop], slope[start:stop], part(cost, N, start, stop), shift[start:stop],
+                part(lower, N, start, stop), part(upper, N, start, stop), limits, near, far, room, whole,
+                out[start:stop], start, found[start:stop], sums[b],
             )  # fmt: skip
         group = taken(counter)
 
@@ -272,45 +306,51 @@ def _sort_blocks(
 @member_kernel
 def _sort_block(
     c: Floats, s: Floats, a: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats, near: float,
-    far: float, room: Floats, whole: Ints, y: Floats, doubted: Truths, sums: Floats,
+    far: float, room: Floats, whole: Ints, y: Floats, start: int, found: Ints, sums: Floats,
 ) -> int:  # fmt: skip
     """One block of `_sort_blocks`; how many variables are in doubt."""
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
-    low, high, reach, kappa = room[0], room[1], room[2], room[3]
-    least, most, t, first = room[4], room[5], room[6], room[7]
+    span, reach, most, least = room[0], room[1], room[2], room[3]
+    z, value, known = room[4], room[5], room[6]
     m = len(c)
     for i in range(m):
-        low[i], high[i], reach[i], span = _box(c[i], lower[i], upper[i], shift[i], move, trust, share)
-        kappa[i] = convex / span
-        p, q = near * a[i], far * a[i]
-        least[i], most[i] = min(p, q), max(p, q)
-        y[i] = high[i] if s[i] + most[i] < 0.0 else low[i]
-        step = y[i] - c[i]
-        t[i] = 1.0 + (step if s[i] < 0.0 else -step) / reach[i]
-    if power == 1.0:
-        for i in range(m):
-            first[i] = 1.0
-    elif power == RECIPROCAL:
-        for i in range(m):
-            first[i] = 1.0 / (t[i] * t[i])
-    else:
-        powers(t[:m], power - 1.0, first, whole)
-    part, held, weight, count = 0.0, 0.0, 0.0, 0
+        wide = upper[i] - lower[i]
+        span[i] = wide if wide > 0.0 else 1.0
+    for i in range(m):
+        reach[i] = shift[i] * span[i]
+    for i in range(m):
+        z[i] = min(min(move, trust * span[i]), share * reach[i])
+    for i in range(m):
+        most[i] = s[i] + max(near * a[i], far * a[i])
+    for i in range(m):
+        least[i] = s[i] + min(near * a[i], far * a[i])
+    for i in range(m):
+        low, high = max(lower[i], c[i] - z[i]), min(upper[i], c[i] + z[i])
+        y[i] = high if most[i] < 0.0 else low
     for i in range(m):
         step = y[i] - c[i]
-        pull = kappa[i] * step
-        g = s[i] * first[i] + pull
-        up_there = s[i] + most[i] < 0.0 and g + most[i] <= 0.0
-        down_there = s[i] + least[i] > 0.0 and g + least[i] >= 0.0
-        known = up_there or down_there
-        doubted[i] = not known
-        count += not known
-        # s < 0: d (t f - 1)/xi; else that of the other side, with its sign
-        term = (reach[i] if s[i] < 0.0 else -reach[i]) * (t[i] * first[i] - 1.0) / power
-        part += s[i] * term + 0.5 * pull * step if known else 0.0
-        spent = a[i] * y[i] if known else 0.0
+        z[i] = (step if s[i] < 0.0 else -step) / reach[i]
+    primitives(z[:m], power, value[:m], whole)
+    for i in range(m):
+        # the derivative there, towards its sign where the slope leaves no doubt
+        first = (1.0 + power * value[i]) / (1.0 + z[i])
+        more = s[i] * (first - 1.0) + convex / span[i] * (y[i] - c[i])
+        up, down = -(more + most[i]), more + least[i]
+        ahead = down if least[i] > 0.0 else -1.0
+        known[i] = 1.0 if (up if most[i] < 0.0 else ahead) >= 0.0 else 0.0
+    part, held, weight = 0.0, 0.0, 0.0
+    for i in range(m):
+        step = y[i] - c[i]
+        part += known[i] * (0.5 * convex / span[i] * step * step - abs(s[i]) * reach[i] * value[i])
+    for i in range(m):
+        spent = known[i] * a[i] * y[i]
         held += spent
         weight += abs(spent)
+    count = 0
+    for i in range(m):
+        if known[i] == 0.0:
+            found[count] = start + i
+            count += 1
     sums[0], sums[1], sums[2] = part, held, weight
     return count
 
@@ -318,41 +358,39 @@ def _sort_block(
 @kernel
 def _slot_blocks(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
-    limits: Floats, out: Floats, doubted: Truths, begin: Ints, slots: Floats, place: Ints, x: Floats,
+    limits: Floats, found: Ints, begin: Ints, slots: Floats, place: Ints,
 ) -> None:  # fmt: skip
     """Slots for the variables in doubt, of the blocks that are taken; begin (blocks + 1): their first slots."""
-    power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
-    blocks = len(begin) - 1
+    move, trust, share, convex = limits[1], limits[2], limits[3], limits[4]
+    blocks, N = len(begin) - 1, len(alpha)
     group = taken(counter)
     while group * GROUP < blocks:
         for b in range(group * GROUP, min((group + 1) * GROUP, blocks)):
-            n = begin[b]
-            if begin[b + 1] == n:
-                continue
-            for i in range(b * BLOCK, min((b + 1) * BLOCK, len(alpha))):
-                if doubted[i]:
-                    low, high, reach, span = _box(alpha[i], lower[i], upper[i], shift[i], move, trust, share)
-                    _slot(slots, place, n, i, alpha[i], slope[i], cost[i], low, high, reach, convex / span, power)
-                    x[n] = out[i]
-                    n += 1
+            for n in range(begin[b], begin[b + 1]):
+                i = found[b * BLOCK + n - begin[b]]
+                end, other, a = _one(lower, N, i), _one(upper, N, i), _one(cost, N, i)
+                low, high, reach, span = _box(alpha[i], end, other, shift[i], move, trust, share)
+                _slot(slots, place, n, i, alpha[i], slope[i], a, low, high, reach, convex / span)
         group = taken(counter)
 
 
 @member_kernel
-def _promise(slots: Floats, n: int, x: Floats, power: float) -> float:
+def _promise(slots: Floats, n: int, x: Floats, power: float, room: Floats, whole: Ints) -> float:
     """The model's change over the slots."""
     change = 0.0
-    if power == RECIPROCAL:
-        for k in range(n):
-            step, s, d = x[k] - slots[ITERATE, k], slots[SLOPE, k], slots[REACH, k]
-            side = 1.0 if s < 0.0 else -1.0
-            change += s * step / (1.0 + side * step / d) + 0.5 * slots[KAPPA, k] * step * step
-        return change
-    for k in range(n):
-        step, s, d = x[k] - slots[ITERATE, k], slots[SLOPE, k], slots[REACH, k]
-        side = 1.0 if s < 0.0 else -1.0
-        term = step if power == 1.0 else side * d * (np.exp(power * np.log(1.0 + side * step / d)) - 1.0) / power
-        change += s * term + 0.5 * slots[KAPPA, k] * step * step
+    z, value = room[0], room[1]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        c, s, d = slots[ITERATE, start:stop], slots[SLOPE, start:stop], slots[REACH, start:stop]
+        k, y = slots[KAPPA, start:stop], x[start:stop]
+        m = stop - start
+        for i in range(m):
+            step = y[i] - c[i]
+            z[i] = (step if s[i] < 0.0 else -step) / d[i]
+        primitives(z[:m], power, value[:m], whole)
+        for i in range(m):
+            step = y[i] - c[i]
+            change += 0.5 * k[i] * step * step - abs(s[i]) * d[i] * value[i]
     return change
 
 
@@ -360,37 +398,71 @@ def _promise(slots: Floats, n: int, x: Floats, power: float) -> float:
 def wide_minimum(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     bound: float, at_iterate: float, equal: bool, stride: int, rounding: float, threads: int, out: Floats,
-    slots: Floats, place: Ints, live: Ints, x: Floats,
+    slots: Floats, place: Ints, found: Ints, x: Floats,
 ) -> tuple[float, float, float, float, int]:  # fmt: skip
     """Minimise one row in its box under a x <= bound or = bound.
 
     limits: power, move limit, trust, share of the shifts' distance, convex term over the range's unit. at_iterate: a x
-    of the iterate. out (N,): the minimiser. slots, place, live, x: room for N. Returns the multiplier, what is left of
+    of the iterate. out (N,): the minimiser. slots, place, found, x: room for N. Returns the multiplier, what is left of
     the row, the sum of |a x|, the change of the model, and how many columns of `slots` and `place` hold variables that
     may still be touched up.
     """
     power = limits[0]
+    room, whole = np.empty((5, BLOCK)), np.empty((3, BLOCK), dtype=np.int64)
     least = -BEYOND if equal else 0.0
     near, guess, far = _estimate(
-        alpha, slope, cost, shift, lower, upper, limits, bound - at_iterate, least, stride, slots, place, live, x
+        alpha, slope, cost, shift, lower, upper, limits, bound - at_iterate, least, stride, slots, place, x, room, whole
     )
     multiplier, miss, size, change, n = 0.0, 0.0, 0.0, 0.0, 0
-    for attempt in range(4):
-        if attempt == 3:
+    for attempt in range(ATTEMPTS):
+        if attempt == ATTEMPTS - 1:
             near, far = least, BEYOND
         n, total, size, change = _sort_out(
-            alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, x
+            alpha, slope, cost, shift, lower, upper, limits, near, far, threads, out, slots, place, found
         )
-        multiplier, miss = _root(slots, n, live, x, bound - total, near, guess, far, power, rounding)
-        # an end of the bracket with something left: the sample has misled
+        _enter(slots, n, power)
+        goal = bound - total
+        guess, _, _ = _root(slots, n, x, goal, near, guess, far, power, 1e-6 * abs(bound), bool(0), room, whole)
+        multiplier, miss, way = _root(slots, n, x, goal, near, guess, far, power, rounding, bool(1), room, whole)
+        # something is left at an end of the bracket: the sample has misled
         width = far - near + 1e-3 * abs(far)
-        if miss > rounding and multiplier >= far:
+        if way > 0:
             near, far = far, far + 8.0 * width
-        elif miss < -rounding and multiplier <= near and near > least:
+        elif way < 0 and near > least:
             near, far = max(least, near - 8.0 * width), near
         else:
+            multiplier = 0.0 if way < 0 and not equal else multiplier
             break
     for k in range(n):
         out[place[k]] = x[k]
         size += abs(slots[COST, k] * x[k])
-    return multiplier, miss, size, change + _promise(slots, n, x, power), n
+    return multiplier, miss, size, change + _promise(slots, n, x, power, room, whole), n
+
+
+@vector_entry
+def wide_rows(
+    slopes: Floats, alpha: Floats, trial: Floats, shift: Floats, lower: Floats, upper: Floats, power: float, out: Floats
+) -> None:
+    """out (R,): what the approximations of rows with these slopes (R, N) change from alpha to the trial."""
+    room, whole = np.empty((4, BLOCK)), np.empty((3, BLOCK), dtype=np.int64)
+    reach, z, falling, rising = room[0], room[1], room[2], room[3]
+    for start in range(0, len(alpha), BLOCK):
+        stop = min(start + BLOCK, len(alpha))
+        x, y, far = alpha[start:stop], trial[start:stop], shift[start:stop]
+        low, high = part(lower, len(alpha), start, stop), part(upper, len(alpha), start, stop)
+        m = stop - start
+        for i in range(m):
+            wide = high[i] - low[i]
+            reach[i] = far[i] * (wide if wide > 0.0 else 1.0)
+        for i in range(m):
+            z[i] = (y[i] - x[i]) / reach[i]
+        primitives(z[:m], power, falling[:m], whole)
+        for i in range(m):
+            z[i] = -z[i]
+        primitives(z[:m], power, rising[:m], whole)
+        for r in range(len(out)):
+            row = slopes[r, start:stop]
+            change = 0.0
+            for i in range(m):
+                change += reach[i] * (min(row[i], 0.0) * falling[i] - max(row[i], 0.0) * rising[i])
+            out[r] += change

@@ -1,13 +1,23 @@
-"""Single passes over very many variables, shared by threads: results do not depend on the number of threads."""
+"""Single passes over very many variables, shared by threads: results do not depend on the number of threads.
+
+Of an array whose numbers are all alike the first `PIECE` may be given: what is not read from memory costs nothing.
+"""
 
 import numpy as np
 
 from mdstopo.jit import kernel, member_kernel, vector_entry
 from mdstopo.native.threads import shared, taken
+from mdstopo.optimizer.powers import largest
 from mdstopo.optimizer.problem import Floats, Ints
 
 #: variables that a thread takes at once
 PIECE = 8192
+
+
+@member_kernel
+def part(x: Floats, n: int, start: int, stop: int) -> Floats:
+    """x[start:stop] of an array of n, or of one whose numbers are alike."""
+    return x[start:stop] if len(x) == n else x[: stop - start]
 
 
 @vector_entry
@@ -18,22 +28,25 @@ def wide_residual(
     """max |x - clip(x - (slope + multiplier cost)/steepest)|, at most what a step along -gradient moves."""
     most = np.zeros(_pieces(len(alpha)))
     counter = np.zeros(1, np.int64)
-    shared(_residuals, threads, (counter, alpha, slope, cost, lower, upper, multiplier, steepest, most))
-    return float(most.max())
+    shared(_residuals, threads, (counter, alpha, slope, cost, lower, upper, multiplier, 1.0 / steepest, most))
+    return largest(most)
 
 
 @member_kernel
 def _residuals(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float,
-    steepest: float, out: Floats,
+    unit: float, out: Floats,
 ) -> None:  # fmt: skip
+    room = np.empty(PIECE)
     piece = taken(counter)
     while piece < len(out):
-        most = 0.0
-        for i in range(piece * PIECE, min((piece + 1) * PIECE, len(alpha))):
-            moved = alpha[i] - (slope[i] + multiplier * cost[i]) / steepest
-            most = max(most, abs(alpha[i] - max(lower[i], min(upper[i], moved))))
-        out[piece] = most
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, len(alpha))
+        x, g, a = alpha[start:stop], slope[start:stop], part(cost, len(alpha), start, stop)
+        low, high = part(lower, len(alpha), start, stop), part(upper, len(alpha), start, stop)
+        for i in range(stop - start):
+            moved = x[i] - (g[i] + multiplier * a[i]) * unit
+            room[i] = x[i] - max(low[i], min(high[i], moved))
+        out[piece] = largest(room[: stop - start])
         piece = taken(counter)
 
 
@@ -54,13 +67,18 @@ def _adapted(
 ) -> None:  # fmt: skip
     piece = taken(counter)
     while piece * PIECE < len(shift):
-        for i in range(piece * PIECE, min((piece + 1) * PIECE, len(shift))):
-            step = trial[i] - alpha[i]
-            agreement = last[i] * step
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, len(shift))
+        before, now, far = steps[0, start:stop], steps[1, start:stop], shifts[start:stop]
+        old, x, y, was = last[start:stop], alpha[start:stop], trial[start:stop], shift[start:stop]
+        n = stop - start
+        for i in range(n):
+            before[i] = old[i]
+        for i in range(n):
+            now[i] = y[i] - x[i]
+        for i in range(n):
+            agreement = before[i] * now[i]
             factor = grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
-            steps[0, i] = last[i]
-            steps[1, i] = step
-            shifts[i] = min(max(shift[i] * factor, least), most)
+            far[i] = min(max(was[i] * factor, least), most)
         piece = taken(counter)
 
 
@@ -70,19 +88,63 @@ def wide_change(x: Floats, y: Floats, unit: Floats, threads: int) -> tuple[float
     plain, scaled = np.zeros(_pieces(len(x))), np.zeros(_pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_changes, threads, (counter, x, y, unit, plain, scaled))
-    return float(plain.max()), float(scaled.max())
+    return largest(plain), largest(scaled)
 
 
 @member_kernel
 def _changes(counter: Ints, x: Floats, y: Floats, unit: Floats, plain: Floats, scaled: Floats) -> None:
+    room = np.empty(PIECE)
     piece = taken(counter)
     while piece < len(plain):
-        most, largest = 0.0, 0.0
-        for i in range(piece * PIECE, min((piece + 1) * PIECE, len(x))):
-            change = abs(x[i] - y[i])
-            most = max(most, change)
-            largest = max(largest, change / unit[i])
-        plain[piece], scaled[piece] = most, largest
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, len(x))
+        one, other, wide, n = x[start:stop], y[start:stop], part(unit, len(x), start, stop), stop - start
+        for i in range(n):
+            room[i] = one[i] - other[i]
+        plain[piece] = largest(room[:n])
+        for i in range(n):
+            room[i] /= wide[i]
+        scaled[piece] = largest(room[:n])
+        piece = taken(counter)
+
+
+@vector_entry
+def wide_largest(x: Floats, threads: int) -> float:
+    """max |x|; NaN where one is NaN."""
+    most = np.zeros(_pieces(len(x)))
+    counter = np.zeros(1, np.int64)
+    shared(_sizes, threads, (counter, x, most))
+    return largest(most)
+
+
+@member_kernel
+def _sizes(counter: Ints, x: Floats, out: Floats) -> None:
+    piece = taken(counter)
+    while piece < len(out):
+        out[piece] = largest(x[piece * PIECE : min((piece + 1) * PIECE, len(x))])
+        piece = taken(counter)
+
+
+@vector_entry
+def wide_sum(a: Floats, x: Floats, threads: int) -> float:
+    """sum of a x, of pieces and these in their order."""
+    sums = np.zeros(_pieces(len(x)))
+    counter = np.zeros(1, np.int64)
+    shared(_sums, threads, (counter, a, x, sums))
+    total = 0.0
+    for piece in range(len(sums)):
+        total += sums[piece]
+    return total
+
+
+@member_kernel
+def _sums(counter: Ints, a: Floats, x: Floats, out: Floats) -> None:
+    piece = taken(counter)
+    while piece < len(out):
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, len(x))
+        one, other, total = part(a, len(x), start, stop), x[start:stop], 0.0
+        for i in range(stop - start):
+            total += one[i] * other[i]
+        out[piece] = total
         piece = taken(counter)
 
 

@@ -79,7 +79,7 @@ def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
 
 
 class _Toy:
-    """A problem of a few variables, two rows competing, or of many with one: enough to meet every kernel."""
+    """A problem of two rows, both of which decide, or of many variables the higher: enough to meet every kernel."""
 
     def __init__(self, size: int) -> None:
         self.initial = np.full(size, 0.5)
@@ -87,7 +87,7 @@ class _Toy:
         self.upper = np.ones(size)
         self.linear = LinearRows(np.ones((1, size)), np.array([0.5 * size]), np.array([True]))
         rising = np.linspace(1.0, 3.0, size)
-        self._slopes = np.array([rising, rising[::-1]] if size < MANY else [rising])
+        self._slopes = np.array([rising, rising[::-1] if size < MANY else 0.9 * rising])
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows and their slopes."""

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from mdstopo.jit import vector_entry
 from mdstopo.native.threads import VARIABLE
 from mdstopo.optimizer import driver, wide
 from mdstopo.optimizer.driver import Gsao
-from mdstopo.optimizer.powers import powers
+from mdstopo.optimizer.powers import largest, powers, primitives
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.safeguards import next_shift
@@ -54,10 +55,10 @@ def test_a_step_is_that_of_the_interior_point(n, equal, options, monkeypatch):
     problem = Many(1, equal, n)
     chosen = settings("default", options)
     for state in states(problem, 5, monkeypatch, **options):
-        new = wide.propose(state, 0, problem.lower, problem.upper, problem.linear, chosen)
+        new = wide.propose(state, np.array([0]), wide.Space.of(problem.lower, problem.upper, problem.linear), chosen)
         size = abs(state.objective)
-        assert new.predicted == pytest.approx(state.predicted, rel=1e-7, abs=1e-10 * size)
-        assert new.predicted >= state.predicted - 1e-12 * size
+        assert state.objective - new.promised == pytest.approx(state.predicted, rel=1e-7, abs=1e-10 * size)
+        assert state.objective - new.promised >= state.predicted - 1e-12 * size
         assert new.kkt == pytest.approx(state.kkt, rel=1e-5, abs=1e-8)
         assert np.abs(new.trial - state.trial).max() < 1e-3
         assert np.abs(new.trial - state.trial).mean() < 1e-6
@@ -86,6 +87,7 @@ def test_the_same_state_gives_the_same_bits():
 
 def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
     monkeypatch.setattr(wide, "SHARED", 1)
+    monkeypatch.setattr(wide, "LIGHT", 1)
     found = []
     for threads in (1, 2, 3):
         monkeypatch.setenv(VARIABLE, str(threads))
@@ -133,3 +135,98 @@ def test_powers_are_right_to_rounding(exponent):
     out = np.empty_like(t)
     powers.py_func(t, exponent, out, np.empty((3, len(t)), dtype=np.int64))
     assert np.allclose(out, t**exponent, rtol=1e-14, atol=0.0)
+
+
+@vector_entry
+def all_primitives(z, power, value, room):
+    primitives(z, power, value, room)
+    return largest(value)
+
+
+@pytest.mark.parametrize("power", [-5.0, -1.0, -0.5, 0.0, 0.5, 0.9, 1.0])
+@pytest.mark.parametrize("most", [1e-12, 1e-3, 0.1, 0.3, 0.45, 0.9])
+def test_primitives_are_right_to_rounding_near_and_far(power, most):
+    z = most * np.random.default_rng(0).uniform(-1.0, 1.0, 500)
+    out = np.empty_like(z)
+    found = all_primitives(z, power, out, np.empty((3, len(z)), dtype=np.int64))
+    exact = np.log1p(z) if power == 0.0 else np.expm1(power * np.log1p(z)) / power
+    assert np.allclose(out, exact, rtol=3e-15 if most < 0.4 else 1e-14, atol=1e-15 if most > 0.4 else 0.0)
+    assert found == np.abs(out).max()
+
+
+def test_the_largest_of_numbers_with_nan_is_nan():
+    out, room = np.empty(40), np.empty((3, 40), dtype=np.int64)
+    z = np.full(40, -0.25)
+    assert all_primitives(z, 1.0, out, room) == 0.25
+    z[17] = np.nan
+    assert np.isnan(all_primitives(z, 1.0, out, room))
+
+
+class Several(Many):
+    """The same, and rows that compete: with `shares` of its gradient, at values so far below it."""
+
+    def __init__(self, seed, shares, drops):
+        super().__init__(seed, True, 1_020)
+        self.shares, self.drops = shares, drops
+
+    def evaluate(self, x, gradient=True):
+        one = super().evaluate(x)
+        turned = [one.gradients[0], *(s * one.gradients[0] for s in self.shares)]
+        rows = one.objective * np.array([1.0, *(1.0 - drop for drop in self.drops)])
+        return Sample(float(rows[0]), rows, np.array(turned), one.constraint_rows, one.constraint_gradients)
+
+
+@pytest.mark.parametrize(("share", "drop", "alone"), [(0.95, 0.1, True), (-0.1, 0.1, False), (-0.1, 1e-9, False)])
+def test_the_highest_row_makes_the_step_where_it_decides_alone(share, drop, alone, monkeypatch):
+    problem, chosen = Several(7, (0.9, share), (0.14, drop)), settings()
+    (state,) = states(problem, 1, monkeypatch)
+    space = wide.Space.of(problem.lower, problem.upper, problem.linear)
+    found = wide.propose(state, np.arange(3), space, chosen)
+    assert (found is not None) == alone
+    if found is not None:
+        assert np.abs(found.trial - state.trial).max() < 1e-3
+        assert state.objective - found.promised == pytest.approx(state.predicted, rel=1e-7)
+        assert found.kkt == pytest.approx(state.kkt, rel=1e-5)
+
+
+def test_bounds_and_costs_that_are_alike_are_not_read_and_change_no_bit():
+    problem = Many(8, True)
+    problem.lower, problem.upper = np.full(N, 1e-3), np.ones(N)
+    problem.linear = LinearRows(np.ones((1, N)), np.array([0.3 * N]), np.array([True]))
+    space = wide.Space.of(problem.lower, problem.upper, problem.linear)
+    assert len(space.lower) == len(space.upper) == len(space.rows[0]) < N
+    whole = wide.Space(problem.lower, problem.upper, problem.linear, (problem.linear.A[0],), np.ones(N))
+    for state in states(problem, 5):
+        one, other = (wide.propose(state, np.array([0]), each, settings()) for each in (space, whole))
+        assert np.array_equal(one.trial, other.trial)
+        assert one[1:] == other[1:]
+
+
+def test_a_sample_that_misleads_costs_time_alone(monkeypatch):
+    n = 2_000
+    problem = Many(9, True, n)
+    problem.lower, problem.upper = np.full(n, 1e-3), np.ones(n)
+    problem.linear = LinearRows(np.ones((1, n)), np.array([0.3 * n]), np.array([True]))
+    seen = np.zeros(n, dtype=bool)
+    seen[:: wide._stride(n)] = True
+    problem.falling, problem.rising = np.where(seen, 1.0, 50.0 + np.arange(n) / n), np.zeros(n)
+    (state,) = states(problem, 1, monkeypatch)
+    new = wide.propose(state, np.array([0]), wide.Space.of(problem.lower, problem.upper, problem.linear), settings())
+    assert new is not None
+    assert state.objective - new.promised == pytest.approx(state.predicted, rel=1e-7)
+    assert abs(problem.linear.excess(new.trial)[0]) <= 1e-14 * 0.6 * n
+
+
+def test_what_is_kept_is_what_the_function_gives_and_only_for_the_same_arrays():
+    calls = []
+
+    def size(x):
+        calls.append(x)
+        return len(x)
+
+    kept = wide.Kept(size)
+    one, same, other, third = np.zeros(1), np.zeros(1), np.zeros(2), np.zeros(3)
+    assert [kept(x) for x in (one, one, other, one)] == [1, 1, 2, 1]
+    assert len(calls) == 2
+    assert (kept(same), len(calls)) == (1, 3)
+    assert (kept(third), kept(one), len(calls)) == (3, 1, 5)
