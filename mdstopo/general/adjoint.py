@@ -368,8 +368,8 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
         weights_of(tag, model, tables, track, w, weight)
         o = track.index[w, 0]
         stages = track.index[w + 1, 0] - o
-        # a step with one stage, at its end, has begun where the one before has ended
-        inside = o + stages // 2 if stages > 1 else o - 1
+        # of two stages the first is where the step begins; one that has its end alone begins where the last one ended
+        inside = o + (stages - 1) // 2 if stages > 1 else o - 1
         if bends:
             size, mine = at_stage(model, strength, segment, track, inside, j, -1, desk, slopes, rows)
         for i in range(track.index[w + 1, 0] - o):
