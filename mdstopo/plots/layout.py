@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import GROUND
-from mdstopo.plots.scenery import ends_at, outline, start_state
+from mdstopo.plots.scenery import edge_at, ends_at, outline, start_state
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import COLOURS, WIDTH
 from mdstopo.plots.watch import points_at
@@ -18,6 +18,7 @@ WIDEST, NARROWEST = 1.6, 0.15
 MOST = 20_000
 #: how many times larger than the design a scene may be before its far ends (of contacts, say) are left out of the view
 FAR, MARGIN = 2.0, 0.12
+_CONTACT = "#222222"
 
 
 def draw(module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = ()) -> Any:
@@ -32,6 +33,7 @@ def draw(module: Any, source: Source, load_case: str | None = None, times: tuple
     axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for axis, (t, q) in zip(axes, panels, strict=True):
         _bodies(axis, source, q)
+        _contacts(axis, source, q)
         _members(axis, source, q)
         axis.set_aspect("equal", adjustable="datalim")
         axis.set_xlabel("x, m")
@@ -62,6 +64,16 @@ def _bodies(axis: Any, source: Source, q: Floats) -> None:
             axis.plot(*points_at(case, name, np.concatenate(points), q[None])[0].T, ".", color=colour, markersize=2)
         if name != GROUND:
             axis.plot(q[3 * k], q[3 * k + 1], "+", color=colour, markersize=6, label=name)
+
+
+def _contacts(axis: Any, source: Source, q: Floats) -> None:
+    """Edges as lines, the points that may come against them as rings."""
+    case = source.case
+    for contact in case.contacts:
+        label = "contact" if contact is case.contacts[0] else None
+        axis.plot(*edge_at(case, contact, q).T, "-", color=_CONTACT, linewidth=1.8, alpha=0.6, label=label)
+        places = points_at(case, contact.body, contact.points, q[None])[0]
+        axis.plot(*places.T, "o", color=_CONTACT, markersize=3, markerfacecolor="none", markeredgewidth=0.6)
 
 
 def _members(axis: Any, source: Source, q: Floats) -> None:
@@ -97,6 +109,7 @@ def _look_at_design(axis: Any, source: Source, q: Floats) -> None:
     low, high = np.concatenate(places).min(axis=0), np.concatenate(places).max(axis=0)
     width = float((high - low).max())
     everything = [ends_at(case, group, q).reshape(-1, 2) for group in case.members]
+    everything += [edge_at(case, contact, q) for contact in case.contacts]
     if width > 0.0 and float(np.ptp(np.concatenate(everything), axis=0).max()) > FAR * width:
         axis.set_aspect("equal", adjustable="box")
         axis.set_xlim(low[0] - MARGIN * width, high[0] + MARGIN * width)

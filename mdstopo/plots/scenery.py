@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.case.model import GROUND, Case, Contact, MemberGroup
 from mdstopo.plots.watch import points_at
 
 Floats = NDArray[np.float64]
@@ -22,6 +22,7 @@ def outline(case: Case, body: str) -> Floats:
     for joint in case.joints:
         ends = zip(joint.bodies, (joint.at_first, joint.at_second), strict=True)
         pieces += [np.array([at]) for name, at in ends if name == body]
+    pieces += [contact.points for contact in case.contacts if contact.body == body]
     return hull(np.concatenate(pieces)) if pieces else np.zeros((0, 2))
 
 
@@ -50,6 +51,12 @@ def ends_at(case: Case, group: MemberGroup, q: Floats) -> Floats:
     state = q[None]
     p = points_at(case, group.body_from, group.from_local, state)[0][group.from_index]
     return np.stack([p, points_at(case, group.body_to, group.to_local, state)[0][group.to_index]], axis=1)
+
+
+def edge_at(case: Case, contact: Contact, q: Floats) -> Floats:
+    """(2, 2) both ends of a contact's edge at a state q (3 n_bodies,)."""
+    ends: Floats = points_at(case, contact.edge_body, np.array([contact.edge_from, contact.edge_to]), q[None])[0]
+    return ends
 
 
 def start_state(case: Case) -> Floats:

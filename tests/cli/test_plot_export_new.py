@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mdstopo.cli.group import run_group
-from mdstopo.plots.scenery import hull
+from mdstopo.plots.scenery import edge_at, hull, outline, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import styled
 from mdstopo.plots.table import PLOTS, fitting
@@ -17,6 +17,7 @@ from mdstopo.plots.watch import response_history
 from tests.front.support import CASE
 
 matplotlib = pytest.importorskip("matplotlib")
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
@@ -90,6 +91,17 @@ def test_a_history_of_a_general_scene_is_what_the_engine_reduces(tmp_path):
     history = response_history(engine, alpha, "translation", times)["G2"]
     mean = np.trapezoid(history, times) / 0.2
     assert mean == pytest.approx(engine.evaluate(alpha, gradient=False).objectives["G2"], rel=1e-6)
+
+
+def test_edges_of_contacts_ride_on_their_body_and_points_on_theirs():
+    from mdstopo.case.reader import load_case
+
+    case = load_case(ROOT / "tests/general/cases/crate.yaml")
+    q = start_state(case)
+    q[:3] += 1.0, 2.0, np.pi / 2.0  # the deck
+    assert edge_at(case, case.contacts[1], q) == pytest.approx(np.array([[0.9, 2.13], [-0.2, 2.13]]))
+    corners = outline(case, "crate")
+    assert all((corners == point).all(axis=1).any() for point in case.contacts[1].points[1:])
 
 
 def test_outlines_are_convex_hulls():
