@@ -36,15 +36,3 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
         )
     if case.variables and solver.sensitivity not in BY_PARAMETERS:
         yield "solver.sensitivity", no_parameters(solver.sensitivity)
-    if solver.settle and _of_crush(case):
-        yield "solver.settle", "a start at rest gives no derivatives by parameters of crush; leave these variables out"
-
-
-def _of_crush(case: Case) -> bool:
-    """Whether a parameter of `crush` is a variable."""
-    laws = {group.name: group.laws for group in case.members}
-    return any(
-        laws[name][place].type == "crush"
-        for each in case.variables
-        for name, place in zip(each.groups, each.laws, strict=True)
-    )

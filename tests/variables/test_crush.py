@@ -377,12 +377,6 @@ def test_on_either_side_of_such_a_start_the_derivatives_are_others():
     assert slopes[1] == 0.0
 
 
-def test_a_start_at_rest_with_such_variables_is_refused_by_name():
-    case = case_of(one(), settle="true")
-    with pytest.raises(CaseError, match=r"parameters of crush; leave these variables out"):
-        mdstopo.evaluate(case)
-
-
 @pytest.mark.parametrize("parameter", ["stiffness", "force"])
 def test_bounds_of_what_must_be_above_zero_are_too(parameter):
     text = one().replace(f"parameter: {parameter}, lower: {1000 if parameter == 'stiffness' else 40}",

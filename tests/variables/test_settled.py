@@ -1,13 +1,11 @@
 """A start at rest that depends on parameters of laws: where it is, and its place in the gradients."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.status import Status
@@ -373,12 +371,55 @@ def test_a_value_that_cannot_hold_its_load_ends_the_evaluation_with_the_body_nam
     assert mdstopo.evaluate(case, variables={"k": 300.0}).status.ok
 
 
-def test_parameters_of_what_is_crushed_do_not_go_with_a_start_at_rest():
-    case = hanging(0, k="group: cord, parameter: stiffness, lower: 100, upper: 900")
-    _, rope = case.members
-    crushed = read_case(
-        HANGS.replace("SPEED", "0").replace("VARIABLES", "").replace("type: spring, stiffness: 500",
-        "type: crush, stiffness: 500, force: 90")
-    )  # fmt: skip
-    with pytest.raises(CaseError, match="no derivatives by parameters of crush"):
-        Evaluator(replace(case, members=(crushed.members[0], rope)))
+#: a block on two legs that its weight may crush, beside springs; pushed down, lifted and let down again
+BLOCK = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.5}
+bodies: {b: {mass: 10, inertia: 0.5, position: [0, 1]}}
+points:
+  t: {body: b, grid: {list: [[-0.3, 0.9], [0.3, 0.9]]}}
+  g: {body: ground, grid: {list: [[-0.3, 0], [0.3, 0]]}}
+  s: {body: ground, grid: {list: [[-2, 1.2], [2, 1.4]]}}
+members:
+  legs: {from: t, to: g, connect: pairs, law: {type: crush, stiffness: 6000, force: PLATEAU, gap: 0.001}}
+  hold: {from: t, to: s, connect: pairs, law: {type: spring, stiffness: 900, damping: 20}, design: false}
+loads:
+  - body: b
+    force:
+      - {table: [[0, 0], [0.1, 60], [0.3, -20], [0.5, 0]]}
+      - {table: [[0, 0], [0.1, -250], [0.25, 100], [0.5, 0]]}
+design:
+  initial: 0.8
+  variables:
+    k: {group: legs, parameter: stiffness, lower: 1000, upper: 9000}
+    F: {group: legs, parameter: force, lower: 10, upper: 100}
+    gap: {group: legs, parameter: gap, lower: -0.01, upper: 0.02}
+objectives:
+  Y: {response: {displacement: {body: b, component: y}}, over_time: final}
+  A: {response: {angle: {body: b}}, over_time: final}
+  E: {response: energy, over_time: mean}
+combine: {weights: {Y: 1, A: 1, E: 1}}
+solver: {tolerance: 1.0e-12, integrator: runge_kutta, settle: true}
+"""
+
+
+@pytest.mark.parametrize("plateau", [100, 30], ids=["elastic at rest", "crushed at rest"])
+def test_legs_that_carry_the_weight_have_exact_derivatives_by_their_parameters(plateau):
+    case = read_case(BLOCK.replace("PLATEAU", str(plateau)))
+    found = mdstopo.evaluate(case)
+    assert found.status.ok, found.message
+    direct = mdstopo.evaluate(case, method="direct")
+    for objective, own in found.variable_gradients.items():
+        scale = max(abs(own[each.name][0]) * (each.upper - each.lower) for each in case.variables)
+        for each in case.variables:
+            width, total = each.upper - each.lower, 0.0
+            for k, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+                for sign in (1.0, -1.0):
+                    there = {each.name: each.initial + sign * k * 3e-4 * width}
+                    value = mdstopo.evaluate(case, variables=there, gradient=False).objectives[objective]
+                    total += sign * weight * value / 3e-4
+            assert abs(own[each.name][0] * width - total) <= 1e-6 * scale, (objective, each.name)
+            other = direct.variable_gradients[objective][each.name][0]
+            assert abs(own[each.name][0] - other) * width <= 1e-9 * scale, (objective, each.name)
+    assert (found.variable_gradients["Y"]["gap"][0] != pytest.approx(0.0, abs=1e-9)) == (plateau == 100)
