@@ -138,12 +138,13 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
 
 def _values(done: "Finalized") -> list[list[str]]:
     """The values of each variable in the four designs; of several the lowest and the highest."""
+    full = getattr(done.columns[0].found, "variables", {})
     rows = []
-    for name, full in getattr(done.columns[0].found, "variables", {}).items():
-        own = [each for each in done.values if each.name == name]
-        before, now = [each.before for each in own], [each.value for each in own]
-        unit = f", {own[0].unit}" if own and own[0].unit else ""
-        rows.append([f"{name}{unit}", _range(full.tolist()), _range(before), _range(now), _range(now)])
+    for each in done.case.variables:
+        own = [found for found in done.values if found.name == each.name]
+        before, now = [found.before for found in own], [found.value for found in own]
+        title = f"{each.name}, {each.unit}" if each.unit else each.name
+        rows.append([title, _range(full[each.name].tolist()), _range(before), _range(now), _range(now)])
     return rows
 
 

@@ -212,6 +212,39 @@ def test_one_value_of_two_groups_survives_that_different_members_are_kept() -> N
     assert two.constraints == pytest.approx(one.constraints[:2], abs=1e-12)
 
 
+@pytest.mark.parametrize("more", [{}, {"solver.settle": "true"}])
+def test_a_value_that_fixed_members_have_too_survives(more: dict[str, str]) -> None:
+    both = "{group: [star, legs], parameter: stiffness, each: member, initial: 5000, lower: 1000, upper: 9000}"
+    legs = "{from: left, to: {body: truck, at: [0.2, -1]}, law: {type: spring, stiffness: 3000, damping: 90}, "
+    ground = "[{type: fixed, bodies: [truck, ground], at: [0, -1]}]"
+    case = read_case(
+        PARTS.replace("members:\n", f"members:\n  legs: {legs}design: false}}\n").replace(
+            "gap: 0.01}, cost", "gap: 0.0}, cost"
+        ),
+        overrides={
+            "design.variables": f"{{both: {both}}}",
+            "constraints": "[{volume: all, limit: 9}]",
+            "loads": "[{body: crate, force: [[0, 0, 0], [0.1, 200, 50]]}]",
+            "joints": ground,
+            **more,
+        },
+    )
+    design = design_of(case)
+    kept = np.array([0, 2, 4, 6])
+    assert unlike(case, kept) == {"star", "legs"}
+    reduced, own, final, told = final_of(case, kept, design)
+    assert told == []
+    stiff = design[8:]
+    law = {g.name: g.laws[0] for g in final.members}
+    assert [law[f"legs_{k}"].stiffness for k in range(4)] == list(stiff)
+    assert [law[f"star_{k}"].stiffness for k in (0, 2)] == [design[4] * stiff[0], design[6] * stiff[2]]
+    assert same_motion(reduced, own, final, final.start) < 1e-9
+    whole = Evaluator(reduced).evaluate(own)
+    assert Evaluator(final).evaluate(final.start).objectives["slide"] == pytest.approx(
+        whole.objectives["slide"], rel=1e-9
+    )
+
+
 def test_groups_taken_apart_are_the_same_problem() -> None:
     case = load_case("parts.yaml", {"design.mirrored": "[[port, star]]", "design.shared": "[star]"})
     single = apart(case, {"port", "star"})
