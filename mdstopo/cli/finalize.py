@@ -40,9 +40,10 @@ def command(
 ) -> int:
     """Keep the members of a result of `run` that count, size them anew, verify them, write them as a case.
 
-    Say --keep or --threshold. The sizes are optimised again from those in the result, with only these members; the
-    outcome is computed with a hundredth of the solver's tolerance. In the case that is written each member is a group
-    of its own with its size in its law: `mdstopo simulate` computes its motion without any design.
+    Say --keep or --threshold. The sizes are optimised again from those in the result, with only these members, and so
+    are parameters of laws that vary; the outcome is computed with a hundredth of the solver's tolerance. In the case
+    that is written each member is a group of its own with its size and its parameters in its law: `mdstopo simulate`
+    computes its motion without any design.
     """
     if (keep is None) == (threshold is None):
         raise click.UsageError("say --keep or --threshold, one of them")
@@ -59,16 +60,21 @@ def command(
     place = out or result_path.with_suffix(".final.yaml")
     if place.exists() and not (overwrite and place.is_file()):
         raise StoreError(f"{place} exists already; it is left as it is")
-    case, alpha = opened(view, overrides)
+    case, design = opened(view, overrides, output.notice)
+    alpha = design[: case.n_design]
     for taken in (result_path, case.path):
         if taken is not None and place.exists() and taken.exists() and place.samefile(taken):
             raise StoreError(f"{place}: this is what the new case is made from; choose another place with --out")
-    kept, reduced = ready(case, alpha, keep, threshold)
+    kept, reduced = ready(case, design, keep, threshold)
     if not view.finished:
         output.notice(f"{result_path}: the run is not finished ({view.status}); its best design so far is taken")
     if others := tied(alpha, kept):
         output.notice(
             f"{others} more members have the alpha of the smallest one kept: of equal ones the first are kept"
+        )
+    if keep is not None and len(kept) > keep:
+        output.notice(
+            f"{len(kept) - keep} more members are kept: they have one alpha (`shared`, `mirrored`) with the others"
         )
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
@@ -77,7 +83,7 @@ def command(
     with display(quiet) as show:
         done = finalize(
             case,
-            alpha,
+            design,
             kept,
             reduced,
             place=place,
@@ -118,6 +124,7 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
             values = (number(float(each.constraints[i]) + row.bound, 9) for each in found)
             rows.append([_constraint(done.case, i), *values])
         rows.append(["members", *(str(column.members) for column in done.columns)])
+        rows += _values(done)
         output.table(rows)
     rows = [["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"]]
     if done.tighter:
@@ -127,6 +134,25 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
     if done.text:
         rows.append(["case", str(place)])
     output.table(rows)
+
+
+def _values(done: "Finalized") -> list[list[str]]:
+    """The values of each variable in the four designs; of several the lowest and the highest."""
+    full = getattr(done.columns[0].found, "variables", {})
+    rows = []
+    for each in done.case.variables:
+        own = [found for found in done.values if found.name == each.name]
+        before, now = [found.before for found in own], [found.value for found in own]
+        title = f"{each.name}, {each.unit}" if each.unit else each.name
+        rows.append([title, _range(full[each.name].tolist()), _range(before), _range(now), _range(now)])
+    return rows
+
+
+def _range(values: list[float]) -> str:
+    if not values:
+        return "-"
+    least, most = min(values), max(values)
+    return number(most, 9) if least == most else f"{number(least)} to {number(most)}"
 
 
 def _constraint(case: "Case", i: int) -> str:
@@ -178,6 +204,16 @@ def _document(done: "Finalized", place: Path) -> dict[str, Any]:
             for (group, member), before, after in zip(
                 done.places, done.before.tolist(), done.alpha.tolist(), strict=True
             )
+        ],
+        "variables": [
+            {
+                "name": each.name,
+                "member": each.member,
+                "unit": each.unit,
+                "value_before": each.before,
+                "value": each.value,
+            }
+            for each in done.values
         ],
         "iterations": done.outcome.iterations,
         "evaluations": done.outcome.evaluations,

@@ -1,5 +1,6 @@
 """`mdstopo run`: optimise a case."""
 
+import math
 import shlex
 import sys
 from pathlib import Path
@@ -128,7 +129,8 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     for name, value in outcome.objectives.items():
         rows.append([name, f"{number(outcome.initial_objectives[name], 9)} -> {number(value, 9)}"])
         peaks = outcome.peaks.get(name, ()) if case.uncertainty is None else ()
-        rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in peaks]
+        # an integral or a mean is of no one time
+        rows += [["  peak", f"{number(value, 9)} at {number(t)} s"] for t, value in peaks if not math.isnan(t)]
         rows += lines_of(outcome.conclusion, name)
     if outcome.combined is not None:
         rows.append(["combined", f"{number(outcome.combined, 9)} ({case.combine.method if case.combine else ''})"])

@@ -1,7 +1,8 @@
 """The case of a final system, from the document of the case that it was designed in.
 
 Each member kept is a group of one, its points given in place, its law multiplied by alpha^mu and its cost by alpha; so
-alpha is 1. All else stays as the user wrote it, with what --set changed, and included files written out.
+alpha is 1. Parameters of laws that were variables are numbers; fixed members that differ in them are groups of one,
+too. All else stays as the user wrote it, with what --set changed, and included files written out.
 """
 
 from __future__ import annotations
@@ -19,7 +20,9 @@ from mdstopo.case.model import GROUND, Body, Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.rows import rows_in
-from mdstopo.finalize.laws import sized
+from mdstopo.finalize.apart import free_name
+from mdstopo.finalize.laws import sized as sized_law
+from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
 from mdstopo.store.errors import StoreError
 
 Plain = dict[str, Any]
@@ -40,27 +43,30 @@ def content_of(case: Case) -> Plain:
 
 
 def final_content(
-    content: Plain, case: Case, places: Sequence[tuple[str, int]], alpha: FloatArray
+    content: Plain, case: Case, places: Sequence[tuple[str, int]], design: FloatArray
 ) -> tuple[Plain, list[str]]:
     """The final case as plain values, and sentences about what of the old one it cannot say.
 
     content: of the old case. case: the old one with only the members kept. places (K,): the group of each and its place
-    there. alpha (K,): their sizes; those of size 0 are left out.
+    there. design (K + P,): their sizes, and the values of variables; members of size 0 are left out.
     """
-    names = _names(case, places, alpha)
-    groups: dict[str, list[str]] = {group: [] for group, _ in places}
+    alpha = design[: case.n_design]
+    fixed = _fixed(case)
+    names = _names(case, fixed, places, alpha)
+    sized: dict[str, list[str]] = {group: [] for group, _ in places}
     for (group, _), name in zip(places, names, strict=True):
         if name:
-            groups[group].append(name)
+            sized[group].append(name)
+    groups = {group: own for group, own in fixed.items() if own != [group]} | sized
     told: list[str] = []
-    members = _members(content, case, names, alpha)
+    members = _members(content, case, names, fixed, design)
     final: Plain = {}
     for key, value in content.items():
         if key in ("design", "combine"):
             continue
         if key == "members":
             final[key] = members
-            final["design"] = _design(case, names)
+            final["design"] = _design(case, names) if any(names) else None
         elif key == "points":
             used = _used_points(content, members)
             final[key] = {name: grid for name, grid in (value or {}).items() if name in used}
@@ -68,7 +74,7 @@ def final_content(
             final[key] = _objectives(value or {}, groups, told)
             final["combine"] = _combine(content.get("combine"), final[key])
         elif key == "constraints":
-            final[key] = _constraints(value or [], case, groups, told)
+            final[key] = _constraints(value or [], case, groups, sized, design, told)
         else:
             final[key] = value
     return {key: value for key, value in final.items() if value not in (None, {}, [])}, told
@@ -102,43 +108,78 @@ def _files(case: Case) -> Plain:
     return found
 
 
-def _names(case: Case, places: Sequence[tuple[str, int]], alpha: FloatArray) -> list[str]:
-    """The group of each member: <its group>_<its place there>; empty where it has no size."""
+def _fixed(case: Case) -> dict[str, list[str]]:
+    """Groups without design, each with the groups that it becomes: itself, or one for each member."""
     taken = {group.name for group in case.members if not group.design}
+    return {
+        group.name: [free_name(group.name, i, taken) for i in range(len(group))]
+        if differ(case, group)
+        else [group.name]
+        for group in case.members
+        if not group.design
+    }
+
+
+def _names(
+    case: Case, fixed: Mapping[str, list[str]], places: Sequence[tuple[str, int]], alpha: FloatArray
+) -> list[str]:
+    """The group of each member: <its group>_<its place there>; empty where it has no size."""
+    taken = {*fixed, *(name for own in fixed.values() for name in own)}
     found = []
     for (group, place), size, power in zip(places, alpha.tolist(), case.power.tolist(), strict=True):
-        name = f"{group}_{place}"
-        while name in taken:
-            name += "_"
-        taken.add(name)
+        name = free_name(group, place, taken)
         found.append(name if size**power > 0.0 else "")
     return found
 
 
-def _members(content: Plain, case: Case, names: Sequence[str], alpha: FloatArray) -> Plain:
+def _members(
+    content: Plain, case: Case, names: Sequence[str], fixed: Mapping[str, list[str]], design: FloatArray
+) -> Plain:
     frames = Frames({GROUND: Body(GROUND, 1.0, 1.0, (0.0, 0.0)), **{body.name: body for body in case.bodies}})
+    values = design[case.n_design :]
     members: Plain = {}
     first = 0
     for group in case.members:
         if not group.design:
-            members[group.name] = content["members"][group.name]
+            own = fixed[group.name]
+            if own == [group.name] and group.name in content["members"]:
+                stated = content["members"][group.name]
+                members[group.name] = _at_values(stated, given(case, group, 0, values), case)
+                continue
+            for i, name in enumerate(own):
+                laws = _laws(case, group, i, 1.0, values)
+                members[name] = {**_ends(group, i, frames), "law": laws, "design": False}
             continue
         for i in range(len(group)):
-            name, size = names[first + i], float(alpha[first + i])
+            name, size = names[first + i], float(design[first + i])
             if name:
-                members[name] = _member(group, i, size, frames)
+                laws = _laws(case, group, i, size**group.power, values)
+                members[name] = {**_ends(group, i, frames), "law": laws, "cost": size * float(group.cost[i])}
         first += len(group)
     return members
 
 
-def _member(group: MemberGroup, i: int, alpha: float, frames: Frames) -> Plain:
-    laws = [sized(law, alpha**group.power) for law in group.laws]
+def _at_values(stated: Plain, values: Given, case: Case) -> Plain:
+    """A group as the user wrote it, with parameters of its laws in place."""
+    if not values:
+        return stated
+    laws = stated["law"] if isinstance(stated["law"], list) else [stated["law"]]
+    found = [never_late({**law, **values.get(place, {})}, case) for place, law in enumerate(laws)]
+    return {**stated, "law": found if isinstance(stated["law"], list) else found[0]}
+
+
+def _laws(case: Case, group: MemberGroup, i: int, factor: float, values: FloatArray) -> Plain | list[Plain]:
+    """The laws of member `i` with its size and its parameters in them."""
+    laws = with_values(group.laws, given(case, group, i, values))
+    found = [never_late(sized_law(law, factor), case) for law in laws]
+    return found[0] if len(found) == 1 else found
+
+
+def _ends(group: MemberGroup, i: int, frames: Frames) -> Plain:
     p, q = int(group.from_index[i]), int(group.to_index[i])
     return {
         "from": _end(group.body_from, group.from_local[p : p + 1], group.from_world[p : p + 1], frames),
         "to": _end(group.body_to, group.to_local[q : q + 1], group.to_world[q : q + 1], frames),
-        "law": laws[0] if len(laws) == 1 else laws,
-        "cost": alpha * float(group.cost[i]),
     }
 
 
@@ -197,7 +238,14 @@ def _combine(stated: Plain | None, objectives: Plain) -> Plain | None:
     return {**stated, "weights": weights}
 
 
-def _constraints(stated: list[Plain], case: Case, groups: Mapping[str, list[str]], told: list[str]) -> list[Plain]:
+def _constraints(
+    stated: list[Plain],
+    case: Case,
+    groups: Mapping[str, list[str]],
+    sized: Mapping[str, list[str]],
+    design: FloatArray,
+    told: list[str],
+) -> list[Plain]:
     found: list[Plain] = []
     for i, (entry, row) in enumerate(zip(stated, case.constraints, strict=True)):
         if not isinstance(row, VolumeRow):
@@ -207,9 +255,18 @@ def _constraints(stated: list[Plain], case: Case, groups: Mapping[str, list[str]
             else:
                 told.append(f"constraints[{i}] is left out: {_reason(versions)}")
             continue
-        names = [name for group in row.groups for name in groups[group]]
+        volume = entry["volume"]
+        named = sized if volume == "all" else [volume] if isinstance(volume, str) else volume
+        names = [name for group in named for name in sized.get(group, [])]
         if names:
-            found.append({"volume": "all" if entry["volume"] == "all" else names, row.sense: row.bound})
+            bound = bound_of(row, case.n_design, design)
+            found.append({"volume": "all" if volume == "all" else names, row.sense: bound})
         else:
-            told.append(f"constraints[{i}] is left out: no member that it sums up is kept")
+            told.append(f"constraints[{i}] is left out: {_empty(row)}")
     return found
+
+
+def _empty(row: VolumeRow) -> str:
+    if np.any(row.prices):
+        return "all that it sums up are parameters of laws, which are numbers now"
+    return "no member that it sums up is kept"

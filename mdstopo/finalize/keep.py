@@ -2,88 +2,151 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.design_space import slots_of
 from mdstopo.case.errors import CaseError, Mistake
-from mdstopo.case.model import Case, MemberGroup, VolumeRow
+from mdstopo.case.model import Case, Variable, VolumeRow
+from mdstopo.case.variables import prices
 from mdstopo.case.volume import ROUNDING
 from mdstopo.case.words import count_text, number_text, shown
+from mdstopo.finalize.apart import part, with_own
 
 
-def chosen(alpha: FloatArray, keep: int | None, threshold: float | None) -> IndexArray:
-    """Places (K,), rising, of the `keep` largest alphas (N,), of equal ones the first; or of all >= `threshold`."""
-    if keep is not None:
-        return np.sort(np.argsort(-alpha, kind="stable")[:keep])
-    return np.flatnonzero(alpha >= (0.0 if threshold is None else threshold))
+def chosen(
+    alpha: FloatArray, keep: int | None, threshold: float | None, slots: IndexArray | None = None
+) -> IndexArray:
+    """Places (K,), rising, of the `keep` largest alphas (N,), of equal ones the first; or of all >= `threshold`.
+
+    slots (N,): which alphas are one; all members of one are kept, or none. There may be more than `keep` then.
+    """
+    if keep is None:
+        reaching = alpha >= (0.0 if threshold is None else threshold)
+        return np.flatnonzero(reaching if slots is None else np.isin(slots, slots[reaching]))
+    order = np.argsort(-alpha, kind="stable")
+    if slots is None:
+        return np.sort(order[:keep])
+    # slots in the order of their first members, until there are enough
+    found, first = np.unique(slots[order], return_index=True)
+    ranked = found[np.argsort(first)]
+    before = np.concatenate([[0], np.cumsum(np.bincount(slots)[ranked])[:-1]]) if len(ranked) else ranked
+    return np.flatnonzero(np.isin(slots, ranked[before < keep]))
 
 
-def restricted(case: Case, kept: IndexArray, alpha: FloatArray) -> Case:
+def one_alpha(case: Case) -> IndexArray | None:
+    """(N,) which alphas are one, as a number of each (`shared`, `mirrored`); None where each is its own."""
+    return slots_of({group.name: len(group) for group in case.design_groups}, case.shared, case.mirrored)
+
+
+def restricted(case: Case, kept: IndexArray, design: FloatArray) -> Case:
     """The case with only the design members at `kept` (K,), rising; groups that lose all of theirs are gone.
 
-    alpha (N,): the design; each group's initial one is the mean of those that it keeps, because a case that settles has
-    to settle with its initial design. Bounds of volume rows stay the numbers that they are. It has one start, and of
-    several powers the last.
+    design (N,) or (N + P,); each group's initial alpha is the mean of those that it keeps, and each variable's initial
+    value that of its values, because a case that settles has to settle with its initial design. Alphas that are one,
+    and members of several groups that have one value, have to be kept together (`chosen`, `apart`).
+    Variables of which no group is left are gone. Bounds of volume rows stay the numbers that they are. It has one
+    start, and of several powers the last.
     """
+    design = case.whole(design)
     groups = []
-    for group, own in _with_own(case, kept):
+    for group, own in with_own(case, kept):
         if not group.design:
             groups.append(group)
         elif len(own):
-            groups.append(replace(_part(group, own), powers=(), initial=float(_own(case, group, alpha)[own].mean())))
+            initial = float(design[case.group_slices[group.name]][own].mean())
+            groups.append(replace(part(group, own), powers=(), initial=initial))
     names = {group.name for group in groups}
+    variables = tuple(_variable(each, places, design[case.n_design :]) for each, places in _values(case, kept))
     rows = tuple(
-        replace(row, groups=tuple(n for n in row.groups if n in names), coefficients=row.coefficients[kept])
-        if isinstance(row, VolumeRow)
-        else row
+        _row(row, kept, tuple(n for n in row.groups if n in names), variables) if isinstance(row, VolumeRow) else row
         for row in case.constraints
     )
-    return replace(case, members=tuple(groups), constraints=rows, optimizer=replace(case.optimizer, starts=1))
+    mirrored = [tuple(name for name in pair if name in names) for pair in case.mirrored]
+    return replace(
+        case,
+        members=tuple(groups),
+        constraints=rows,
+        optimizer=replace(case.optimizer, starts=1),
+        shared=tuple(name for name in case.shared if name in names),
+        mirrored=tuple(pair for pair in mirrored if len(pair) > 1),
+        variables=variables,
+    )
 
 
-def _own(case: Case, group: MemberGroup, alpha: FloatArray) -> FloatArray:
-    return alpha[case.group_slices[group.name]]
+def kept_values(case: Case, kept: IndexArray) -> IndexArray:
+    """Places among the values (P,) of variables, rising, of those that some member kept has; as `restricted`."""
+    found = [places for _, places in _values(case, kept)]
+    return np.concatenate(found) if found else np.zeros(0, dtype=np.intp)
+
+
+def _values(case: Case, kept: IndexArray) -> Iterator[tuple[Variable, IndexArray]]:
+    """Each variable that has a group left, with only such groups, and the places of its values among all (P,)."""
+    own = {group.name: places for group, places in with_own(case, kept)}
+    first = 0
+    for each in case.variables:
+        left = [(name, law) for name, law in zip(each.groups, each.laws, strict=True) if len(own[name])]
+        if left:
+            places = own[left[0][0]] if each.each == "member" else np.zeros(1, dtype=np.intp)
+            assert each.each != "member" or all(np.array_equal(own[name], places) for name, _ in left)
+            names, laws = zip(*left, strict=True)
+            yield replace(each, groups=names, laws=laws, count=len(places)), first + places
+        first += each.count
+
+
+def _variable(variable: Variable, places: IndexArray, values: FloatArray) -> Variable:
+    mean = float(values[places].mean())
+    return replace(variable, initial=min(max(mean, variable.lower), variable.upper))
+
+
+def _row(row: VolumeRow, kept: IndexArray, groups: tuple[str, ...], variables: tuple[Variable, ...]) -> VolumeRow:
+    own = prices(variables, groups) if len(row.prices) else row.prices
+    return replace(row, groups=groups, coefficients=row.coefficients[kept], prices=own)
 
 
 def places(case: Case, kept: IndexArray) -> list[tuple[str, int]]:
     """Of each design member at `kept`: the name of its group, and its place in it from 0."""
-    return [(group.name, int(i)) for group, own in _with_own(case, kept) if group.design for i in own]
+    return [(group.name, int(i)) for group, own in with_own(case, kept) if group.design for i in own]
 
 
 def check(case: Case) -> None:
-    """Refuse a case whose alphas cannot be taken member by member. Raises CaseError with every reason."""
-    wrong = {
-        "uncertainty": case.uncertainty is not None,
-        "design.shared": bool(case.shared),
-        "design.mirrored": bool(case.mirrored),
-        "design.variables": bool(case.variables),
-    }
-    mistakes = [
-        case.marks.mistake(path, f"a case with {path} cannot be finalized") for path, found in wrong.items() if found
-    ]
-    _raise(case, mistakes)
+    """Refuse a case that has no one design. Raises CaseError."""
+    if case.uncertainty is not None:
+        _raise(case, [case.marks.mistake("uncertainty", "a case with uncertainty cannot be finalized")])
 
 
-def check_restricted(case: Case) -> None:
-    """Refuse what the members kept cannot do. Raises CaseError with every reason."""
-    _raise(case, [case.marks.mistake(path, message) for path, message in _undone(case)])
+def check_restricted(case: Case, split: Iterable[str] = ()) -> None:
+    """Refuse what the members kept cannot do. Raises CaseError with every reason.
+
+    split: groups that were taken apart.
+    """
+    _raise(case, [case.marks.mistake(path, message) for path, message in _undone(case, set(split))])
 
 
-def _undone(case: Case) -> Iterator[tuple[str, str]]:
+def _undone(case: Case, split: set[str]) -> Iterator[tuple[str, str]]:
     names = {group.name for group in case.members}
+
+    def lost(group: str | None) -> str:
+        if group in split:
+            return (
+                f"it looks at the members of {shown(str(group))}, of which others are kept than of the groups whose "
+                "values (`each: member`) they have: keep the same, or give these groups variables of their own"
+            )
+        return "" if group in (None, *names) else _nobody(str(group))
+
     for objective in case.objectives:
-        if objective.response.group not in (None, *names):
-            yield f"objectives.{objective.name}", _nobody(str(objective.response.group))
-    upper = case.upper
+        if message := lost(objective.response.group):
+            yield f"objectives.{objective.name}", message
+    upper = np.concatenate([case.upper, *(np.full(each.count, each.upper) for each in case.variables)])
     for i, row in enumerate(case.constraints):
         if not isinstance(row, VolumeRow):
-            if row.response.group not in (None, *names):
-                yield f"constraints[{i}]", _nobody(str(row.response.group))
+            if message := lost(row.response.group):
+                yield f"constraints[{i}]", message
             continue
-        most = float(row.coefficients @ upper)
+        most = row.spent(upper)
         if row.sense != "limit" and row.bound > most + ROUNDING * max(most, abs(row.bound)):
             yield (
                 f"constraints[{i}].{row.sense}",
@@ -100,29 +163,3 @@ def _nobody(group: str) -> str:
 def _raise(case: Case, mistakes: list[Mistake]) -> None:
     if mistakes:
         raise CaseError(mistakes, str(case.path or case.name))
-
-
-def _with_own(case: Case, kept: IndexArray) -> Iterator[tuple[MemberGroup, IndexArray]]:
-    """Each group with the places in it of those of its members that are kept; none of groups without design."""
-    first = 0
-    for group in case.members:
-        count = len(group) if group.design else 0
-        yield group, kept[(kept >= first) & (kept < first + count)] - first
-        first += count
-
-
-def _part(group: MemberGroup, own: IndexArray) -> MemberGroup:
-    """The group with the members at `own`, and the points that they need."""
-    p, p_index = np.unique(group.from_index[own], return_inverse=True)
-    q, q_index = np.unique(group.to_index[own], return_inverse=True)
-    return replace(
-        group,
-        from_local=group.from_local[p],
-        from_world=group.from_world[p],
-        to_local=group.to_local[q],
-        to_world=group.to_world[q],
-        from_index=p_index,
-        to_index=q_index,
-        length=group.length[own],
-        cost=group.cost[own],
-    )

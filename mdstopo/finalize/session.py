@@ -12,17 +12,20 @@ from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
-from mdstopo.finalize.keep import check, check_restricted, chosen, places, restricted
+from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
 from mdstopo.finalize.text import text_of
+from mdstopo.finalize.values import Parameter, told_apart
 from mdstopo.scene.refusals import refusals
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even, problem_of
 from mdstopo.session.engine import Evaluation, make_engine
 from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.run import run_session
-from mdstopo.session.starts import first_design
+from mdstopo.session.starts import first_design, unshared
 from mdstopo.status import RunStatus
+from mdstopo.store.design import with_values
 from mdstopo.store.errors import StoreError
 from mdstopo.store.reader import ResultView
 from mdstopo.store.stored_case import case_of
@@ -49,10 +52,11 @@ class Finalized:
     """What became of a result.
 
     case: the full one; reduced: with only the members kept. kept (K,): their places among the design members, places:
-    in their groups. before, alpha (K,): their alphas in the result and now. columns: full design, kept, re-optimised,
-    verified. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words. text: the final
-    case, empty where there is none; told: what it cannot say. difference: largest relative one between its objectives
-    and those of the re-optimised design, None where it has none.
+    in their groups. before, alpha (K,): their alphas in the result and now; values: the same of parameters of laws.
+    columns: full design, kept, re-optimised, verified, the last two those of the final case where there are such
+    parameters and it says all. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words.
+    text: the final case, empty where there is none; told: what it cannot say. difference: largest relative one between
+    its objectives and those of the re-optimised design, None where it has none.
     """
 
     case: Case
@@ -67,10 +71,16 @@ class Finalized:
     text: str
     told: list[str]
     difference: float | None
+    values: list[Parameter]
 
 
-def opened(view: ResultView, changes: Mapping[str, str]) -> tuple[Case, FloatArray]:
-    """The case of a run, with further keys set, and its best design (N,). Raises CaseError and StoreError."""
+def opened(
+    view: ResultView, changes: Mapping[str, str], notify: Callable[[str], None] = ignore
+) -> tuple[Case, FloatArray]:
+    """The case of a run, with further keys set, and its best design (N + P,), alphas that are one made so.
+
+    Raises CaseError and StoreError.
+    """
     if view.kind != "run":
         raise StoreError(f"{view.path}: a result of `{view.kind}`; finalize takes one of `run`")
     case = case_of(view, changes)
@@ -79,40 +89,54 @@ def opened(view: ResultView, changes: Mapping[str, str]) -> tuple[Case, FloatArr
             raise StoreError(f"{view.path}: the file {name} is no longer the one that the run read")
     if "design/alpha" not in view.arrays:
         raise StoreError(f"{view.path}: the run has no design yet")
-    return case, np.squeeze(view.alpha) if view.alpha.ndim > 1 else view.alpha
-
-
-def ready(case: Case, alpha: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:
-    """The members to keep and the case with only these; everything that can be refused is refused here.
-
-    alpha (N,): the design. Raises CaseError and StoreError.
-    """
-    check(case)
-    if not case.is_optimizable:
-        raise StoreError(f"{case.path or case.name}: the case has no objectives to size members for")
+    alpha = np.squeeze(view.alpha) if view.alpha.ndim > 1 else view.alpha
     if alpha.shape != (case.n_design,):
         raise StoreError(
             f"{case.path or case.name}: the design has {alpha.size} values; "
             f"the case has {case.n_design} design variables"
         )
-    kept = chosen(alpha, keep, threshold)
-    if not len(kept):
+    space = case.space
+    if unknown := [name for name in view.under("design/variables") if name not in space.parts]:
+        raise StoreError(f"{view.path}: it holds values of the design variable {unknown[0]}; the case has none")
+    design = case.whole(with_values(view, None, alpha, space.parts))
+    if words := unshared(case, design):
+        notify(words)
+        design = np.concatenate([space.expand(space.reduce(design))[: case.n_design], design[case.n_design :]])
+    return case, design
+
+
+def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:
+    """The members to keep and the case with only these; everything that can be refused is refused here.
+
+    design (N,) or (N + P,). Members whose alphas are one are kept together. Without any design member all is kept.
+    Raises CaseError and StoreError.
+    """
+    check(case)
+    if not case.is_optimizable:
+        raise StoreError(f"{case.path or case.name}: the case has no objectives to size members for")
+    whole = case.whole(design)
+    if whole.shape != (case.space.length,):
+        raise ValueError(f"design must have {case.n_design} or {case.space.length} values, not {design.size}")
+    alpha = whole[: case.n_design]
+    kept = chosen(alpha, keep, threshold, one_alpha(case))
+    if not len(kept) and case.n_design:
         raise StoreError(f"no member has alpha of {threshold:g} or more; the largest is {alpha.max():.6g}")
-    reduced = restricted(case, kept, alpha)
-    check_restricted(reduced)
+    split = unlike(case, kept)
+    reduced = restricted(apart(case, split), kept, whole)
+    check_restricted(reduced, split)
     content_of(case)
     return kept, reduced
 
 
 def tied(alpha: FloatArray, kept: IndexArray) -> int:
-    """How many members that are not kept have as large an alpha as the smallest that is."""
-    least = alpha[kept].min()
+    """How many members that are not kept have as large an alpha (N,) as the smallest that is."""
+    least = alpha[kept].min(initial=np.inf)
     return int(np.count_nonzero(alpha >= least)) - len(kept)
 
 
 def finalize(
     case: Case,
-    alpha: FloatArray,
+    design: FloatArray,
     kept: IndexArray,
     reduced: Case,
     *,
@@ -122,36 +146,59 @@ def finalize(
     stop_requested: Callable[[], bool] = never,
     notify: Callable[[str], None] = ignore,
 ) -> Finalized:
-    """Re-optimise the sizes of the members kept, verify them, and make the text of the final case.
+    """Re-optimise the members kept, verify them, and make the text of the final case.
 
-    case, reduced, kept: as `ready` gave them; alpha (N,): the design. place: where the text is going to stand. head:
-    its first lines, comments. The text is empty where the run was interrupted or its design cannot be computed.
+    Their sizes and the parameters of laws that vary are optimised together. case, reduced, kept: as `ready` gave them;
+    design (N,) or (N + P,): the design. place: where the text is going to stand. head: its first lines, comments. The
+    text is empty where the run was interrupted or its design cannot be computed.
     """
-    before = alpha[kept]
+    design = case.whole(design)
+    held = kept_values(apart(case, unlike(case, kept)), kept)
+    count = len(kept)
+    before = design[np.concatenate([kept, case.n_design + held])]
     outcome = run_session(
         reduced, initial=before, on_iteration=on_iteration, stop_requested=stop_requested, notify=notify
     )
     engine = make_engine(reduced)
-    sizes = first_design(reduced, problem_of(engine, even(reduced)), outcome.alpha)[1]
+    reached = np.concatenate([outcome.alpha, *outcome.variables.values()])
+    now = reduced.space.expand(first_design(reduced, problem_of(engine, even(reduced)), reached)[1])
     own = places(case, kept)
+    values = told_apart(case, held, before[count:], now[count:])
+
+    def made(columns: tuple[Column, ...], words: str, text: str, told: list[str], gap: float | None) -> Finalized:
+        sizes, stated = now[:count], before[:count]
+        return Finalized(case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values)
+
     if outcome.status is RunStatus.INTERRUPTED:
-        return Finalized(case, reduced, kept, own, before, sizes, (), outcome, "", "", [], None)
-    tighter, words = _tighter(reduced)
-    count = len(kept)
-    columns = (
-        Column("full design", case.n_design, make_engine(case).evaluate(alpha, gradient=False)),
-        Column("kept as they were", count, engine.evaluate(before, gradient=False)),
-        Column("re-optimised", count, engine.evaluate(sizes, gradient=False)),
-        Column("verified", count, make_engine(tighter).evaluate(sizes, gradient=False)),
-    )
-    text, difference = "", None
+        return made((), "", "", [], None)
+    found = engine.evaluate(now, gradient=False)
+    full = Column("full design", case.n_design, make_engine(case).evaluate(design, gradient=False))
+    first = Column("kept as they were", count, engine.evaluate(before, gradient=False))
     told: list[str] = []
-    there = bool(np.any(sizes**reduced.power > 0.0))
-    if there and columns[-1].found.status.usable and columns[-2].found.status.usable:
-        content, told = final_content(content_of(case), reduced, own, sizes)
+    text, difference = "", None
+    source, sized = reduced, now
+    if found.status.usable and (not count or np.any(now[:count] ** reduced.power > 0.0)):
+        content, told = final_content(content_of(case), reduced, own, now)
         text = head + text_of(content)
-        difference = _difference(_read(text, place), columns[-2].found)
-    return Finalized(case, reduced, kept, own, before, sizes, columns, outcome, words, text, told, difference)
+        final = _read(text, place)
+        difference = _difference(final, found)
+        if reduced.variables and _says_all(final, reduced):
+            # without variables other kernels may compute it: what is reported is what is written
+            source, sized = final, final.start
+            found = make_engine(final).evaluate(sized, gradient=False)
+    tighter, words = _tighter(source)
+    verified = make_engine(tighter).evaluate(sized, gradient=False)
+    columns = (full, first, Column("re-optimised", count, found), Column("verified", count, verified))
+    if not (found.status.usable and verified.status.usable):
+        return made(columns, words, "", [], None)
+    return made(columns, words, text, told, difference)
+
+
+def _says_all(final: Case, reduced: Case) -> bool:
+    """Whether a final case has every objective and constraint of the one that it was made from."""
+    names = [objective.name for objective in final.objectives]
+    same = names == [objective.name for objective in reduced.objectives]
+    return same and len(final.constraints) == len(reduced.constraints)
 
 
 def _tighter(case: Case) -> tuple[Case, str]:

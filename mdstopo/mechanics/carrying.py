@@ -45,7 +45,7 @@ def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
     parts = springs.chunk.shape[0]
     count = np.zeros(parts, np.int64)
     job = (np.zeros(1, np.int64), springs.chunk, block, strength, count)
-    shared(_count_chunks, threads_for(springs, 1), job)
+    shared(_count_chunks, threads_for(springs, np.int64(1)), job)
     left = 0
     for i in range(parts):
         left += count[i]
@@ -76,7 +76,7 @@ def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
     room = strength[3:ROOMY]
     if fill:
         gather = (np.zeros(1, np.int64), springs.chunk, block, springs.member, strength, begin, count, room)
-        shared(_gather_chunks, threads_for(springs, 1), gather)
+        shared(_gather_chunks, threads_for(springs, np.int64(1)), gather)
         for k in range(block.shape[0]):
             for row in range(8):
                 for i in range(fewer[k, 1] + fewer[k, 5], fewer[k, 2]):

@@ -45,7 +45,7 @@ def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
     """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12)."""
     counter = np.zeros(1, np.int64)
     job = (counter, model.chunk, model.block, model.power, model.member, alpha, strength)
-    shared(_scale_chunks, threads_for(model, 1), job)
+    shared(_scale_chunks, threads_for(model, np.int64(1)), job)
 
 
 @kernel
@@ -205,7 +205,7 @@ def design_gradient(model, stage, z, used, out, work):  # type: ignore[no-untype
     """
     pair = model.pair
     n_pair = pair.shape[0]
-    count = 0
+    count = np.int64(0)
     for i in range(used.shape[0]):
         count += used[i]
     work[7] += count
@@ -299,7 +299,7 @@ def unscale_gradient(model, alpha, padded, out):  # type: ignore[no-untyped-def]
     """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
     counter = np.zeros(1, np.int64)
     job = (counter, model.chunk, model.block, model.power, alpha, padded, out)
-    shared(_unscale_chunks, threads_for(model, 1), job)
+    shared(_unscale_chunks, threads_for(model, np.int64(1)), job)
 
 
 @kernel

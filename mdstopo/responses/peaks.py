@@ -72,7 +72,7 @@ def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-
     size = 0.0
     for i in range(samples):
         size = max(size, abs(g[i]))
-    found = 0
+    found = np.int64(0)
     falls = d[0] < 0.0
     if d[0] == 0.0:  # from rest: the first sample that differs by more than rounding tells
         i = 1

@@ -31,7 +31,7 @@ def read_design(path: Path | str, count: int, parts: Mapping[str, slice] | None 
     if path.suffix.lower() in (".h5", ".hdf5"):
         view = read_result(path, leave_out=_NOT_NEEDED)
         alpha = _checked(path, _read_h5(view) if point is None else _read_front(view, point), count)
-        return _with_values(view, point, alpha, parts or {})
+        return with_values(view, point, alpha, parts or {})
     reader = {".npy": _read_npy, ".txt": _read_text}.get(path.suffix.lower())
     if reader is None:
         raise StoreError(f"{path}: a design is read from {_SUFFIXES}, not from {path.suffix or 'a bare name'!r}")
@@ -44,10 +44,14 @@ def read_design(path: Path | str, count: int, parts: Mapping[str, slice] | None 
     return _checked(path, found, count)
 
 
-def _with_values(
+def with_values(
     view: ResultView, point: int | None, alpha: NDArray[np.float64], parts: Mapping[str, slice]
 ) -> NDArray[np.float64]:
-    """alpha with the values of all variables behind it where the file has them; alpha alone where it has none."""
+    """alpha with the values of all variables behind it where the file has them; alpha alone where it has none.
+
+    point: of a front; None takes the best design of a run. parts: as of `read_design`. Raises StoreError where the file
+    has only some of them, or others.
+    """
     prefix = "design" if point is None else "pareto"
     own = {name: view.arrays.get(f"{prefix}/variables/{name}") for name in parts}
     if all(values is None for values in own.values()):

@@ -91,6 +91,17 @@ def test_run_says_what_it_reached_and_writes_the_file(capsys: pytest.CaptureFixt
     assert os.listdir("results") == ["probe.h5"]
 
 
+@pytest.mark.parametrize(("over_time", "lines"), [("mean", 0), ("integral", 0), ("final", 1), ("max", 1)])
+def test_run_says_when_only_of_what_has_a_time(over_time: str, lines: int, capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = call(capsys, "run", "probe.yaml", "--set", f"objectives.G.over_time={over_time}")
+    assert status == 0
+    assert "nan" not in out
+    said = [line.split() for line in out.splitlines() if line.startswith("    peak")]
+    assert len(said) >= lines
+    assert bool(said) == bool(lines)
+    assert all(words[2] == "at" and 0.0 <= float(words[3]) <= 0.1 for words in said)
+
+
 def test_run_for_machines_and_in_silence(capsys: pytest.CaptureFixture[str]) -> None:
     found = answer(capsys, "run", "probe.yaml")
     assert found["status"] == "max_iterations"

@@ -86,6 +86,9 @@ solver: {tolerance: 1.0e-10}
 """
 
 
+UNCERTAIN = "uncertainty={parameters: {bodies.torso.mass: {normal: {deviation: 6}}}}"
+
+
 @pytest.fixture(autouse=True)
 def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -318,7 +321,7 @@ def test_a_threshold_keeps_what_reaches_it_and_the_table_says_all(capsys: pytest
         (["--keep", "2"], "constraints[0].equals: found the bound 2.4"),
         (["--keep", "5", "--overwrite", "--out", "run.h5"], "this is what the new case is made from"),
         (["--keep", "3", "--set", "points.edge.grid.rectangle.count=5"], "the design has 21 values"),
-        (["--keep", "3", "--set", "design.shared=[belts]"], "design.shared cannot be finalized"),
+        (["--keep", "3", "--set", UNCERTAIN], "a case with uncertainty cannot be finalized"),
         (["--keep", "3", "--set", "design.mirrored=[[belts, belts]]"], "belts"),
         (["--keep", "3", "--set", "objectives=null"], "objectives"),
     ],

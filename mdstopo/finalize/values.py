@@ -1,0 +1,82 @@
+"""The laws of members at the values that a design gives their parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.model import Case, Law, MemberGroup, VolumeRow
+from mdstopo.case.volume import ROUNDING
+
+#: place of the law in its group -> parameter -> value
+Given = Mapping[int, Mapping[str, float]]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A value of a variable that some member kept has: its place k (None: one for all), before and now, in its unit."""
+
+    name: str
+    member: int | None
+    unit: str
+    before: float
+    value: float
+
+
+def told_apart(case: Case, places: IndexArray, before: FloatArray, values: FloatArray) -> list[Parameter]:
+    """The values (V,) at these places among all (P,) of the case, before and now."""
+    found: list[Parameter] = []
+    rows = list(zip(places.tolist(), before.tolist(), values.tolist(), strict=True))
+    first = 0
+    for each in case.variables:
+        found += [
+            Parameter(each.name, place - first if each.each == "member" else None, each.unit, old, new)
+            for place, old, new in rows
+            if first <= place < first + each.count
+        ]
+        first += each.count
+    return found
+
+
+def differ(case: Case, group: MemberGroup) -> bool:
+    """Whether members of a group have values of their own."""
+    return len(group) > 1 and any(each.each == "member" and group.name in each.groups for each in case.variables)
+
+
+def given(case: Case, group: MemberGroup, i: int, values: FloatArray) -> Given:
+    """What the variables of a case say about member `i` of a group, at their values (P,)."""
+    found: dict[int, dict[str, float]] = {}
+    first = 0
+    for each in case.variables:
+        for name, place in zip(each.groups, each.laws, strict=True):
+            if name == group.name:
+                value = float(values[first + (i if each.each == "member" else 0)])
+                found.setdefault(place, {})[each.parameter] = value
+        first += each.count
+    return found
+
+
+def with_values(laws: tuple[Law, ...], values: Given) -> list[Law]:
+    """The laws with these parameters."""
+    return [replace(law, **values.get(place, {})) for place, law in enumerate(laws)]
+
+
+def never_late(stated: dict[str, Any], case: Case) -> dict[str, Any]:
+    """A law as the file states it. One that would end before it begins never acts: it begins when all is over."""
+    begin, until = stated.get("active_from"), stated.get("active_until")
+    if begin is None or until is None or begin < until:
+        return stated
+    after = max(begin, *(each.end for each in case.load_cases))
+    return {key: value for key, value in (stated | {"active_from": after}).items() if key != "active_until"}
+
+
+def bound_of(row: VolumeRow, n: int, design: FloatArray) -> float:
+    """What a row leaves for alpha (n,) where the values behind it are numbers: its bound without what these cost."""
+    if not len(row.prices):
+        return row.bound
+    left = row.bound - float(row.prices @ design[n:])
+    own = float(row.coefficients @ design[:n])
+    # a row that is used up to rounding stays so: of a small rest that can be more than the rounding of the rest
+    return own if abs(own - left) <= ROUNDING * max(abs(row.bound), abs(own)) else left
