@@ -37,7 +37,7 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import MANY, WIDE, Kept, Space, adapt, excess, is_wide, largest_change, propose
+from mdstopo.optimizer.wide import WIDE, Kept, Space, adapt, excess, is_wide, largest_change, propose
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -174,7 +174,7 @@ class Gsao:
             )
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
-            if len(state.alpha) >= MANY:
+            if len(state.alpha) >= WIDE:
                 state.steps, state.shift = adapt(state, settings)
             else:
                 state.steps = np.stack([state.steps[1], state.trial - state.alpha])

@@ -28,9 +28,9 @@ from mdstopo.optimizer.wide_passes import PIECE, wide_adapt, wide_change, wide_l
 Indices = NDArray[np.intp]
 T = TypeVar("T")
 
-#: variables from which on this way is taken, and passes over them are compiled
+#: variables from which on this way is taken
 MANY = 256
-#: and from which on memory counts: no cuts are kept, and what is alike is not read again
+#: and from which on memory counts: single passes are compiled too, no cuts are kept, what is alike is not read again
 WIDE = 10_000
 #: and from which on threads share them
 SHARED = 50_000
@@ -165,7 +165,7 @@ def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
     """max |x - y|, and the largest in its unit."""
-    if len(x) >= MANY:
+    if len(x) >= WIDE:
         plain, scaled = wide_change(x, y, unit, _threads(len(x), LIGHT))
         return plain, scaled
     change = np.abs(x - y)
@@ -188,7 +188,7 @@ def finite(numbers: Floats) -> bool:
 
 def _largest(x: Floats) -> float:
     """max |x|; NaN where one is NaN."""
-    return wide_largest(x, _threads(len(x), LIGHT))
+    return wide_largest(x, _threads(len(x), LIGHT)) if len(x) >= WIDE else float(np.abs(x).max())
 
 
 def _touch_up(trial: Floats, slots: Floats, place: Ints, space: Space, rounding: float) -> None:

@@ -220,7 +220,7 @@ def _estimate(
     """
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
     N = len(alpha)
-    n = np.int64(0)  # a 0 as written has its callees compiled once more, for that type
+    n: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
     goal = 0.0
     for i in range(0, N, stride):
         a = _one(cost, N, i)
@@ -261,7 +261,7 @@ def _sort_out(
         _sort_blocks, threads,
         (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, found, sums, begin),
     )  # fmt: skip
-    n = np.int64(0)  # a 0 as written has its callees compiled once more, for that type
+    n: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
     total, size, change = 0.0, 0.0, 0.0
     for b in range(blocks):
         change += sums[b, 0]
