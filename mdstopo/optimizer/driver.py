@@ -37,7 +37,7 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Kept, Space, adapt, excess, is_wide, largest_change, propose
+from mdstopo.optimizer.wide import WIDE, Kept, Space, adapt, excess, is_wide, largest_change, propose, ranges
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -62,8 +62,7 @@ class Gsao:
         self.upper = np.asarray(problem.upper, dtype=np.float64)
         if not np.all(self.lower <= self.upper):
             raise ValueError("a lower bound lies above its upper bound")
-        width = self.upper - self.lower
-        self.range = np.where(width > 0.0, width, 1.0)
+        self.range = ranges(self.lower, self.upper)
         self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
         self._space = Space.of(self.lower, self.upper, problem.linear)

@@ -59,9 +59,14 @@ class Space(NamedTuple):
     @classmethod
     def of(cls, lower: Floats, upper: Floats, linear: LinearRows) -> "Space":
         """That of bounds and rows."""
-        width = upper - lower
-        unit = np.where(width > 0.0, width, 1.0)
-        return cls(short(lower), short(upper), linear, tuple(short(row) for row in linear.A), short(unit))
+        unit = short(ranges(lower, upper))
+        return cls(short(lower), short(upper), linear, tuple(short(row) for row in linear.A), unit)
+
+
+def ranges(lower: Floats, upper: Floats) -> Floats:
+    """How far each variable can go (N,); 1 where it cannot."""
+    width = upper - lower
+    return np.where(width > 0.0, width, 1.0)
 
 
 def short(x: Floats) -> Floats:
@@ -138,7 +143,7 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
     n = len(trial)
     if len(chosen) + len(state.cuts) + len(state.constraint_rows) == 1:
         return True
-    changes, values = [], []
+    values = []
     for some, of in (
         (state.gradients[chosen], state.rows[chosen]),
         (state.cut_gradients.reshape(-1, n), state.cuts),
@@ -147,7 +152,6 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
         found = np.zeros(len(of))
         if len(of):
             wide_rows(np.ascontiguousarray(some), state.alpha, trial, state.shift, lower, upper, power, found)
-        changes.append(found)
         values.append(of + found)
     objective, cuts, limits = values
     return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())

@@ -1,6 +1,49 @@
 """What the tests of variables share."""
 
+import numpy as np
+
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
 from mdstopo.session.run import run_session
+
+
+def case_of(text, **solver):
+    return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})
+
+
+def with_variables(text, group, parameters, **solver):
+    """The case with parameters of a group as variables: by name their value, and bounds."""
+    variables = ", ".join(
+        f"{name}: {{group: {group}, parameter: {name}, initial: {value}, lower: {lower}, upper: {upper}}}"
+        for name, (value, lower, upper) in parameters.items()
+    )
+    return case_of(text.replace("VARIABLES", variables), **solver)
+
+
+def whole(found, name):
+    """The derivative of an objective, or of a constraint (its number), by alpha and all values, as one vector."""
+    if isinstance(name, int):
+        own, named = found.constraint_gradients[name], found.constraint_variable_gradients
+        return np.concatenate([own, *(named[each][name] for each in named)])
+    return np.concatenate([found.gradients[name], *found.variable_gradients[name].values()])
+
+
+def differences(case, design, direction, h):
+    """Derivatives of objectives and constraints along a direction (N + P,), by sixth-order central differences."""
+    evaluator = Evaluator(case)
+    total = {}
+    for m, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+        for sign in (1.0, -1.0):
+            found = evaluator.evaluate(design + sign * m * h * direction, gradient=False)
+            assert found.status.ok, found.message
+            for name, value in (*found.objectives.items(), *enumerate(found.constraints)):
+                total[name] = total.get(name, 0.0) + sign * weight * value / h
+    return total
+
+
+def widths(case):
+    """How far each entry of a design can go: what derivatives are made comparable by."""
+    return np.concatenate([np.ones(case.n_design), *(np.full(v.count, v.upper - v.lower) for v in case.variables)])
 
 
 def whole_and_resumed(case, folder):

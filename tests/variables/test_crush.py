@@ -13,6 +13,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.status import Status
 from tests.general.support import CASES
+from tests.variables.support import case_of, differences, whole, widths
 
 ONE = """
 format: 1
@@ -74,36 +75,6 @@ def one(side="compression", **given):
     if side == "tension":
         v.update(v=-v["v"], g=-v["g"], push=-v["push"], foot=-2.0, more="side: tension, " + v["more"])
     return ONE.format(lower=v["gap"] - 0.1, upper=v["gap"] + 0.1, **v)
-
-
-def case_of(text, **solver):
-    return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})
-
-
-def whole(found, name):
-    """The derivative of an objective, or of a constraint (its number), by alpha and all values, as one vector."""
-    if isinstance(name, int):
-        own, named = found.constraint_gradients[name], found.constraint_variable_gradients
-        return np.concatenate([own, *(named[each][name] for each in named)])
-    return np.concatenate([found.gradients[name], *found.variable_gradients[name].values()])
-
-
-def differences(case, design, direction, h):
-    """Derivatives of all objectives and constraints along a direction, by sixth-order central differences."""
-    evaluator = Evaluator(case)
-    total = {}
-    for m, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
-        for sign in (1.0, -1.0):
-            found = evaluator.evaluate(design + sign * m * h * direction, gradient=False)
-            assert found.status.ok, found.message
-            for name, value in (*found.objectives.items(), *enumerate(found.constraints)):
-                total[name] = total.get(name, 0.0) + sign * weight * value / h
-    return total
-
-
-def widths(case):
-    """How far each entry of a design can go: what derivatives are made comparable by."""
-    return np.concatenate([np.ones(case.n_design), *(np.full(v.count, v.upper - v.lower) for v in case.variables)])
 
 
 def check_each(case, bound, h=1e-4):

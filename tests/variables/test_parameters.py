@@ -6,6 +6,7 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.case.variables import PARAMETERS
+from tests.variables.support import differences, with_variables
 
 SCENE = """
 format: 1
@@ -84,29 +85,10 @@ SLIDE = "joints: [{type: prismatic, bodies: [ground, m], at: [0, 0], axis: [0.8,
 SWITCHING = {"gap", "clipped", "actuator", "crush", "drawn"}
 
 
-def case_of(law, parameters, jointed=False, **solver):
-    variables = ", ".join(
-        f"{name}: {{group: t, parameter: {name}, initial: {value}, lower: {lower}, upper: {upper}}}"
-        for name, (value, lower, upper) in parameters.items()
-    )
-    text = SCENE.replace("LAW", law).replace("VARIABLES", variables)
-    text = text.replace("JOINTS", SLIDE if jointed else "").replace("TURN", "0" if jointed else "0.4")
-    return read_case(text, overrides={f"solver.{key}": str(value) for key, value in solver.items()})
-
-
-def slopes(case, name, size):
-    """Derivatives of all objectives by the value of a variable, by sixth-order central differences."""
-    (variable,) = [each for each in case.variables if each.name == name]
-    h = size * (variable.upper - variable.lower)
-    total = {}
-    for m, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
-        for sign in (1.0, -1.0):
-            value = variable.initial + sign * m * h
-            found = mdstopo.evaluate(case, variables={name: value}, gradient=False)
-            assert found.status.ok, found.message
-            for objective, own in found.objectives.items():
-                total[objective] = total.get(objective, 0.0) + sign * weight * own / h
-    return total
+def scene_of(law, parameters, jointed=False, **solver):
+    text = SCENE.replace("LAW", law).replace("JOINTS", SLIDE if jointed else "")
+    text = text.replace("TURN", "0" if jointed else "0.4")
+    return with_variables(text, "t", parameters, **solver)
 
 
 def largest(found, objective, case):
@@ -120,10 +102,13 @@ def check(case, bound, size=3e-4):
     assert found.status.ok, found.message
     for variable in case.variables:
         width = variable.upper - variable.lower
-        for objective, slope in slopes(case, variable.name, size).items():
-            own = found.variable_gradients[objective][variable.name][0]
-            scale = max(abs(own) * width, 0.1 * largest(found, objective, case))
-            assert abs(own - slope) * width <= bound * scale, (variable.name, objective, own, slope)
+        direction = np.zeros(len(case.start))
+        direction[case.space.parts[variable.name]] = width
+        slopes = differences(case, case.start, direction, size)
+        for objective in found.objectives:
+            own = found.variable_gradients[objective][variable.name][0] * width
+            scale = max(abs(own), 0.1 * largest(found, objective, case))
+            assert abs(own - slopes[objective]) <= bound * scale, (variable.name, objective, own, slopes)
 
 
 def test_no_law_of_the_format_is_left_out():
@@ -138,7 +123,7 @@ def test_no_law_of_the_format_is_left_out():
 @pytest.mark.parametrize("jointed", [False, True], ids=["free", "jointed"])
 @pytest.mark.parametrize("name", LAWS)
 def test_the_derivative_by_a_parameter_is_that_of_what_is_computed(name, jointed):
-    check(case_of(*LAWS[name], jointed, tolerance=1e-12), 1e-7)
+    check(scene_of(*LAWS[name], jointed, tolerance=1e-12), 1e-7)
 
 
 @pytest.mark.parametrize("name", [name for name in LAWS if name not in SWITCHING])
@@ -146,21 +131,21 @@ def test_so_it_is_with_the_fixed_steps_of_generalized_alpha(name):
     law, parameters = LAWS[name]
     if name == "pulse":  # the ends of steps follow it, so that its time and rate are as the other times
         parameters = {"peak": parameters["peak"]}
-    check(case_of(law, parameters, integrator="generalized_alpha", step=0.01), 1e-7)
+    check(scene_of(law, parameters, integrator="generalized_alpha", step=0.01), 1e-7)
 
 
 @pytest.mark.parametrize("jointed", [False, True], ids=["free", "jointed"])
 @pytest.mark.parametrize("name", TIMED)
 def test_the_derivative_by_a_time_is_that_of_what_is_computed(name, jointed):
     times = {**TIMES, "active_until": (0.3, 0, 0.6)} if name == "gap" else TIMES
-    check(case_of(TIMED[name], times, jointed, tolerance=1e-12), 1e-6)
+    check(scene_of(TIMED[name], times, jointed, tolerance=1e-12), 1e-6)
 
 
 @pytest.mark.parametrize("solver", [{"tolerance": 1e-9}, {"integrator": "generalized_alpha", "step": 0.01}], ids=str)
 @pytest.mark.parametrize("name", [*LAWS, *(f"timed {name}" for name in TIMED)])
 def test_direct_and_adjoint_agree(name, solver):
     law, parameters = (TIMED[name[6:]], TIMES) if name.startswith("timed") else LAWS[name]
-    case = case_of(law, parameters, True, **solver)
+    case = scene_of(law, parameters, True, **solver)
     adjoint, direct = (mdstopo.evaluate(case, method=method) for method in ("adjoint", "direct"))
     for objective in adjoint.objectives:
         scale = largest(adjoint, objective, case)
@@ -173,10 +158,10 @@ def test_direct_and_adjoint_agree(name, solver):
 
 def test_by_times_and_through_events_generalized_alpha_is_right_to_its_own_order():
     for law, parameters in (LAWS["gap"], LAWS["pulse"], (TIMED["spring"], TIMES)):
-        exact = mdstopo.evaluate(case_of(law, parameters, tolerance=1e-11)).variable_gradients["M"]
+        exact = mdstopo.evaluate(scene_of(law, parameters, tolerance=1e-11)).variable_gradients["M"]
         errors = []
         for step in (0.004, 0.001):
-            case = case_of(law, parameters, integrator="generalized_alpha", step=step)
+            case = scene_of(law, parameters, integrator="generalized_alpha", step=step)
             found = mdstopo.evaluate(case).variable_gradients["M"]
             errors.append(max(abs(found[name][0] - exact[name][0]) / abs(exact[name][0]) for name in exact))
         assert errors[0] < 1e-2
@@ -185,7 +170,7 @@ def test_by_times_and_through_events_generalized_alpha_is_right_to_its_own_order
 
 def test_at_the_start_the_derivative_by_a_time_is_that_to_the_side_on_which_it_does_something():
     law, times = "{type: spring, stiffness: 90, preload: 5, active_from: 0}", {"active_from": (0, -0.1, 0.5)}
-    case = case_of(law, times, tolerance=1e-12)
+    case = scene_of(law, times, tolerance=1e-12)
     found = mdstopo.evaluate(case)
     h = 1e-4
     values = [mdstopo.evaluate(case, variables={"active_from": k * h}).objectives["X"] for k in range(5)]
@@ -197,7 +182,7 @@ def test_at_the_start_the_derivative_by_a_time_is_that_to_the_side_on_which_it_d
 
 
 def test_a_law_that_never_acts_has_no_derivatives():
-    case = case_of(TIMED["spring"], TIMES)
+    case = scene_of(TIMED["spring"], TIMES)
     found = mdstopo.evaluate(case, variables={"active_from": 0.45})
     assert found.variable_gradients["M"]["active_from"][0] == 0.0
     assert found.variable_gradients["M"]["active_until"][0] == 0.0
@@ -224,7 +209,7 @@ def test_a_value_for_each_member_and_one_for_all_of_them_tell_the_same():
 
 
 def test_constraints_on_responses_and_volume_rows_have_derivatives_by_variables_too():
-    case = case_of(*LAWS["spring"], tolerance=1e-11)
+    case = scene_of(*LAWS["spring"], tolerance=1e-11)
     found = mdstopo.evaluate(case)
     h = 1e-3
     above, below = (mdstopo.evaluate(case, variables={"damping": 2 + s * h}).constraints[0] for s in (1, -1))
@@ -235,8 +220,8 @@ def test_constraints_on_responses_and_volume_rows_have_derivatives_by_variables_
 def test_the_value_takes_the_place_of_the_laws_own():
     law, parameters = LAWS["gap"]
     moved = {"stiffness": (450, 10, 1000), "damping": (2.5, 0, 9), "gap": (0.08, 0, 0.3)}
-    varied = mdstopo.evaluate(case_of(law, parameters), variables={name: value[0] for name, value in moved.items()})
+    varied = mdstopo.evaluate(scene_of(law, parameters), variables={name: value[0] for name, value in moved.items()})
     stated = law.replace("300", "450").replace("damping: 4", "damping: 2.5").replace("gap: 0.1", "gap: 0.08")
-    plain = mdstopo.evaluate(case_of(stated.replace("}", ", free_length: 0.9}"), {"stiffness": moved["stiffness"]}))
+    plain = mdstopo.evaluate(scene_of(stated.replace("}", ", free_length: 0.9}"), {"stiffness": moved["stiffness"]}))
     for objective, value in plain.objectives.items():
         assert varied.objectives[objective] == pytest.approx(value, rel=1e-9)
