@@ -39,9 +39,9 @@ def with_own(case: Case, kept: IndexArray) -> Iterator[tuple[MemberGroup, IndexA
         first += len(group)
 
 
-def free_name(group: str, place: int, taken: set[str]) -> str:
-    """<group>_<place>, or longer where that is taken; then it is taken too."""
-    name = f"{group}_{place}"
+def free_name(whole: str, place: int, taken: set[str]) -> str:
+    """<whole>_<place>, or longer where that is taken; then it is taken too."""
+    name = f"{whole}_{place}"
     while name in taken:
         name += "_"
     taken.add(name)
@@ -103,11 +103,12 @@ def apart(case: Case, names: Iterable[str]) -> Case:
 
 
 def _variables(variables: Sequence[Variable], single: Mapping[str, list[str]]) -> Iterator[Variable]:
+    taken = {each.name for each in variables}
     for each in variables:
         if each.each == "member" and each.groups[0] in single:
             for k in range(each.count):
                 groups = tuple(single[name][k] for name in each.groups)
-                yield replace(each, name=f"{each.name}_{k}", groups=groups, each="group", count=1)
+                yield replace(each, name=free_name(each.name, k, taken), groups=groups, each="group", count=1)
             continue
         laws = [
             law for name, law in zip(each.groups, each.laws, strict=True) for _ in range(len(single.get(name, [name])))

@@ -212,6 +212,19 @@ def test_one_value_of_two_groups_survives_that_different_members_are_kept() -> N
     assert two.constraints == pytest.approx(one.constraints[:2], abs=1e-12)
 
 
+def test_values_taken_apart_get_names_that_no_other_variable_has() -> None:
+    named = PARTS.replace("    kick: {", "    slack_0: {").replace("    onset: {", "    slack_3: {")
+    case = read_case(named)
+    design = design_of(case)
+    reduced, own, final, _ = final_of(case, np.array([0, 3, 5, 7]), design)
+    names = [v.name for v in reduced.variables]
+    assert len(set(names)) == len(names)
+    gap = case.space.named(design)["slack"]
+    law = {g.name: g.laws for g in final.members}
+    assert [law[n][0].gap for n in ("port_0", "star_1", "port_3", "star_3")] == [gap[0], gap[1], gap[3], gap[3]]
+    assert same_motion(reduced, own, final, final.start) < 1e-9
+
+
 @pytest.mark.parametrize("more", [{}, {"solver.settle": "true"}])
 def test_a_value_that_fixed_members_have_too_survives(more: dict[str, str]) -> None:
     both = "{group: [star, legs], parameter: stiffness, each: member, initial: 5000, lower: 1000, upper: 9000}"
