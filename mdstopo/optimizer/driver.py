@@ -37,7 +37,7 @@ from mdstopo.optimizer.safeguards import (
 )
 from mdstopo.optimizer.state import History, State
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Kept, Space, adapt, excess, is_wide, largest_change, propose, ranges
+from mdstopo.optimizer.wide import WIDE, Measures, Space, adapt, is_wide, propose, ranges
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -65,9 +65,7 @@ class Gsao:
         self.range = ranges(self.lower, self.upper)
         self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
-        self._space = Space.of(self.lower, self.upper, problem.linear)
-        self._change = Kept(lambda x, y: largest_change(x, y, self._space.unit))
-        self._excess = Kept(lambda x: excess(self._space, x))
+        self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
 
     def start(self, initial: Floats | None = None) -> State:
         """Evaluate the (projected) initial design and propose a first step."""
@@ -75,7 +73,7 @@ class Gsao:
         first = self.problem.initial if initial is None else initial
         alpha = project(np.asarray(first, dtype=np.float64), self.lower, self.upper, self.problem.linear)
         sample = self.problem.evaluate(alpha)
-        wrong = failure(sample)
+        wrong = failure(sample, self._measures.steepest)
         n = len(alpha)
         price = np.zeros(0) if wrong else first_price(sample, self.settings)
         violation = float("inf") if wrong else scaled_violation(sample)
@@ -94,7 +92,7 @@ class Gsao:
             predicted=0.0,
             kkt=float("nan"),
             shift=np.full(n, self.settings.number("shift_start")),
-            steps=np.zeros((2, n)),
+            step=np.zeros(n),
             trust=self.settings.number("trust_start") if self.trusted else 1.0,
             convex=self.settings.number("convex_start"),
             price=price,
@@ -129,7 +127,7 @@ class Gsao:
         state = replace(state, iteration=state.iteration + 1, evaluations=state.evaluations + 1)
         tried, origin = state.trial, state.alpha
         sample = self.problem.evaluate(tried)
-        wrong = failure(sample)
+        wrong = failure(sample, self._measures.steepest)
         accepted = False
         if wrong:
             self._retreat(state, wrong)
@@ -137,7 +135,7 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
-        change, _ = self._change(tried, origin)
+        change, _ = self._measures.change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
 
     def reopen(self, state: State) -> State:
@@ -174,10 +172,10 @@ class Gsao:
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
             if len(state.alpha) >= WIDE:
-                state.steps, state.shift = adapt(state, settings)
+                state.step, state.shift = adapt(state, settings)
             else:
-                state.steps = np.stack([state.steps[1], state.trial - state.alpha])
-                state.shift = next_shift(state.shift, state.steps, settings)
+                last, state.step = state.step, state.trial - state.alpha
+                state.shift = next_shift(state.shift, last, state.step, settings)
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
             state.rows, state.gradients = sample.rows, sample.gradients
@@ -209,8 +207,7 @@ class Gsao:
         """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
         chosen = self._competing(state)
         if is_wide(state, self.problem.linear, self.settings):
-            left = float(self._excess(state.alpha)[0])
-            found = propose(state, chosen, self._space, self.settings, left)
+            found = propose(state, chosen, self._measures, self.settings)
             if found is not None:
                 if len(state.charge):
                     state.charge = next_charge(state.charge, np.zeros_like(state.charge), state.price)
@@ -317,7 +314,7 @@ class Gsao:
         return max(float(moved), complementarity)
 
     def _move(self, state: State) -> float:
-        return self._change(state.trial, state.alpha)[1]
+        return self._measures.change(state.trial, state.alpha)[1]
 
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
@@ -327,7 +324,7 @@ class Gsao:
         state.seconds += self.clock() - began
         state.history = state.history.extended(
             sample,
-            self._excess(design),
+            self._measures.excess(design),
             change,
             state.evaluations,
             state.seconds,

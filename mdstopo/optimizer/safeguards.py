@@ -6,6 +6,8 @@ ratio of actual to predicted decrease; the convex term grows when the model prov
 approximation (Svanberg 2002).
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from mdstopo.optimizer.presets import Settings
@@ -34,17 +36,12 @@ CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.
 FRESH = 1e-5
 
 
-def failure(sample: Sample) -> str:
-    """Why a sample cannot be used, as a sentence; empty if it can."""
+def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
+    """Why a sample cannot be used, as a sentence; empty if it can. steepest: as `wide.steepest`."""
     if sample.status is Status.OK:
-        numbers = (
-            sample.rows,
-            sample.gradients,
-            sample.constraint_rows,
-            sample.constraint_gradients,
-        )
+        numbers = (sample.rows, sample.constraint_rows, sample.constraint_gradients)
         known = np.isfinite(sample.objective) and all(finite(number) for number in numbers if number.size)
-        if known and len(sample.rows):
+        if known and len(sample.rows) and finite(steepest(sample.gradients)):
             return ""
         return Status.NON_FINITE.value
     return f"{sample.status.value} ({sample.message})" if sample.message else sample.status.value
@@ -154,10 +151,10 @@ def next_convex(convex: float, ratio: float, too_low: bool, settings: Settings) 
     return convex
 
 
-def next_shift(shift: Floats, steps: Floats, settings: Settings) -> Floats:
-    """Distances of the shifts in ranges, (N,): wider where the last two steps agree, narrower where they
-    oppose."""
-    agreement = steps[0] * steps[1]
+def next_shift(shift: Floats, last: Floats, step: Floats, settings: Settings) -> Floats:
+    """Distances of the shifts in ranges, (N,): wider where a step agrees with the last one, narrower where it
+    opposes it."""
+    agreement = last * step
     factor = np.where(
         agreement > 0.0,
         settings.number("shift_grow"),

@@ -115,7 +115,7 @@ class State:
     (K, N); `forgotten`, the objective at which they were last dropped.
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
     the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
-    shifts, `steps` (2, N) the last two accepted steps, `trust` the half width of the trust box in ranges,
+    shifts, `step` (N,) the last accepted step, `trust` the half width of the trust box in ranges,
     `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge` (C,) in
     the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
     The best so far: `best_alpha` (N,), `best_objective`, `best_violation`.
@@ -135,7 +135,7 @@ class State:
     predicted: float
     kkt: float
     shift: Floats
-    steps: Floats
+    step: Floats
     trust: float
     convex: float
     price: Floats

@@ -33,7 +33,7 @@ MANY = 256
 #: and from which on memory counts: single passes are compiled too, no cuts are kept, what is alike is not read again
 WIDE = 10_000
 #: and from which on threads share them
-SHARED = 50_000
+SHARED = 200_000
 #: where a pass does little, so that making threads would cost as much
 LIGHT = 400_000
 _LEAST_SAMPLE = 256
@@ -91,6 +91,16 @@ class Kept(Generic[T]):
         return result
 
 
+class Measures:
+    """What is asked of designs and of gradients more than once: `largest_change`, `excess`, `steepest`."""
+
+    def __init__(self, space: Space) -> None:
+        self.space = space
+        self.change = Kept(lambda x, y: largest_change(x, y, space.unit))
+        self.excess = Kept(lambda x: excess(space, x))
+        self.steepest = Kept(steepest)
+
+
 def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
     """Whether `propose` may make the next step of a state."""
     return (
@@ -103,24 +113,22 @@ def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
     )
 
 
-def propose(
-    state: State, chosen: Indices, space: Space, settings: Settings, left: float | None = None
-) -> Proposal | None:
-    """The next step from a state, whose competing rows are `chosen`; left: what its volume row exceeds its bound by.
+def propose(state: State, chosen: Indices, measures: Measures, settings: Settings) -> Proposal | None:
+    """The next step from a state, whose competing rows are `chosen`.
 
     Nothing where more than the highest row decides, or where the subproblem resists.
     """
     alpha, n, row = state.alpha, len(state.alpha), int(chosen[0])
-    lower, upper, linear, (cost,), _ = space
+    lower, upper, linear, (cost,), _ = measures.space
     slope, bound = np.ascontiguousarray(state.gradients[row]), float(linear.b[0])
-    own = _largest(slope)
-    steepest = max([own, *(_largest(np.ascontiguousarray(state.gradients[k])) for k in chosen[1:])])
+    sizes = measures.steepest(state.gradients)
+    own, steepest = float(sizes[row]), float(sizes[chosen].max())
     if own == 0.0 or not isfinite(steepest):
         return None
     power = settings.number("power")
     share = inf if power == 1.0 else 1.0 - settings.number("shift_margin")
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
-    left = float(excess(space, alpha)[0]) if left is None else left
+    left = float(measures.excess(alpha)[0])
     trial, slots = np.empty(n), np.empty((SLOTS, n))
     place, found, x = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n)
     multiplier, miss, size, change, count = wide_minimum(
@@ -130,7 +138,7 @@ def propose(
     size += abs(bound)
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > 1e-9 * size and multiplier != 0.0):
         return None
-    _touch_up(trial, slots[:, :count], place[:count], space, ROUNDING * size)
+    trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
     if not _decides(state, chosen, trial, lower, upper, power):
         return None
     residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own, _threads(n, LIGHT))
@@ -158,13 +166,13 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
 
 
 def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
-    """The last two steps (2, N) and the distances of the shifts (N,), after the trial was accepted."""
-    steps, shifts = np.empty_like(state.steps), np.empty_like(state.shift)
+    """The step (N,) and the distances of the shifts (N,), after the trial was accepted."""
+    step, shifts = np.empty_like(state.step), np.empty_like(state.shift)
     grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
     least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
     threads = _threads(len(shifts), LIGHT)
-    wide_adapt(state.shift, state.steps[1], state.trial, state.alpha, grow, shrink, least, most, threads, steps, shifts)
-    return steps, shifts
+    wide_adapt(state.shift, state.step, state.trial, state.alpha, grow, shrink, least, most, threads, step, shifts)
+    return step, shifts
 
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
@@ -183,6 +191,13 @@ def excess(space: Space, x: Floats) -> Floats:
     return np.array([wide_sum(row, x, _threads(len(x), LIGHT)) for row in space.rows]) - space.linear.b
 
 
+def steepest(gradients: Floats) -> Floats:
+    """The largest size of an entry of each row (R,) of gradients (R, N); NaN where one is NaN."""
+    if gradients.shape[1] < WIDE:
+        return np.asarray(np.abs(gradients).max(axis=1, initial=0.0))
+    return np.array([_largest(np.ascontiguousarray(row)) for row in gradients])
+
+
 def finite(numbers: Floats) -> bool:
     """Whether all are."""
     if numbers.size < WIDE or not numbers.flags.c_contiguous:
@@ -191,25 +206,27 @@ def finite(numbers: Floats) -> bool:
 
 
 def _largest(x: Floats) -> float:
-    """max |x|; NaN where one is NaN."""
-    return wide_largest(x, _threads(len(x), LIGHT)) if len(x) >= WIDE else float(np.abs(x).max())
+    """max |x| of very many; NaN where one is NaN."""
+    return wide_largest(x, _threads(len(x), LIGHT))
 
 
-def _touch_up(trial: Floats, slots: Floats, place: Ints, space: Space, rounding: float) -> None:
-    """Remove the last rounding errors of the volume row from the variables inside their boxes."""
-    low, high, linear = slots[LOW], slots[HIGH], space.linear
+def _touched_up(trial: Floats, slots: Floats, place: Ints, measures: Measures, rounding: float) -> Floats:
+    """A design without the last rounding errors of the volume row, taken from the variables inside their boxes."""
+    low, high, space = slots[LOW], slots[HIGH], measures.space
+    left = float(measures.excess(trial)[0])
     for _ in range(20):
-        left = float(excess(space, trial)[0])
-        if abs(left) <= rounding or (left < 0.0 and not linear.equal[0]):
-            return
+        if abs(left) <= rounding or (left < 0.0 and not space.linear.equal[0]):
+            return trial
         at = trial[place]
         push = np.where((at > low) & (at < high), slots[COST], 0.0)
         square = float(np.einsum("i,i->", push, push))
         if square == 0.0:
             break
+        trial = trial.copy()  # what is known of the other stays true
         trial[place] = np.clip(at - left / square * push, low, high)
+        left = float(measures.excess(trial)[0])
     lower, upper = (np.resize(end, len(trial)) for end in (space.lower, space.upper))
-    trial[:] = repair(trial, lower, upper, linear)
+    return repair(trial, lower, upper, space.linear)
 
 
 def _stride(n: int) -> int:

@@ -310,38 +310,37 @@ def _sort_block(
 ) -> int:  # fmt: skip
     """One block of `_sort_blocks`; how many variables are in doubt."""
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
-    span, reach, most, least = room[0], room[1], room[2], room[3]
+    span, most, least, kappa = room[0], room[1], room[2], room[3]
     z, value, known = room[4], room[5], room[6]
     m = len(c)
     for i in range(m):
         wide = upper[i] - lower[i]
         span[i] = wide if wide > 0.0 else 1.0
     for i in range(m):
-        reach[i] = shift[i] * span[i]
-    for i in range(m):
-        z[i] = min(min(move, trust * span[i]), share * reach[i])
-    for i in range(m):
         most[i] = s[i] + max(near * a[i], far * a[i])
     for i in range(m):
         least[i] = s[i] + min(near * a[i], far * a[i])
     for i in range(m):
-        low, high = max(lower[i], c[i] - z[i]), min(upper[i], c[i] + z[i])
+        away = min(min(move, trust * span[i]), share * (shift[i] * span[i]))
+        low, high = max(lower[i], c[i] - away), min(upper[i], c[i] + away)
         y[i] = high if most[i] < 0.0 else low
     for i in range(m):
         step = y[i] - c[i]
-        z[i] = (step if s[i] < 0.0 else -step) / reach[i]
+        z[i] = (step if s[i] < 0.0 else -step) / (shift[i] * span[i])
     primitives(z[:m], power, value[:m], whole)
     for i in range(m):
-        # the derivative there, towards its sign where the slope leaves no doubt
-        first = (1.0 + power * value[i]) / (1.0 + z[i])
-        more = s[i] * (first - 1.0) + convex / span[i] * (y[i] - c[i])
-        up, down = -(more + most[i]), more + least[i]
+        kappa[i] = convex / span[i]
+    for i in range(m):
+        # the derivative there, times 1 + z, towards its sign where the slope leaves no doubt
+        t = 1.0 + z[i]
+        more = s[i] * (power * value[i] - z[i]) + kappa[i] * (y[i] - c[i]) * t
+        up, down = -(more + most[i] * t), more + least[i] * t
         ahead = down if least[i] > 0.0 else -1.0
         known[i] = 1.0 if (up if most[i] < 0.0 else ahead) >= 0.0 else 0.0
     part, held, weight = 0.0, 0.0, 0.0
     for i in range(m):
         step = y[i] - c[i]
-        part += known[i] * (0.5 * convex / span[i] * step * step - abs(s[i]) * reach[i] * value[i])
+        part += known[i] * (0.5 * kappa[i] * step * step - abs(s[i]) * (shift[i] * span[i]) * value[i])
     for i in range(m):
         spent = known[i] * a[i] * y[i]
         held += spent

@@ -53,26 +53,24 @@ def _residuals(
 @vector_entry
 def wide_adapt(
     shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float, most: float,
-    threads: int, steps: Floats, shifts: Floats,
+    threads: int, step: Floats, shifts: Floats,
 ) -> None:  # fmt: skip
-    """In one pass what follows an accepted step: `steps` (2, N), the last one and this one, and the new `shifts`."""
+    """In one pass what follows an accepted step, `last` being the one before it: `step` (N,) and the new `shifts`."""
     counter = np.zeros(1, np.int64)
-    shared(_adapted, threads, (counter, shift, last, trial, alpha, grow, shrink, least, most, steps, shifts))
+    shared(_adapted, threads, (counter, shift, last, trial, alpha, grow, shrink, least, most, step, shifts))
 
 
 @member_kernel
 def _adapted(
     counter: Ints, shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float,
-    least: float, most: float, steps: Floats, shifts: Floats,
+    least: float, most: float, step: Floats, shifts: Floats,
 ) -> None:  # fmt: skip
     piece = taken(counter)
     while piece * PIECE < len(shift):
         start, stop = piece * PIECE, min((piece + 1) * PIECE, len(shift))
-        before, now, far = steps[0, start:stop], steps[1, start:stop], shifts[start:stop]
-        old, x, y, was = last[start:stop], alpha[start:stop], trial[start:stop], shift[start:stop]
+        now, far = step[start:stop], shifts[start:stop]
+        before, x, y, was = last[start:stop], alpha[start:stop], trial[start:stop], shift[start:stop]
         n = stop - start
-        for i in range(n):
-            before[i] = old[i]
         for i in range(n):
             now[i] = y[i] - x[i]
         for i in range(n):

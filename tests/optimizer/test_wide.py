@@ -48,6 +48,10 @@ def states(problem, steps, monkeypatch=None, **options):
     return found
 
 
+def measures_of(problem):
+    return wide.Measures(wide.Space.of(problem.lower, problem.upper, problem.linear))
+
+
 @pytest.mark.parametrize("equal", [False, True])
 @pytest.mark.parametrize("options", [{}, {"power": -1.0}, {"power": 1.0}, {"move_limit": 0.05}, {"convex_start": 1.0}])
 @pytest.mark.parametrize("n", SIZES)
@@ -55,7 +59,7 @@ def test_a_step_is_that_of_the_interior_point(n, equal, options, monkeypatch):
     problem = Many(1, equal, n)
     chosen = settings("default", options)
     for state in states(problem, 5, monkeypatch, **options):
-        new = wide.propose(state, np.array([0]), wide.Space.of(problem.lower, problem.upper, problem.linear), chosen)
+        new = wide.propose(state, np.array([0]), measures_of(problem), chosen)
         size = abs(state.objective)
         assert state.objective - new.promised == pytest.approx(state.predicted, rel=1e-7, abs=1e-10 * size)
         assert state.objective - new.promised >= state.predicted - 1e-12 * size
@@ -96,7 +100,7 @@ def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
     for other in others:
         assert other.kkt == one.kkt
         assert other.predicted == one.predicted
-        for name in ("trial", "alpha", "steps", "shift"):
+        for name in ("trial", "alpha", "step", "shift"):
             assert np.array_equal(getattr(other, name), getattr(one, name))
 
 
@@ -124,9 +128,9 @@ def test_a_run_ends_where_the_interior_point_ends(monkeypatch):
 def test_shifts_and_steps_are_those_of_the_plain_rule():
     chosen = settings()
     state = states(Many(6, True), 5)[-1]
-    steps, shifts = wide.adapt(state, chosen)
-    assert np.array_equal(steps, np.stack([state.steps[1], state.trial - state.alpha]))
-    assert np.array_equal(shifts, next_shift(state.shift, steps, chosen))
+    step, shifts = wide.adapt(state, chosen)
+    assert np.array_equal(step, state.trial - state.alpha)
+    assert np.array_equal(shifts, next_shift(state.shift, state.step, step, chosen))
 
 
 @pytest.mark.parametrize("exponent", [-6.0, -2.0, -0.1, 0.5, 1.0])
@@ -180,8 +184,7 @@ class Several(Many):
 def test_the_highest_row_makes_the_step_where_it_decides_alone(share, drop, alone, monkeypatch):
     problem, chosen = Several(7, (0.9, share), (0.14, drop)), settings()
     (state,) = states(problem, 1, monkeypatch)
-    space = wide.Space.of(problem.lower, problem.upper, problem.linear)
-    found = wide.propose(state, np.arange(3), space, chosen)
+    found = wide.propose(state, np.arange(3), measures_of(problem), chosen)
     assert (found is not None) == alone
     if found is not None:
         assert np.abs(found.trial - state.trial).max() < 1e-3
@@ -197,7 +200,7 @@ def test_bounds_and_costs_that_are_alike_are_not_read_and_change_no_bit():
     assert len(space.lower) == len(space.upper) == len(space.rows[0]) < N
     whole = wide.Space(problem.lower, problem.upper, problem.linear, (problem.linear.A[0],), np.ones(N))
     for state in states(problem, 5):
-        one, other = (wide.propose(state, np.array([0]), each, settings()) for each in (space, whole))
+        one, other = (wide.propose(state, np.array([0]), wide.Measures(each), settings()) for each in (space, whole))
         assert np.array_equal(one.trial, other.trial)
         assert one[1:] == other[1:]
 
@@ -211,7 +214,7 @@ def test_a_sample_that_misleads_costs_time_alone(monkeypatch):
     seen[:: wide._stride(n)] = True
     problem.falling, problem.rising = np.where(seen, 1.0, 50.0 + np.arange(n) / n), np.zeros(n)
     (state,) = states(problem, 1, monkeypatch)
-    new = wide.propose(state, np.array([0]), wide.Space.of(problem.lower, problem.upper, problem.linear), settings())
+    new = wide.propose(state, np.array([0]), measures_of(problem), settings())
     assert new is not None
     assert state.objective - new.promised == pytest.approx(state.predicted, rel=1e-7)
     assert abs(problem.linear.excess(new.trial)[0]) <= 1e-14 * 0.6 * n
