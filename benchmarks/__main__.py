@@ -49,7 +49,7 @@ def main() -> int:
     parser.add_argument(
         "--pages",
         action="store_true",
-        help="write the applications' tables into docs/applications, their designs into cases/designs",
+        help="write the tables of the applications and of other programs into docs, designs into cases/designs",
     )
     chosen = parser.parse_args()
     unknown = [name for name in chosen.sections if name not in SECTIONS]
@@ -62,16 +62,20 @@ def main() -> int:
         print(table.markdown(), flush=True)
     for name in sections:
         began = time.perf_counter()
-        printed = []
+        printed, summary = [], []
         for table in _tables(name, chosen.pages):
             text = table.markdown()
             printed.append(text)
+            if not table.detail:
+                summary.append(text)
             print(text, flush=True)
         print(f"({name}: {time.perf_counter() - began:.0f} s)\n", flush=True)
         if chosen.readme and name not in ELSEWHERE:
             replace_block(Path("README.md"), name, "\n".join([*printed, machine]))
         if chosen.pages and name == "applications":
             write_pages(printed, machine)
+        if chosen.pages and name in PEERS:
+            replace_block(Path("docs/comparison.md"), name, "\n".join([*summary, machine]))
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Numbers in the README and in the pages of the applications stand between marks, and only this module writes there."""
+"""Numbers in the README, and in pages of the documentation, stand between marks; only this module writes there."""
 
 import re
 from pathlib import Path

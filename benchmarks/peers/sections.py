@@ -19,7 +19,7 @@ from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 
 #: shares of the peers' times that are allowed
-BAR, BAR_LOOP, BAR_FORWARD, BAR_MILLION = 0.2, 0.1, 0.02, 0.05
+BAR, BAR_LOOP, BAR_FORWARD, BAR_MILLION = 0.1, 0.1, 0.02, 0.05
 MILLION = 1_000_000
 
 #: a named scene and design, with what was measured there

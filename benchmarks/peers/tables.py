@@ -43,7 +43,7 @@ def every_setting(title: str, found: Sequence[Measured]) -> Table:
         ]
         for each in found
     ]
-    return Table(title, _COLUMNS, rows, (_NOTE,))
+    return Table(title, _COLUMNS, rows, (_NOTE,), detail=True)
 
 
 def fastest(found: Sequence[Measured], level: float, peers: Sequence[str]) -> Measured | None:

@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Table:
-    """One table. columns: headings; rows: text, a cell a column; notes: sentences below it."""
+    """One table. columns: headings; rows: text, a cell a column; notes: sentences below it; detail: whether another
+    sums it up."""
 
     title: str
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     notes: Sequence[str] = ()
+    detail: bool = False
 
     def markdown(self, level: int = 3) -> str:
         """The table with its title as a heading."""
