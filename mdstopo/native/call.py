@@ -19,6 +19,10 @@ IndexArray = NDArray[np.int64]
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
 
 
+#: the eight bytes of a result, by its letter
+_SLOTS = {"f": "d", "i": "q", "b": "?7x"}
+
+
 class _Excuse(ctypes.Structure):
     _fields_ = (
         ("data", ctypes.c_void_p),
@@ -52,6 +56,7 @@ class Native:
         self._kinds = types.split()
         self._result = code.result.strip("()")
         self._single = not code.result.startswith("(")
+        self._unpack = struct.Struct("".join(_SLOTS[letter] for letter in self._result)).unpack_from
 
     def __call__(self, *arguments: Any) -> Any:
         return self._block_of(arguments)[0]()
@@ -87,8 +92,7 @@ class Native:
                 numbers.append(int(argument))
         first = len(numbers)
         block = np.array(numbers + [0] * (len(self._result) + 1), dtype=np.int64)
-        items = {"f": block.view(np.float64).item, "i": block.item, "b": block.item}
-        slots = [(items[letter], first + k, letter == "b") for k, letter in enumerate(self._result)]
+        unpack, results, nothing = self._unpack, block[first:].data, not self._result
         address = ctypes.c_void_p(block.__array_interface__["data"][0])
         function, single = self._call, self._single
 
@@ -96,10 +100,9 @@ class Native:
         def call(kept: Any = arguments) -> Any:
             if function(address):
                 self._fail(block.item(-1))
-            if not slots:
+            if nothing:
                 return None
-            found = [bool(item(k)) if boolean else item(k) for item, k, boolean in slots]
-            return found[0] if single else tuple(found)
+            return unpack(results)[0] if single else unpack(results)
 
         return call, block, places
 
