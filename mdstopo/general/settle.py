@@ -2,10 +2,13 @@
 
     F(q, v = 0, t0, alpha, p) - Phi_q^T lam = 0,   Phi(q) = 0
 
-is found by pseudo-dynamics: implicit steps of M q' = F on the joints, whose length grows as what is left of the force
-falls, until they are Newton's. They run downhill where there is an energy, so a stable equilibrium is found, and the
-nearest in that sense. It depends on the design, alpha and the values p of laws' variables, by K dq + Phi_q^T dlam = dF,
-Phi_q dq = 0: `inverse` is that linear map.
+is found by pseudo-dynamics: implicit steps of M q' = F on the joints, whose length grows as long as forces change as
+their stiffness says, until they are Newton's. They run downhill where there is an energy, so a stable equilibrium is
+found, and the nearest in that sense. Forces have kinks (a plateau, a gap), at which a whole step may go too far and the
+next one as far back, for ever: each ends at the latest where no force along it is left. Of an energy whose forces are
+continuous this finds a minimum (J.-S. Pang and L. Qi 1995, "A globally convergent Newton method for convex SC1
+minimization problems"). It depends on the design, alpha and the values p of laws' variables, by
+K dq + Phi_q^T dlam = dF, Phi_q dq = 0: `inverse` is that linear map.
 Every search begins at the stated configuration, whatever was found before.
 """
 
@@ -23,6 +26,10 @@ if TYPE_CHECKING:
 MOST, FAR = 400, 0.1
 #: the farthest that an equilibrium is looked for: by how many sizes of the scene a body may move, and how far turn, rad
 SIZES, TURN = 2.0, 2.0 * np.pi
+#: steps grow so much, where the force along them at their end is what was foreseen, to a share of that at their start
+GROWTH, AGREES = 4.0, 0.25
+#: share of the force along a step that may point back at its end, and looks for a better end at most
+BACK, LOOKS = 0.1, 30
 #: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
 NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
@@ -57,26 +64,24 @@ def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: flo
     size: of the scene, m.
     """
     scene = _AtRest(driver, alpha, size)
-    q = q0.copy()
-    scene.at(q)
-    rate = scene.rate()
-    left = scene.left()
-    pace = 1.0 / rate if rate > 0.0 else size / max(left, 1e-300)
+    q = scene.land(q0.copy())
+    rate, left = scene.rate(), scene.left()
+    pace = 1.0 / rate if rate > 0.0 else size / max(float(np.linalg.norm(left)), 1e-300)
     for _ in range(MOST):
         step = scene.step(1.0 / pace)
-        far = scene.extent(step)
-        if far > FAR * size:
-            pace *= max(0.25, 0.5 * FAR * size / far)
+        far, own = scene.extent(step), scene.scaled(step)
+        ahead = float(own @ left)
+        if far > FAR * size or (ahead < 0.0 and far > ARRIVED * size):
+            pace *= min(max(0.25, 0.5 * FAR * size / far), 0.5)
             continue
-        q = q + step
-        scene.at(q)
-        now = scene.left()
-        pace *= min(max(left / now, 0.3), 10.0) if now > 0.0 else 10.0
-        left = now
-        rate = scene.rate()
+        q, left, share, off = _stepped(scene, q, step, ahead, float(own @ own) / pace)
+        if off <= AGREES * ahead:
+            pace *= GROWTH
+        elif off > ahead:
+            pace *= 0.5
         if scene.lost(q - q0):
             return _nowhere(driver, q - q0, scene.arms)
-        if far <= NEAR * size and pace * rate > 1.0:
+        if share * far <= NEAR * size and pace * scene.rate() > 1.0:
             break
     far = np.inf
     for _ in range(20):
@@ -102,6 +107,34 @@ def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: flo
     return Settled(
         q, inverse, float(distance[far_body]), names[far_body], float(shift[turned_body, 2]), names[turned_body]
     )
+
+
+def _stepped(
+    scene: "_AtRest", q: FloatArray, step: FloatArray, ahead: float, foreseen: float
+) -> tuple[FloatArray, FloatArray, float, float]:
+    """Go along a step (n,) from q (n,), as far as the force along it does not point back: ahead at its start.
+
+    Returns where it ends, what is left of the force there, the share of the step taken, and by how much the force along
+    it at the end of all of it differs from what was foreseen.
+    """
+    own = scene.scaled(step)
+    low, high, share, off = 0.0, 1.0, 1.0, 0.0
+    forward, backward = ahead, 0.0
+    for look in range(LOOKS):
+        there = scene.land(q + share * step)
+        left = scene.left()
+        along = float(own @ left)
+        if look == 0:
+            off = abs(along - foreseen)
+        if along >= -BACK * ahead and (look == 0 or along <= BACK * ahead):
+            break
+        # Illinois' rule: an end that stays counts half
+        if along > 0.0:
+            low, forward, backward = share, along, 0.5 * backward
+        else:
+            high, forward, backward = share, 0.5 * forward if look else forward, along
+        share = low + (high - low) * min(max(forward / (forward - backward), 0.1), 0.9)
+    return there, left, share, off
 
 
 def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> str:
@@ -138,12 +171,29 @@ class _AtRest:
         """Of the fastest motion, 1/s^2."""
         return float(np.linalg.norm(self.stiffness, 2)) if len(self.free) else 0.0
 
-    def left(self) -> float:
-        """What no joint takes of the force, and by how much joints misfit, as one number (sqrt(kg) m/s^2)."""
+    def land(self, q: FloatArray) -> FloatArray:
+        """Look at the place on the joints next to q (n,), which is returned."""
+        self.at(q)
+        for _ in range(3):
+            if np.abs(self._phi).max(initial=0.0) <= ARRIVED * self._size:
+                break
+            q = q + self.onto()
+            self.at(q)
+        return q
+
+    def left(self) -> FloatArray:
+        """What no joint takes of the force (sqrt(kg) m/s^2), in scaled coordinates; multipliers are set to what they
+        take."""
         if not len(self._lam):
-            return float(np.linalg.norm(self.pull))
-        rest = self.pull - self.jac.T @ np.linalg.lstsq(self.jac.T, self.pull, rcond=None)[0]
-        return float(np.hypot(np.linalg.norm(rest), np.linalg.norm(self._phi) * np.linalg.norm(self.pull) / self._size))
+            return self.pull
+        self._lam[:] = np.linalg.lstsq(self.jac.T, self.pull, rcond=None)[0]
+        left: FloatArray = self.pull - self.jac.T @ self._lam
+        return left
+
+    def scaled(self, step: FloatArray) -> FloatArray:
+        """The free part of a step (n,) in scaled coordinates."""
+        own: FloatArray = step[self.free] * self._root
+        return own
 
     def step(self, drag: float) -> FloatArray:
         """(n,): one implicit step with drag M (1/s^2); the joints' multipliers are those of its end."""

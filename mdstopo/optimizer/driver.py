@@ -32,6 +32,7 @@ from mdstopo.optimizer.safeguards import (
     next_trust,
     no_cuts,
     outdated,
+    plain_violation,
     scaled_violation,
     verdict,
 )
@@ -76,7 +77,7 @@ class Gsao:
         wrong = failure(sample, self._measures.steepest)
         n = len(alpha)
         price = np.zeros(0) if wrong else first_price(sample, self.settings)
-        violation = float("inf") if wrong else scaled_violation(sample)
+        violation, plain = (float("inf"),) * 2 if wrong else (scaled_violation(sample), plain_violation(sample))
         state = State(
             alpha=alpha,
             objective=sample.objective,
@@ -105,6 +106,7 @@ class Gsao:
             best_alpha=alpha,
             best_objective=sample.objective,
             best_violation=violation,
+            best_plain=plain,
             status=RunStatus.RUNNING,
             reason="",
             history=History(),
@@ -163,12 +165,10 @@ class Gsao:
         trust, convex = state.trust, state.convex
         state.convex = next_convex(state.convex, ratio, actual < state.predicted, settings)
         state.trust = next_trust(state.trust, ratio, settings) if self.trusted else 1.0
-        if better(sample.objective, violation, state, settings.tolerance):
-            state.best_alpha, state.best_objective, state.best_violation = (
-                state.trial,
-                sample.objective,
-                violation,
-            )
+        plain = plain_violation(sample)
+        if better(sample.objective, violation, plain, state, settings.tolerance):
+            state.best_alpha, state.best_objective = state.trial, sample.objective
+            state.best_violation, state.best_plain = violation, plain
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
             if len(state.alpha) >= WIDE:

@@ -120,11 +120,18 @@ def first_price(sample: Sample, settings: Settings) -> Floats:
     return settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(steepest > 0.0, steepest, 1.0)
 
 
-def better(objective: float, violation: float, state: State, tolerance: float) -> bool:
-    """Whether a design beats the best so far: among feasible ones by objective, else by violation."""
-    if max(violation, state.best_violation) <= tolerance:
-        return objective < state.best_objective
-    return violation < state.best_violation
+def plain_violation(sample: Sample) -> float:
+    """The largest constraint violation c itself, relative to the bound: what a user is told."""
+    return float(np.maximum(sample.constraint_rows, 0.0).max(initial=0.0))
+
+
+def better(objective: float, violation: float, plain: float, state: State, tolerance: float) -> bool:
+    """Whether a design beats the best so far: feasible before infeasible, among feasible ones by objective, else by the
+    plain violation. The scaled one is large where gradients vanish, as they do where a limit is missed by the least."""
+    feasible = violation <= tolerance
+    if feasible != (state.best_violation <= tolerance):
+        return feasible
+    return objective < state.best_objective if feasible else plain < state.best_plain
 
 
 def next_trust(trust: float, ratio: float, settings: Settings) -> float:

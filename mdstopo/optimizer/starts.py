@@ -32,13 +32,13 @@ def random_feasible(problem: Problem, seed: int, index: int) -> Floats:
 
 
 def best_run(runs: Sequence[State | None], tolerance: float) -> int:
-    """The index of the best run: feasible before infeasible, then the lowest objective, then the first."""
+    """The index of the best run: feasible before infeasible, then by violation, then by objective, then the first."""
 
     def key(item: tuple[int, State | None]) -> tuple[bool, float, float, int]:
         index, state = item
         if state is None or not np.isfinite(state.best_objective):
             return True, float("inf"), float("inf"), index
         infeasible = state.best_violation > tolerance
-        return infeasible, state.best_violation if infeasible else 0.0, state.best_objective, index
+        return infeasible, state.best_plain if infeasible else 0.0, state.best_objective, index
 
     return min(enumerate(runs), key=key)[0]

@@ -118,7 +118,8 @@ class State:
     shifts, `step` (N,) the last accepted step, `trust` the half width of the trust box in ranges,
     `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge` (C,) in
     the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
-    The best so far: `best_alpha` (N,), `best_objective`, `best_violation`.
+    The best so far: `best_alpha` (N,), `best_objective`, `best_violation`, and `best_plain`, its violation
+    relative to the bounds alone.
     """
 
     alpha: Floats
@@ -148,6 +149,7 @@ class State:
     best_alpha: Floats
     best_objective: float
     best_violation: float
+    best_plain: float
     status: RunStatus
     reason: str
     history: History

@@ -195,6 +195,23 @@ def test_a_constraint_that_cannot_be_met_ends_at_the_least_violation():
     assert state.best_violation == pytest.approx(1.0, abs=1e-5)
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_where_no_design_keeps_a_limit_the_one_that_misses_it_least_is_kept(seed: int) -> None:
+    """Its gradient vanishes there: as a change of a variable the violation is large."""
+    least = np.random.default_rng(seed).uniform(0.2, 0.8, 3)
+
+    def limit(x):
+        return np.array([0.3 + np.sum((x - least) ** 2)]), 2.0 * (x - least)[None, :]
+
+    problem = Toy(
+        lambda x: (np.array([1.0 + np.sum(x)]), np.ones((1, 3))), np.full(3, 0.5), 0.0, 1.0, constraints=limit
+    )
+    state = run(Gsao(problem, settings(max_iterations=30)))
+    seen = [float(limit(x)[0][0]) for x in problem.evaluated]
+    assert state.best_plain == min(seen)
+    assert float(limit(state.best_alpha)[0][0]) == min(seen)
+
+
 # Failures.
 
 
