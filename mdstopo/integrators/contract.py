@@ -90,7 +90,7 @@ def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, 
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
-    """The Python function to be compiled for this type of steps; its parameters are named as the duty's."""
+    """The kernel for this type of steps."""
     kind = getattr(steps, "instance_class", None)  # of a named tuple's type
     if kind is None:
         return None

@@ -6,21 +6,17 @@ level (`jit.kernel`) is optimised in its entry only: a quarter of the compile ti
 optimised by itself too, so that its vectors do not depend on who calls it.
 """
 
-from collections.abc import Iterator
-from types import CodeType
+import contextlib
 from typing import Any
 
-import numpy as np
 from llvmlite import binding as llvm
-from numba.core import ir, types
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
-from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import AnnotateTypes, BaseNativeLowering, NativeLowering, NopythonRewrites
-from numba.core.untyped_passes import InlineClosureLikes
 
-from mdstopo.native.lowering import Lower
+LEANER: dict[Any, Any] = {}
+with contextlib.suppress(ImportError, AttributeError):  # of a version of Numba in which some of it is not found
+    from mdstopo.native.passes import LEANER
 
 
 class Optimised(JITCodeLibrary):
@@ -52,68 +48,6 @@ class Left(Optimised):
         pass
 
 
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _Lowering(BaseNativeLowering):
-    """Numba's, with our `Lower`."""
-
-    _name = "mdstopo_lowering"
-    lowering_class = Lower
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _Rewrites(NopythonRewrites):
-    """Numba's, where there is something to rewrite: arithmetic with whole arrays."""
-
-    _name = "mdstopo_rewrites"
-
-    def run_pass(self, state: Any) -> bool:
-        return any(_is_array_arithmetic(inst, state) for inst in _assigned(state)) and super().run_pass(state)
-
-
-def _assigned(state: Any) -> Iterator[Any]:
-    for block in state.func_ir.blocks.values():
-        yield from block.find_insts(ir.Assign)
-
-
-def _is_array_arithmetic(inst: Any, state: Any) -> bool:
-    made = inst.value
-    if not isinstance(made, ir.Expr) or not isinstance(state.typemap[inst.target.name], types.Array):
-        return False
-    if made.op == "call":
-        return isinstance(getattr(state.typemap[made.func.name], "typing_key", None), np.ufunc)
-    return made.op in ("binop", "inplace_binop", "unary")
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class _Closures(InlineClosureLikes):
-    """Numba's, where a function holds another."""
-
-    _name = "mdstopo_closures"
-
-    def run_pass(self, state: Any) -> bool:
-        held = state.func_id.code.co_consts
-        return any(isinstance(each, CodeType) for each in held) and super().run_pass(state)
-
-
-@register_pass(mutates_CFG=False, analysis_only=True)
-class _Unannotated(AnnotateTypes):
-    """Instead of the listing of types beside the source, which nobody reads."""
-
-    _name = "mdstopo_unannotated"
-
-    def run_pass(self, state: Any) -> bool:
-        state.type_annotation = ""
-        return False
-
-
-_LEANER = {
-    NativeLowering: _Lowering,
-    NopythonRewrites: _Rewrites,
-    InlineClosureLikes: _Closures,
-    AnnotateTypes: _Unannotated,
-}
-
-
 def _compiler(library: type[Optimised]) -> type[Compiler]:
     class Lean(Compiler):
         def __init__(self, typingctx: Any, targetctx: Any, given: Any, *rest: Any) -> None:
@@ -121,9 +55,9 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
             self.state.library = library(targetctx.codegen(), library.__name__)
 
         def define_pipelines(self) -> Any:
-            found = super().define_pipelines()
+            found = super().define_pipelines()  # type: ignore[no-untyped-call]
             for manager in found:
-                manager.passes = [(_LEANER.get(each, each), told) for each, told in manager.passes]
+                manager.passes = [(LEANER.get(each, each), told) for each, told in manager.passes]
                 manager.finalize()
             return found
 

@@ -20,7 +20,8 @@ def spare() -> None:
 
 def _remember_signatures() -> None:
     """What operators give for numbers, arrays and tuples of them is looked for once."""
-    ask = types.Function.get_call_type
+    function: Any = types.Function
+    ask = function.get_call_type
     known: dict[Any, Any] = {}
 
     def get_call_type(self: Any, context: Any, asked: Any, named: Any) -> Any:
@@ -33,7 +34,7 @@ def _remember_signatures() -> None:
             found = known[key] = ask(self, context, asked, named)
         return found
 
-    types.Function.get_call_type = get_call_type
+    function.get_call_type = get_call_type
 
 
 _LASTING = (types.Number, types.Boolean, types.Literal, types.Array, types.BaseTuple)
