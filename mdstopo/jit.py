@@ -43,14 +43,14 @@ def inline(function: F) -> F:
 
 
 def by_type(stub: Callable[..., Any]) -> Callable[[F], F]:
-    """What kernels that call `stub` get: the function that the decorated one returns for the types of the arguments."""
+    """What kernels that call `stub` get: the kernel that the decorated one returns for the types of the arguments."""
 
     def enter(choose: F) -> F:
         @when_compiling
         def register() -> None:
-            from numba.extending import overload
+            from mdstopo.native.choice import offer
 
-            overload(stub)(choose)
+            offer(stub, choose)
 
         return choose
 

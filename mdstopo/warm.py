@@ -8,10 +8,11 @@ missing is compiled here when it is called.
 
 import contextlib
 import gc
+import importlib
 import subprocess
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from mdstopo.native.store import cache_folder
 
@@ -48,6 +49,9 @@ def mark_compiled(integrator: str) -> None:
 class Beside:
     """Another process that compiles what looks at an integrator's steps, if that has never been compiled here."""
 
+    #: modules whose `compile_share` the other process calls before that
+    shares: ClassVar[list[str]] = []
+
     def __init__(self, integrator: str) -> None:
         self.integrator = integrator
         self._child: subprocess.Popen[bytes] | None = None
@@ -55,7 +59,7 @@ class Beside:
         if self.due:
             with contextlib.suppress(OSError):
                 self._child = subprocess.Popen(
-                    [sys.executable, "-m", "mdstopo.warm", integrator],
+                    [sys.executable, "-m", "mdstopo.warm", integrator, *self.shares],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
@@ -90,12 +94,12 @@ def compile_looking(integrator: str) -> None:
     from mdstopo.engine import Evaluator
     from mdstopo.integrators.driver import Driver
 
-    driver = Evaluator(_tiny(integrator), beside=False).driver("default")
+    driver = Evaluator(tiny(integrator), beside=False).driver("default")
     assert isinstance(driver, Driver)
     driver.compile_looking()
 
 
-def _tiny(integrator: str) -> "Case":
+def tiny(integrator: str) -> "Case":
     from mdstopo.case.reader import read_case
 
     return read_case(_CASE.format(integrator=integrator))
@@ -103,4 +107,6 @@ def _tiny(integrator: str) -> "Case":
 
 if __name__ == "__main__":
     gc.disable()  # as in `session.ready`
+    for module in sys.argv[2:]:
+        importlib.import_module(module).compile_share()
     compile_looking(sys.argv[1])

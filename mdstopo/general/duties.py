@@ -68,7 +68,7 @@ def implement(tag: tuple[int, ...], **duties: Callable[..., Any]) -> None:
 
 
 def _of(name: str, tag: Any) -> Any:
-    return DUTIES[name][len(tag)].py_func
+    return DUTIES[name][len(tag)]
 
 
 @by_type(point_of)

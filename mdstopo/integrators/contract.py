@@ -90,7 +90,7 @@ def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, 
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
-    """The Python function to be compiled for this type of steps; its parameters are named as the duty's."""
+    """The kernel for this type of steps."""
     kind = getattr(steps, "instance_class", None)  # of a named tuple's type
     if kind is None:
         return None
@@ -99,7 +99,7 @@ def _implementation(name: str, steps: Any) -> Implementation | None:
         chosen = _DUTIES["point_of"].get(kind)
     if chosen is None and name == "sample":
         chosen = sample_stages
-    return None if chosen is None else chosen.py_func
+    return chosen
 
 
 @kernel
@@ -157,4 +157,4 @@ def _sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
 
 @by_type(steps_of)
 def _steps_of(tag, arrays):  # type: ignore[no-untyped-def]
-    return _MAKERS[len(tag)].py_func
+    return _MAKERS[len(tag)]

@@ -6,9 +6,13 @@ Numba asks an unknown global for its `_numba_type_`; only then is it imported he
 import contextlib
 import functools
 import importlib
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
+
+#: has Numba's errors in plain letters: it makes thousands that only itself sees, when it looks for what fits
+_PLAIN = "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"
 
 _PENDING: list[Callable[[], None]] = []
 
@@ -28,24 +32,34 @@ def numba() -> Any:
 
 
 def _import_lean() -> Any:
-    """Import Numba; in a process of our own without scipy and cffi, which no kernel here uses.
+    """Import Numba; in a process of our own without scipy and cffi, which no kernel here uses, and spared some work.
 
     They would cost 0.2 s. Elsewhere Numba may serve others too.
     """
-    spared = {"scipy", "cffi"} - sys.modules.keys()
-    if not _is_our_process() or "numba" in sys.modules or len(spared) < 2:
+    if not _is_our_process() or "numba" in sys.modules:
         return importlib.import_module("numba")
+    spared = {"scipy", "cffi"} - sys.modules.keys()
+    if len(spared) < 2:
+        spared = set()
     for name in spared:
         sys.modules[name] = None  # type: ignore[assignment]  # an import of it now fails, which Numba allows for
+    stated = os.environ.get(_PLAIN)
+    os.environ[_PLAIN] = "1"
     try:
         module = importlib.import_module("numba")
-        module.config.DISABLE_ERROR_MESSAGE_HIGHLIGHTING = 1  # of messages that it only shows to itself
         for user in ("numba.np.arraymath", "numba.core.typing.cffi_utils"):
             with contextlib.suppress(ImportError):
                 importlib.import_module(user)
     finally:
+        del os.environ[_PLAIN]
+        if stated is not None:
+            os.environ[_PLAIN] = stated
         for name in spared:
             del sys.modules[name]
+    with contextlib.suppress(ImportError, AttributeError, LookupError):  # of another version of Numba
+        from mdstopo.native.sparing import spare
+
+        spare()
     return module
 
 

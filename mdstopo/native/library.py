@@ -6,12 +6,17 @@ level (`jit.kernel`) is optimised in its entry only: a quarter of the compile ti
 optimised by itself too, so that its vectors do not depend on who calls it.
 """
 
+import contextlib
 from typing import Any
 
 from llvmlite import binding as llvm
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
+
+LEANER: dict[Any, Any] = {}
+with contextlib.suppress(ImportError, AttributeError):  # of a version of Numba in which some of it is not found
+    from mdstopo.native.passes import LEANER
 
 
 class Optimised(JITCodeLibrary):
@@ -48,6 +53,13 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
         def __init__(self, typingctx: Any, targetctx: Any, given: Any, *rest: Any) -> None:
             super().__init__(typingctx, targetctx, given, *rest)  # type: ignore[no-untyped-call]
             self.state.library = library(targetctx.codegen(), library.__name__)
+
+        def define_pipelines(self) -> Any:
+            found = super().define_pipelines()  # type: ignore[no-untyped-call]
+            for manager in found:
+                manager.passes = [(LEANER.get(each, each), told) for each, told in manager.passes]
+                manager.finalize()
+            return found
 
     return Lean
 

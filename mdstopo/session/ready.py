@@ -26,6 +26,7 @@ from mdstopo.store.contents import Motion
 
 Floats = NDArray[np.float64]
 
+_FEW = 3  # variables of the smallest problem
 _SMALL = 100_000  # members up to which an evaluation costs nothing beside loading its kernels
 
 
@@ -61,16 +62,28 @@ def get_ready(
     Returns the stated first x (n,), the nearest one that keeps bounds and volume rows, and its motion in each load
     case. Raises CaseError where no design keeps the rows.
     """
-    for size in [3, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
-        optimizer = make_optimizer(case, _Toy(size))
-        state = optimizer.start()
-        if state.running:
-            optimizer.step(state)
+    for size in [_FEW, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
+        _meet(case, size)
     stated, begin = first_design(case, problem, initial)
     before = motions(case, engine, case.space.expand(begin))
     if case.n_members <= _SMALL:
         problem.evaluate(begin)
     return stated, begin, before
+
+
+def _meet(case: Case, size: int) -> None:
+    """Load the kernels that the optimiser calls where there are so many variables."""
+    optimizer = make_optimizer(case, _Toy(size))
+    state = optimizer.start()
+    if state.running:
+        optimizer.step(state)
+
+
+def compile_share() -> None:
+    """Compile what few variables need: the share of the process beside this one (`warm`) where there are many."""
+    from mdstopo.warm import tiny
+
+    _meet(tiny("auto"), _FEW)
 
 
 def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
@@ -111,11 +124,17 @@ def _main() -> None:
     import signal
 
     from mdstopo.session.combining import even, problem_of
+    from mdstopo.warm import Beside
 
     gc.disable()  # what the compiler makes lives on: looking through it again and again takes a tenth of the time
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
+    many = case.space.size >= MANY
+    if many:
+        Beside.shares.append("mdstopo.session.ready")
     engine = make_engine(case)
+    if many:
+        _meet(case, MANY)
     problem = problem_of(engine, even(case))
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
