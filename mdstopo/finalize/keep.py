@@ -17,9 +17,7 @@ from mdstopo.case.words import count_text, number_text, shown
 from mdstopo.finalize.apart import part, with_own
 
 
-def chosen(
-    alpha: FloatArray, keep: int | None, threshold: float | None, slots: IndexArray | None = None
-) -> IndexArray:
+def chosen(alpha: FloatArray, keep: int | None, threshold: float | None, slots: IndexArray | None = None) -> IndexArray:
     """Places (K,), rising, of the `keep` largest alphas (N,), of equal ones the first; or of all >= `threshold`.
 
     slots (N,): which alphas are one; all members of one are kept, or none. There may be more than `keep` then.
@@ -118,22 +116,25 @@ def check(case: Case) -> None:
         _raise(case, [case.marks.mistake("uncertainty", "a case with uncertainty cannot be finalized")])
 
 
-def check_restricted(case: Case, split: Iterable[str] = ()) -> None:
+def check_restricted(case: Case, whole: Case, split: Iterable[str] = ()) -> None:
     """Refuse what the members kept cannot do. Raises CaseError with every reason.
 
-    split: groups that were taken apart.
+    whole: the case with all its members; split: groups that were taken apart.
     """
-    _raise(case, [case.marks.mistake(path, message) for path, message in _undone(case, set(split))])
+    _raise(case, [case.marks.mistake(path, message) for path, message in _undone(case, whole, set(split))])
 
 
-def _undone(case: Case, split: set[str]) -> Iterator[tuple[str, str]]:
+def _undone(case: Case, whole: Case, split: set[str]) -> Iterator[tuple[str, str]]:
     names = {group.name for group in case.members}
 
     def lost(group: str | None) -> str:
         if group in split:
+            joined = [each.groups for each in whole.variables if each.each == "member" and group in each.groups]
+            mirrored = f", with --set design.mirrored=[[{', '.join(joined[0])}]]" if joined else ""
             return (
                 f"it looks at the members of {shown(str(group))}, of which others are kept than of the groups whose "
-                "values (`each: member`) they have: keep the same, or give these groups variables of their own"
+                f"values (`each: member`) they have: keep the same{mirrored}, or give these groups variables of their "
+                "own and run again"
             )
         return "" if group in (None, *names) else _nobody(str(group))
 

@@ -123,7 +123,7 @@ def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | N
         raise StoreError(f"no member has alpha of {threshold:g} or more; the largest is {alpha.max():.6g}")
     split = unlike(case, kept)
     reduced = restricted(apart(case, split), kept, whole)
-    check_restricted(reduced, split)
+    check_restricted(reduced, case, split)
     content_of(case)
     return kept, reduced
 

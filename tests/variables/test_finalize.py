@@ -276,6 +276,28 @@ def test_what_looks_at_a_group_taken_apart_is_refused() -> None:
     assert ready(case, design, None, 0.5)[0].tolist() == [1, 3, 5, 7]
 
 
+def test_what_the_refusal_of_a_group_taken_apart_says_to_do_helps(capsys) -> None:
+    forces = [
+        "--set",
+        "objectives.slide.response={member_force: {group: star}}",
+        "--set",
+        "objectives.slide.over_time=max",
+    ]
+    assert call(capsys, "run", "parts.yaml", "--out", "run.h5", "--quiet", *forces)[0] == 0
+    status, _, err = call(capsys, "finalize", "run.h5", "--keep", "5")
+    assert status == 2
+    assert "keep the same, with --set design.mirrored=[[port, star]], or give" in " ".join(err.split())
+    words = ["--set", "design.mirrored=[[port, star]]", "--json"]
+    status, out, err = call(capsys, "finalize", "run.h5", "--keep", "1", *words)
+    assert status == 0, err
+    told = json.loads(out)
+    ((group, one), (_, other)) = ((each["group"], each["member"]) for each in told["kept"])
+    assert (group, one) == ("port", other)
+    final = load_case("run.final.yaml")
+    found = Evaluator(final).evaluate(final.start)
+    assert found.objectives["slide"] == pytest.approx(told["designs"][2]["objectives"]["slide"], rel=1e-9)
+
+
 def test_alphas_that_are_one_are_kept_together(capsys) -> None:
     slots = one_alpha(load_case("parts.yaml", {"design.mirrored": "[[port, star]]"}))
     alpha = np.array([0.1, 0.7, 0.5, 0.5] * 2)
