@@ -17,7 +17,7 @@ IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 #: pictures of the motion: application, load case, time in s, end of the name
 MOMENTS = {"restraint": ("forward", 0.13, "far"), "lander": ("level", 0.206, "deep")}
 #: points of a front and iterations of each of its solves
-FRONTS = {"restraint": (3, 40), "tiedown": (5, 40), "mooring": (3, 25), "lander": (5, 40)}
+FRONTS = {"restraint": (3, 40), "tiedown": (5, 40), "mooring": (3, 60), "lander": (5, 40)}
 
 
 def commands(name: str, folder: Path, fronts: bool) -> Iterator[list[str]]:
