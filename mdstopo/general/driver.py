@@ -14,9 +14,9 @@ from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
-from mdstopo.general.kinks import kinks, landed
+from mdstopo.general.kinks import landed
+from mdstopo.general.landings import INTEGRALS, ROUNDS, landings
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
-from mdstopo.general.responses import kinked
 from mdstopo.general.rivals import compete, members_peaks
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
@@ -31,8 +31,6 @@ from mdstopo.status import Status
 ROWS = 6
 #: of what a reduction takes the peaks: of g, of -g, or of both
 SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
-#: reductions that are integrals over time: of g (1), of its square (2)
-INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
 
 
 def load_method(name: str) -> ModuleType:
@@ -68,7 +66,7 @@ class GeneralDriver:
         self.gradients = np.zeros((count, ROWS, n_design + varied))
         self.where = np.full(3, -1, dtype=np.int64)
         self.events = 0
-        #: where the steps of the last evaluation had to end (`kinks`)
+        #: where the steps of the last evaluation had to end (`landings`)
         self.landings: list[float] = []
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
         self._entry: Any = None
@@ -141,25 +139,21 @@ class GeneralDriver:
     def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
         code, count, time = self.run(alpha, gradient)
-        self.landings = self._kinks(count) if code == OK else []
-        if self.landings:
+        self.landings = []
+        for _ in range(ROUNDS):
+            more = landings(self, count) if code == OK else []
+            if not more:
+                break
+            self.landings = self.landings + more
             code, count, time = self.run(alpha, gradient, self.landings)
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient)
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]), self._grazing())
 
-    def _kinks(self, count: int) -> list[float]:
-        """Times at which what is integrated has kinks; steps are to end there (`kinks`)."""
-        found: list[float] = []
-        for j, name in enumerate(self.scene.reductions):
-            if name in INTEGRALS and kinked.py_func(self.scene.model, j):  # type: ignore[attr-defined]
-                see = partial(self._see, j, count)
-                found += kinks(self.states()[0][: count + 1].copy(), see)
-        return found
-
-    def _see(self, j: int, count: int, places: FloatArray, exact: bool) -> FloatArray:
-        return self.visit(j, places, exact, count)[2]
+    def see(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
+        """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
+        return self.visit(j, places, exact, count, rates=rates)[2]
 
     def _grazing(self) -> int:
         """A member (padded) that grazes where something is looked at, or -1."""
@@ -185,7 +179,7 @@ class GeneralDriver:
             self.found[j] = 1
             return
 
-        see = partial(self._see, j, count)
+        see = partial(self.see, j, count)
         if compete(self.scene.model.response[j, 0], reduction):
             found = ranked(members_peaks(self, j, t, reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
         elif reduction == "final":
@@ -212,6 +206,7 @@ class GeneralDriver:
         count: int,
         steps: "GeneralSteps | None" = None,
         who: int = -1,
+        rates: bool = True,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """q, v, a (3, K, n), multipliers (K, n_row + n_driven) and (K, 3) value, rate, member at places (K, 2).
 
@@ -227,8 +222,8 @@ class GeneralDriver:
         lam = np.zeros((len(places), int(model.size[0]) + len(model.driven)))
         seen = np.zeros((len(places), 3))
         self.entry.visit(
-            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, strength, exact, j, who,
-            places, out, lam, seen, self.work,
+            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, strength, exact, rates, j,
+            who, places, out, lam, seen, self.work,
         )  # fmt: skip
         return out, lam, seen
 

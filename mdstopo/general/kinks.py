@@ -1,7 +1,8 @@
 """Integrals over time of what has kinks: a norm that passes zero, the largest of several forces that changes hands.
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
-first looked at, and computed once more with steps that end at its kinks (and around bends that are nearly such). The
+first looked at, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
+derivatives bend more sharply than values; for values see `landings`). The
 integrand is continuous there, so that its derivatives need no term of their own.
 """
 

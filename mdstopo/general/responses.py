@@ -213,10 +213,10 @@ def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-un
 
 
 @kernel
-def rated(tag, model, strength, track, k, c, j, who, t, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
+def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
     """g_j and dg_j/dt at a state of step k; a, lam, the desk and the slopes are those of it afterwards.
 
-    j < 0: no response is asked for.
+    j < 0: no response is asked for; without `rates` the rate may be meaningless, and costs nothing.
     Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, dg/dt = g_q v +
     g_v a; else it is differenced along the method's own motion. near: scratch (4, n).
     """
@@ -229,7 +229,7 @@ def rated(tag, model, strength, track, k, c, j, who, t, q, v, desk, a, lam, bars
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         return np.nan, np.nan
     kind = model.response[j, 0]
-    simple = kind == ENERGY or (kind in (POINT, ANGLE) and model.response[j, 4] < derivatives(tag))
+    simple = not rates or kind == ENERGY or (kind in (POINT, ANGLE) and model.response[j, 4] < derivatives(tag))
     if not simple:
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         for d in range(n):

@@ -13,14 +13,31 @@ from mdstopo.jit import entry, kernel
 
 @entry
 def visit(  # type: ignore[no-untyped-def]
-    tag, ints, floats, tables, limits, count, room, room_ints, strength, exact, j, who, places, out, lam_out, seen, work
+    tag,
+    ints,
+    floats,
+    tables,
+    limits,
+    count,
+    room,
+    room_ints,
+    strength,
+    exact,
+    rates,
+    j,
+    who,
+    places,
+    out,
+    lam_out,
+    seen,
+    work,
 ):
     """States, and where j >= 0 response j, at places (K, 2): steps and fractions of them, each on its step's side.
 
-    exact: the method's own motion inside steps, else the quintic through both ends' states and accelerations. who: a
-    member, or -1 for the one with the largest force. Out: out (3, K, n) = q, v, a; lam_out (K, n_row + n_driven), the
-    multipliers of the solved rows, then those of the driven coordinates (what M a + Phi_q^T lam = F leaves to them);
-    seen (K, 3): value, rate, member.
+    exact: the method's own motion inside steps, else the quintic through both ends' states and accelerations. rates:
+    whether rates are wanted. who: a member, or -1 for the one with the largest force. Out: out (3, K, n) = q, v, a;
+    lam_out (K, n_row + n_driven), the multipliers of the solved rows, then those of the driven coordinates (what
+    M a + Phi_q^T lam = F leaves to them); seen (K, 3): value, rate, member.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -48,7 +65,7 @@ def visit(  # type: ignore[no-untyped-def]
             balance(model, strength, segment, t, q, v, no, desk, a, lam)
             seen[i, 2] = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
         value, rate = rated(
-            tag, model, strength, track, k, c, j, int(seen[i, 2]), t, q, v, desk, a, lam, bars, row_bar, near
+            tag, model, strength, track, k, c, j, int(seen[i, 2]), rates, t, q, v, desk, a, lam, bars, row_bar, near
         )
         seen[i, 0] = value
         seen[i, 1] = rate

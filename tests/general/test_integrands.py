@@ -266,3 +266,68 @@ def test_rounding_does_not_decide_on_which_side_of_zero_a_force_is():
     found = np.array([evaluate(case, design * (1.0 + 1e-9 * k)).gradients["F"] for k in range(60)])
     assert np.abs(found - found[0]).max() < 1e-5 * np.abs(found[0]).max()
     assert np.abs(found[0] - differences(case, "F", design)).max() < 1e-6 * np.abs(found[0]).max()
+
+
+#: a mass on two springs across each other: its acceleration, speed and distance turn round near zero, never at it
+NEARLY = """
+format: 1
+time: {end: 2}
+bodies:
+  a: {mass: 1, inertia: 1, position: [2, 0], velocity: [1, ASIDE]}
+members:
+  s: {from: {body: ground, at: [-5, 0]}, to: {body: a, at: [2, 0]}, law: {type: spring, stiffness: 9}}
+  u: {from: {body: ground, at: [2, 7]}, to: {body: a, at: [2, 0]}, law: {type: spring, stiffness: 6}}
+design: {initial: 1}
+objectives:
+  A: {response: {acceleration: {body: a}}, over_time: mean}
+  V: {response: {velocity: {body: a}}, over_time: mean}
+  D: {response: {displacement: {body: a}}, over_time: mean}
+combine: {weights: {A: 1, V: 1, D: 1}, normalize: false}
+solver: {integrator: runge_kutta, tolerance: 1e-13}
+"""
+
+
+def means_by_quadrature(case):
+    """The three means from the motion alone, by panels that are halved until they no longer change."""
+    motion = simulate(case)
+    nodes, weights = np.polynomial.legendre.leggauss(16)
+
+    def panel(low, high):
+        at = motion.at(0.5 * (low + high) + 0.5 * (high - low) * nodes)
+        sizes = [np.hypot(x[:, 0], x[:, 1]) for x in (at.a, at.v, at.q - motion.q[0])]
+        return 0.5 * (high - low) * np.array([weights @ size for size in sizes])
+
+    edges = np.linspace(0.0, 2.0, 41)
+    left = [(low, high, panel(low, high)) for low, high in pairwise(edges)]
+    total = np.zeros(3)
+    while left:
+        low, high, rough = left.pop()
+        middle = 0.5 * (low + high)
+        halves = panel(low, middle), panel(middle, high)
+        if np.abs(sum(halves) - rough).max() < 1e-14 or high - low < 1e-7:
+            total += sum(halves)
+        else:
+            left += [(low, middle, halves[0]), (middle, high, halves[1])]
+    return dict(zip("AVD", total / 2.0, strict=True))
+
+
+@pytest.mark.parametrize("aside", [1e-4, 1e-2, 0.03, 0.1, 0.3, 1.0])
+def test_means_of_norms_that_come_near_zero_are_right_to_the_tolerance(aside):
+    text = NEARLY.replace("ASIDE", repr(aside))
+    exact = means_by_quadrature(read_case(text))
+    for tolerance in (1e-6, 1e-8, 1e-10):
+        found = evaluate(read_case(text, overrides={"solver.tolerance": tolerance}), gradient=False)
+        for name, value in exact.items():
+            assert found.objectives[name] == pytest.approx(value, rel=3 * tolerance), (name, tolerance)
+
+
+@pytest.mark.parametrize("method", ["adjoint", "direct"])
+@pytest.mark.parametrize("aside", [0.03, 0.3])
+def test_gradients_of_means_of_norms_that_come_near_zero_are_those_of_the_values(aside, method):
+    text = NEARLY.replace("ASIDE", repr(aside))
+    alpha = np.array([0.9, 0.8])
+    tight = read_case(text)
+    found = evaluate(read_case(text, overrides={"solver.tolerance": 1e-10}), alpha, method=method)
+    for name in "AVD":
+        slope = differences(tight, name, alpha, 1e-4)
+        assert np.abs(found.gradients[name] - slope).max() <= 1e-7 * np.abs(slope).max(), name

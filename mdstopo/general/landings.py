@@ -1,0 +1,100 @@
+"""Where steps are to end for the sake of integrals: at kinks of what is integrated, and where it bends too sharply.
+
+The integral of a response is that of one more coordinate, by the weights of the stages, but no error control looks at
+it. A norm or an absolute value has a complex singularity as near to the real axis as it comes to zero, however smooth
+the motion is; the nearer it is, the shorter steps beside it have to be. So the weights' sum over each step is compared
+with a Gauss-Legendre sum, on the quintic through the step's ends, and steps are halved until both agree. What halves
+them is landed on; since steps are chosen anew in between, that is looked at once more. Fixed steps promise nothing, and
+stay.
+"""
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.general.kinks import kinks
+from mdstopo.general.responses import kinked
+from mdstopo.integrators.runge_kutta_tables import STAGES
+from mdstopo.scene.model import FloatArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
+
+#: reductions that are integrals over time: of g (1), of its square (2)
+INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
+#: how often an evaluation looks for landings
+ROUNDS = 3
+#: how far both sums over a step may differ, relative to the tolerance and the whole integral
+SHARE = 0.1
+#: halvings of one step at most
+HALVINGS = 24
+#: steps nearer together than this share of the simulated time are one
+APART = 1e-10
+
+#: places (K, 2) -> values (K,)
+Look = Callable[[FloatArray], FloatArray]
+
+
+def landings(driver: "GeneralDriver", count: int) -> list[float]:
+    """Times at which steps are to end, beside `driver.landings`, from the `count` steps of its last run."""
+    model, found = driver.scene.model, list[float]()
+    looked = [
+        (j, name)
+        for j, name in enumerate(driver.scene.reductions)
+        if name in INTEGRALS and kinked.py_func(model, j)  # type: ignore[attr-defined]
+    ]
+    if not looked:
+        return found
+    t = driver.states()[0][: count + 1].copy()
+    if not driver.landings:
+        for j, _ in looked:
+            found += kinks(t, partial(driver.see, j, count))
+    if driver.method.name != "runge_kutta" or driver.settings[2] > 0.0:
+        return found
+    ends = np.unique(np.concatenate([t, found, driver.landings]))
+    ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
+    method = 1 if model.size[2] != 0 else 0
+    vectors = driver.method.tables[method, 2, :, : STAGES[method]]
+    weighed = vectors[2] != 0.0
+    rule = np.stack([vectors[0][weighed], vectors[2][weighed]])
+    for j, name in looked:
+
+        def look(places: FloatArray, j: int = j, square: bool = INTEGRALS[name] == 2) -> FloatArray:
+            value = driver.see(j, count, places, False, rates=False)[:, 0]
+            return value * value if square else value
+
+        found += halves(t, ends, look, rule, SHARE * float(driver.settings[0]))
+    return found
+
+
+def halves(t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolerance: float) -> list[float]:
+    """Times that halve the intervals between `ends` (k + 1,), and their halves, until the rule is good on each.
+
+    t (m + 1,): ends of steps, all of them among `ends`; rule (2, s): nodes and weights on (0, 1). Good is what differs
+    from the Gauss-Legendre sum by the tolerance times the whole integral at most.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    places = np.concatenate([rule[0], 0.5 * (nodes + 1.0)])
+    low, width = ends[:-1], np.diff(ends)
+    step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
+    found: list[float] = []
+    whole = np.nan
+    for _ in range(HALVINGS):
+        times = low[:, None] + width[:, None] * places
+        fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
+        at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
+        value = look(at.reshape(-1, 2)).reshape(fraction.shape)
+        sums = width * np.einsum("ij,j->i", value[:, : rule.shape[1]], rule[1])
+        better = 0.5 * width * np.einsum("ij,j->i", value[:, rule.shape[1] :], weights)
+        if np.isnan(whole):
+            whole = float(np.abs(better).sum())
+        bad = (np.abs(sums - better) > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
+        if not bad.any():
+            break
+        half = 0.5 * width[bad]
+        found += (low[bad] + half).tolist()
+        low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
+        step = np.concatenate([step[bad], step[bad]])
+    return found
