@@ -110,3 +110,4 @@ if __name__ == "__main__":
     for module in sys.argv[2:]:
         importlib.import_module(module).compile_share()
     compile_looking(sys.argv[1])
+    gc.freeze()  # it would be looked through at the end as well

@@ -139,6 +139,7 @@ def _main() -> None:
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
     _marker(case).touch()
+    gc.freeze()  # it would be looked through at the end as well
 
 
 if __name__ == "__main__":
