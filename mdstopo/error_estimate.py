@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from mdstopo.engine import Evaluator
 
 FINER = 1e-3
-#: the tightest tolerance that double precision lets be kept
-TIGHTEST = 1e-13
+#: the tightest tolerance that double precision lets be kept, and where one that does no more for a result is given up
+TIGHTEST, COARSEST = 1e-13, 1e-6
 #: what rounding leaves in sums over a motion, relative
 ROUNDING = 1e-15
 
@@ -59,8 +59,12 @@ class Estimator:
             finer = self._at(tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
             if finer.work != found.work:
                 return finer
-        # nothing finer can be had: a coarser one is farther off than what was found
-        return self._at(10.0 * tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
+        # nothing finer can be had: a coarser one is farther off than what was found, once its steps are others
+        while True:
+            tolerance *= 10.0
+            coarser = self._at(tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
+            if coarser.work != found.work or tolerance >= COARSEST:
+                return coarser
 
     def _at(self, tolerance: float) -> "Evaluator":
         return self._evaluator.otherwise(integrator=self._evaluator.integrator, tolerance=tolerance)

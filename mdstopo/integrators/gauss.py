@@ -6,7 +6,7 @@ On a window the accelerations at the nodes obey a_j = M^-1 F(q_j, v_j, t_j), wit
     a_j = M^-1 (F_j - K_j (q_j(a) - q_j) - C_j (v_j(a) - v_j))
 
 is solved by sweeps that touch no member (they contract quickly because h^2 |K/M| |A|^2 is small on the windows chosen
-here). The first pass uses few nodes; every further one takes more, until the Legendre coefficients of a have decayed
+here). The first pass has seven nodes; every further one takes more, until the Legendre coefficients of a have decayed
 below the tolerance, and goes on at that number until the Newton correction is. So the corrections and the tail of the
 coefficients are the error estimate, at no cost. The last correction is solved for but not passed over once more, so
 the kept tangents belong to states that are off by it: by at most the tolerance (and 1e-4) on adaptive windows, by
@@ -64,7 +64,7 @@ TAG = (0,)
 COUNTS = LEVELS
 MOST = max(LEVELS)
 #: level of the windows of a fixed step: seven nodes, order 14
-FIXED_LEVEL = 1
+FIXED_LEVEL = 0
 #: radians of the fastest vibration that the first window may span, so that the sweeps contract
 LONGEST = 6.0
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
@@ -264,7 +264,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 return STEP_TOO_SMALL, count, t
 
             # predict with the balance linearised at the window's start (the last stage before it)
-            level = FIXED_LEVEL if fixed_step > 0.0 else 0
+            level = FIXED_LEVEL
             s = COUNTS[level]
             planes = tables[level]
             load[:] = 0.0
@@ -334,7 +334,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                         accepted = True
                         break
                     previous = e
-                elif level == n_level - 1 or (level >= 1 and e > 0.5):
+                elif level == n_level - 1 or (newton > 1 and e > 0.5):
                     break  # more nodes are not to be had; a far too long window is seen early
                 else:
                     level += 1

@@ -19,7 +19,7 @@ from mdstopo.scene.model import FloatArray
 AnyFloats = NDArray[np.floating[Any]]
 
 #: numbers of nodes a window may have, in the order in which they are tried
-LEVELS = (4, 7, 9, 11, 14)
+LEVELS = (7, 10, 14)
 
 #: planes of the tables, each (s_max, s_max): row 0 of NODES holds c, row 1 the weights b, row 2 b (1 - c);
 #: A, AA integrate node accelerations once and twice to the nodes; LEGENDRE turns node values into coefficients;
