@@ -28,7 +28,9 @@ class Lower(NumbaLower):
     """Numba's, with less for LLVM to do away with."""
 
     def init(self) -> None:
-        self._borrowed = borrowed(self.blocks, self.fndesc.typemap)
+        # a generator's variables outlive the call that sets them: they are kept between calls
+        self._lasting = bool(self.func_ir.func_id.is_generator)
+        self._borrowed = set() if self._lasting else borrowed(self.blocks, self.fndesc.typemap)
         self._counting = self.context
         self._plain = self.context.subtarget(enable_nrt=False)
         self._plain.__dict__.pop("nrt", None)  # the other one's counter, where it has been made
@@ -42,7 +44,7 @@ class Lower(NumbaLower):
     def _find_singly_assigned_variable(self) -> None:
         """Those that need no place in memory; ones that are counted keep it, because they may be let go of twice."""
         super()._find_singly_assigned_variable()
-        once = assigned_once(self.blocks)
+        once = set() if self._lasting else assigned_once(self.blocks)
         self._held = {name for name in once if self._is_counted(name)} - self._singly_assigned_vars
         self._singly_assigned_vars |= once - self._held
         self._values: dict[str, Any] = {}
@@ -76,7 +78,7 @@ class Lower(NumbaLower):
 
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         array, wanted = signature.args
-        kinds = self._numbers(array, wanted)
+        kinds = self._numbers(value.name, array, wanted)
         if not kinds:
             return super().lower_getitem(resty, expr, value, index, signature)
         given = self.loadvar(value.name)
@@ -90,7 +92,7 @@ class Lower(NumbaLower):
 
     def lower_setitem(self, target_var: Any, index_var: Any, value_var: Any, signature: Any) -> Any:
         array, wanted, kind = signature.args
-        kinds = self._numbers(array, wanted)
+        kinds = self._numbers(target_var.name, array, wanted)
         if not kinds or len(kinds) < array.ndim:
             return super().lower_setitem(target_var, index_var, value_var, signature)
         given = self.loadvar(target_var.name)
@@ -100,9 +102,14 @@ class Lower(NumbaLower):
             self.context, self.builder, array, self.context.cast(self.builder, value, kind, array.dtype), address
         )
 
-    def _numbers(self, array: Any, wanted: Any) -> tuple[Any, ...]:
-        """The types of the numbers that index an array; none where something else does, or it is not in C order."""
+    def _numbers(self, name: str, array: Any, wanted: Any) -> tuple[Any, ...]:
+        """The types of the numbers that index an array; none where something else does, or it is not in C order.
+
+        Nor where the variable may also hold None: then it is more than the array.
+        """
         if not isinstance(array, types.Array) or array.layout != "C" or self.context.enable_boundscheck:
+            return ()
+        if isinstance(self.typeof(name), types.Optional):
             return ()
         kinds = _kinds(wanted)
         fits = len(kinds) <= array.ndim and all(isinstance(kind, types.Integer) for kind in kinds)
