@@ -56,7 +56,9 @@ def _import_lean() -> Any:
             os.environ[_PLAIN] = stated
         for name in spared:
             del sys.modules[name]
-    with contextlib.suppress(ImportError, AttributeError, LookupError):  # of another version of Numba
+    from mdstopo.native.library import IS_KNOWN
+
+    if IS_KNOWN:
         from mdstopo.native.sparing import spare
 
         spare()

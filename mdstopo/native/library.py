@@ -6,16 +6,20 @@ level (`jit.kernel`) is optimised in its entry only: a quarter of the compile ti
 optimised by itself too, so that its vectors do not depend on who calls it.
 """
 
-import contextlib
 from typing import Any
 
+import numba
 from llvmlite import binding as llvm
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
 
+#: versions of Numba whose insides `passes`, `lowering` and `sparing` are known to fit; others compile in their own way
+KNOWN = ("0.68.",)
+IS_KNOWN = numba.__version__.startswith(KNOWN)
+
 LEANER: dict[Any, Any] = {}
-with contextlib.suppress(ImportError, AttributeError):  # of a version of Numba in which some of it is not found
+if IS_KNOWN:
     from mdstopo.native.passes import LEANER
 
 

@@ -1,6 +1,7 @@
 """From Numba's typed code to LLVM's, in half as many instructions: the time to compile goes with their number.
 
-Nothing that is computed differs from what Numba's own `Lower` makes, which leaves the same to LLVM to find out:
+Numba's own `Lower` leaves the same to LLVM to find out. What is computed is the same, but for the last bits where LLVM
+may fuse or reorder what it sees:
 
 What a function got from its caller lives as long as the call. So neither it nor views of it are counted: a scene is a
 tuple of thirty arrays, each of which would be counted at every mention of it.
