@@ -77,7 +77,7 @@ solver: {settle: true}
 
 @pytest.mark.parametrize(
     ("solver", "bound"),
-    [({"tolerance": 1e-11}, 1e-6), ({"integrator": "generalized_alpha", "step": 0.002, "tolerance": 1e-10}, 1e-2)],
+    [({"tolerance": 1e-12}, 1e-6), ({"integrator": "generalized_alpha", "step": 0.002, "tolerance": 1e-10}, 1e-2)],
     ids=["runge_kutta", "generalized_alpha"],
 )
 def test_gradients_go_through_the_equilibrium(solver, bound):
@@ -86,7 +86,7 @@ def test_gradients_go_through_the_equilibrium(solver, bound):
     found, direct = mdstopo.evaluate(case, alpha), mdstopo.evaluate(case, alpha, method="direct")
     assert found.status.ok, found.message
     direction = np.random.default_rng(1).normal(size=case.n_design) * alpha
-    for name, slope in slopes(case, alpha, direction, 1e-5).items():
+    for name, slope in slopes(case, alpha, direction, 1e-4).items():
         gradient = found.gradients[name]
         assert abs(slope - gradient @ direction) <= bound * np.abs(gradient * direction).max(), name
         assert np.abs(direct.gradients[name] - gradient).max() <= 1e-9 * np.abs(gradient).max(), name
