@@ -63,8 +63,8 @@ TAG = (0,)
 
 COUNTS = LEVELS
 MOST = max(LEVELS)
-#: level of the windows of a fixed step: seven nodes, order 14
-FIXED_LEVEL = 0
+#: level of every first pass, and of all passes of a fixed step: seven nodes, order 14
+FIRST_LEVEL = 0
 #: radians of the fastest vibration that the first window may span, so that the sweeps contract
 LONGEST = 6.0
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
@@ -264,7 +264,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 return STEP_TOO_SMALL, count, t
 
             # predict with the balance linearised at the window's start (the last stage before it)
-            level = FIXED_LEVEL
+            level = FIRST_LEVEL
             s = COUNTS[level]
             planes = tables[level]
             load[:] = 0.0

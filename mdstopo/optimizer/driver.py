@@ -260,7 +260,7 @@ class Gsao:
         if settings.flag("zero_shift"):
             # A variable at zero would have its shift on top of it.
             below = np.maximum(state.alpha, 1e-9 * self.range)
-        steepest = float(np.abs(state.gradients[chosen]).max())
+        steepest = float(self._measures.steepest(state.gradients)[chosen].max())
         return Approximation(
             state.alpha,
             below,
@@ -299,7 +299,7 @@ class Gsao:
         of volume rows that carry one. At an optimum the subproblem returns the iterate and its multipliers,
         and all are zero.
         """
-        steepest = float(np.abs(state.gradients[0]).max(initial=0.0))
+        steepest = float(self._measures.steepest(state.gradients)[0])
         if steepest == 0.0:
             return 0.0
         linear = self.problem.linear
