@@ -1,9 +1,9 @@
 """The members that carry anything: all others are left out of the motion.
 
-A member whose strengths are zero (alpha^mu = 0) adds nothing to any sum. Where a share of all members is like that, the
-others are written behind the strengths, block by block and in their order, and the motion is computed with these. Only
-the design decides, so that results depend on nothing else. The gradient needs all members: at mu = 1 one that carries
-nothing has a slope.
+A member whose strengths are zero (alpha^mu = 0) adds nothing to any sum. Where so many are like that that it pays, the
+others are written behind the strengths, block by block and in their order, and the motion is computed with these; they
+are no grids any more. Only the design decides, so that results depend on nothing else. The gradient needs all members:
+at mu = 1 one that carries nothing has a slope.
 """
 
 import numpy as np
@@ -11,10 +11,10 @@ import numpy as np
 from mdstopo.jit import kernel
 from mdstopo.mechanics.passes import springs_of, threads_for
 from mdstopo.native.threads import shared, taken
-from mdstopo.scene.model import VECTOR, Model, Springs
+from mdstopo.scene.model import BLOCK, VECTOR, Model, Springs
 
-#: of so many members one must carry nothing
-SHARE = 4
+#: costs of a member of a grid and of another: all that are left have to cost at most three quarters of what all do
+IN_GRID, PLAIN = 2, 3
 #: rows of strengths with room for the members that carry, as in `Model.member`
 ROOMY = 11
 
@@ -50,17 +50,18 @@ def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
     for i in range(parts):
         left += count[i]
     members = 0
+    cost = 0
     for k in range(block.shape[0]):
         members += block[k, 5]
-    if strength.shape[0] < ROOMY or SHARE * (members - left) < members:
+        cost += block[k, 5] * (IN_GRID if block[k, 6] > 0 else PLAIN)
+    if strength.shape[0] < ROOMY or 4 * PLAIN * left > 3 * cost:
         return springs, strength[:3], members
     # where each chunk begins among those that are left
     begin = np.empty(parts, np.int64)
-    fewer = np.empty((block.shape[0], 6), np.int64)
+    fewer = np.zeros((block.shape[0], BLOCK), np.int64)
     for k in range(block.shape[0]):
-        for j in range(6):
+        for j in range(5):
             fewer[k, j] = block[k, j]
-        fewer[k, 5] = 0
     for i in range(parts):
         k = springs.chunk[i, 0]
         begin[i] = block[k, 1] + fewer[k, 5]

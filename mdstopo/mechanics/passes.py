@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.grids import add_forces, add_tangent, design_grid, sum_grid
 from mdstopo.mechanics.laws.spring import (
     elastic_design,
     elastic_force,
@@ -66,22 +67,41 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
             strength[2, i] = member[7, i]
         return
     mu = power[k]
-    first = block[k, 4] + start - block[k, 1]
-    count = min(stop, block[k, 1] + block[k, 5]) - start
-    a = alpha[first : first + count]
-    for row in range(3 if block[k, 3] == 1 else 1):
-        whole = member[5 + row, start : start + count]
-        scaled = strength[row, start : start + count]
-        if mu == 1.0:  # a loop of its own: a power that is not used would be computed all the same
-            for i in range(count):
-                scaled[i] = a[i] * whole[i]
-        else:
-            for i in range(count):
-                scaled[i] = a[i] ** mu * whole[i]
-    for i in range(start + count, stop):
-        strength[0, i] = 0.0
-        strength[1, i] = 0.0
-        strength[2, i] = 0.0
+    at = start
+    while at < stop:
+        count, first, last = _row(block, k, at, stop)
+        a = alpha[first : first + count]
+        for row in range(3 if block[k, 3] == 1 else 1):
+            whole = member[5 + row, at : at + count]
+            scaled = strength[row, at : at + count]
+            if mu == 1.0:  # a loop of its own: a power that is not used would be computed all the same
+                for i in range(count):
+                    scaled[i] = a[i] * whole[i]
+            else:
+                for i in range(count):
+                    scaled[i] = a[i] ** mu * whole[i]
+        for i in range(at + count, last):
+            strength[0, i] = 0.0
+            strength[1, i] = 0.0
+            strength[2, i] = 0.0
+        at = last
+
+
+@kernel
+def _row(block, k, at, stop):  # type: ignore[no-untyped-def]
+    """How many members of block k lie one after the other from `at` on, the first's variable, and where the next do."""
+    width = block[k, 6]
+    if width == 0:
+        return min(stop, end_of(block, k)) - at, block[k, 4] + at - block[k, 1], stop
+    if at >= end_of(block, k):
+        return 0, 0, stop
+    return block[k, 7], block[k, 4] + (at - block[k, 1]) // width * block[k, 7], at + width
+
+
+@kernel
+def end_of(block, k):  # type: ignore[no-untyped-def]
+    """Where the members of block k end, and of a grid the places of its last row."""
+    return block[k, 1] + (block[k, 5] if block[k, 6] == 0 else block[k, 5] // block[k, 7] * block[k, 6])
 
 
 @kernel
@@ -121,6 +141,9 @@ def _sum_chunks(counter, chunk, block, member, strength, rel, m, tangent, part):
 @kernel
 def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
     """Add the part start..stop of block k to sums (m, columns, SUMS)."""
+    if block[k, 6] > 0:
+        sum_grid(k, start, stop, block, member, strength[0], rel, m, tangent, sums, column)
+        return
     p = block[k, 0]
     viscous = block[k, 3] == 1
     counted = block[k, 4] >= 0  # energy is that of design members
@@ -137,28 +160,11 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
             o = sums[j, column]
             if not viscous:
                 if tangent:
-                    x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(
-                        px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3]
-                    )
-                    o[7] += kxx
-                    o[8] += kxy
-                    o[9] += kxt
-                    o[10] += kxy
-                    o[11] += kyy
-                    o[12] += kyt
-                    o[13] += kxt
-                    o[14] += kyt
-                    o[15] += ktt
+                    found = elastic_tangent(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3])
+                    add_forces(found[:4], counted, o)
+                    add_tangent(found[4:], o)
                 else:
-                    x, y, t, e = elastic_force(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3])
-                o[0] += x
-                o[1] += y
-                o[2] += t
-                if counted:
-                    o[3] += e
-                    o[4] -= x
-                    o[5] -= y
-                    o[6] -= t
+                    add_forces(elastic_force(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3]), counted, o)
                 continue
             cs = strength[1, lo:hi]
             ps = strength[2, lo:hi]
@@ -239,6 +245,9 @@ def _design(k, start, stop, block, member, rel, u, out):  # type: ignore[no-unty
     if block[k, 4] < 0:
         return
     p = block[k, 0]
+    if block[k, 6] > 0:
+        design_grid(start, stop, block[k, 6], member, rel[:, p], u[:, p], out)
+        return
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)
         px = member[0, lo:hi]
@@ -316,14 +325,16 @@ def _unscale(k, start, stop, block, power, alpha, padded, out):  # type: ignore[
     if block[k, 4] < 0:
         return
     mu = power[k]
-    first = block[k, 4] + start - block[k, 1]
-    count = min(stop, block[k, 1] + block[k, 5]) - start
-    a = alpha[first : first + count]
-    given = padded[start : start + count]
-    own = out[first : first + count]
-    if mu == 1.0:
-        for i in range(count):
-            own[i] = given[i]
-    else:
-        for i in range(count):
-            own[i] = mu * a[i] ** (mu - 1.0) * given[i]
+    at = start
+    while at < stop:
+        count, first, last = _row(block, k, at, stop)
+        a = alpha[first : first + count]
+        given = padded[at : at + count]
+        own = out[first : first + count]
+        if mu == 1.0:
+            for i in range(count):
+                own[i] = given[i]
+        else:
+            for i in range(count):
+                own[i] = mu * a[i] ** (mu - 1.0) * given[i]
+        at = last

@@ -10,7 +10,8 @@ from functools import cached_property
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, MemberGroup, SpringLaw
-from mdstopo.scene.model import VECTOR, FloatArray, IndexArray, Model
+from mdstopo.scene.grids import row_of
+from mdstopo.scene.model import BLOCK, VECTOR, FloatArray, IndexArray, Model
 from mdstopo.scene.signals import breakpoints, segment_values
 
 ELASTIC, VISCOUS = 0, 1
@@ -61,31 +62,43 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     """Blocks, pairs and member arrays. index: body name to its place in the state."""
     pairs: dict[tuple[int, int], int] = {}
     blocks, powers, first = [], [], 0
-    total = sum(-(-len(group) // VECTOR) * VECTOR for group in case.members)
-    member = np.zeros((8, total))
     start = 0
     for group in case.members:
         law = _spring(group)
         pair = pairs.setdefault((index[group.body_from], index[group.body_to]), len(pairs))
         count = len(group)
-        stop = start + -(-count // VECTOR) * VECTOR
-        rows = member[:, start : start + count]
-        rows[0:2] = group.p_local.T
-        rows[2:4] = group.q_local.T
-        rows[4] = group.length if law.free_length is None else law.free_length
-        rows[5:8] = np.array([[law.stiffness], [law.damping], [law.preload]])
         kind = VISCOUS if law.damping > 0.0 or law.preload != 0.0 else ELASTIC
-        blocks.append([pair, start, stop, kind, first if group.design else -1, count])
+        width, length = row_of(group, kind == ELASTIC)
+        places = count // length * width if length else count
+        stop = start + -(-places // VECTOR) * VECTOR
+        blocks.append([pair, start, stop, kind, first if group.design else -1, count, width, length])
         powers.append(group.power)
         first += count if group.design else 0
         start = stop
+    member = np.zeros((8, start))
+    for group, block in zip(case.members, blocks, strict=True):
+        _fill(group, block, member)
     return Members(
         pairs=np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
-        block=np.array(blocks, dtype=np.int64).reshape(-1, 6),
+        block=np.array(blocks, dtype=np.int64).reshape(-1, BLOCK),
         power=np.array(powers, dtype=np.float64),
         member=member,
         shortest=np.array([float(group.length.min()) for group in case.members]),
     )
+
+
+def _fill(group: MemberGroup, block: list[int], member: FloatArray) -> None:
+    """Write the members of a group into the padded arrays member (8, M_padded)."""
+    law = _spring(group)
+    _, start, _, _, _, count, width, length = block
+    shape = (count // length, length) if width else (1, count)
+    rows = member[:, start : start + shape[0] * (width or count)].reshape(8, shape[0], -1)
+    own = rows[:, :, : shape[1]]
+    own[0:2] = group.p_local.T.reshape(2, *shape)
+    own[2:4] = group.q_local.T.reshape(2, *shape)
+    own[4] = (group.length if law.free_length is None else np.full(count, law.free_length)).reshape(shape)
+    own[5:8] = np.array([law.stiffness, law.damping, law.preload])[:, None, None]
+    rows[:5, :, shape[1] :] = own[:5, :, -1:]  # the last point once more: no place has a length of its own
 
 
 def _spring(group: MemberGroup) -> SpringLaw:

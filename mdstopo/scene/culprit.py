@@ -7,7 +7,8 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.scene.compile import Scene
-from mdstopo.scene.model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, FloatArray
+from mdstopo.scene.grids import places_of
+from mdstopo.scene.model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, STIFFNESS, FloatArray
 from mdstopo.scene.packing import pack
 from mdstopo.status import Status
 
@@ -25,8 +26,9 @@ class Culprits:
     def member(self, padded: int) -> str:
         """A member in words, from its place in the padded arrays."""
         for group, block in zip(self.case.members, self.scene.model.block.tolist(), strict=True):
-            i = padded - block[START]
-            if 0 <= i < block[COUNT]:
+            places = places_of(block)
+            i = int(np.searchsorted(places, padded))
+            if i < len(places) and places[i] == padded:
                 p, q = group.p_world[i], group.q_world[i]
                 return (
                     f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
@@ -50,11 +52,11 @@ class Culprits:
         model = self.scene.model
         best, found = COLLAPSED, -1
         for block, group in zip(model.block.tolist(), self.case.members, strict=True):
-            part = slice(block[START], block[START] + block[COUNT])
+            places = places_of(block)
             strength = np.ones(block[COUNT])
             if block[DESIGN] >= 0:
                 strength = design[block[DESIGN] : block[DESIGN] + block[COUNT]] ** group.power
-            member = model.member[:, part]
+            member = model.member[:, places]
             a, b = (3 * body for body in model.pair[block[PAIR]].tolist())
             ends = []
             for body, rows in ((a, (PX, PY)), (b, (QX, QY))):
@@ -66,7 +68,7 @@ class Culprits:
             ratio = np.where(carries, ratio, np.inf)
             i = int(ratio.argmin())
             if ratio[i] < best:
-                best, found = float(ratio[i]), block[START] + i
+                best, found = float(ratio[i]), int(places[i])
         return found
 
     def natural_frequencies(self, design: FloatArray) -> FloatArray:
@@ -75,9 +77,8 @@ class Culprits:
         strength = model.member[5:8].copy()
         for block, group in zip(model.block.tolist(), self.case.members, strict=True):
             if block[DESIGN] >= 0:
-                part = slice(block[START], block[START] + block[COUNT])
                 first = block[DESIGN]
-                strength[:, part] *= design[first : first + block[COUNT]] ** group.power
+                strength[:, places_of(block)] *= design[first : first + block[COUNT]] ** group.power
         from mdstopo.mechanics.start_entry import start_tangents
 
         strength[1] = 0.0  # undamped

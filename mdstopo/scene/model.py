@@ -2,7 +2,8 @@
 
 n_b bodies have n = 3 n_b coordinates q = (x, y, psi) each. `ground` is the last body, with infinite mass, where a
 member is tied to it; it is absent otherwise. Members live in blocks of one law and one pair of bodies, structure of
-arrays; blocks are padded to a multiple of the vector width with members of no stiffness. Loads are linear in time
+arrays; blocks are padded to a multiple of the vector width with members of no stiffness, and so is each row of a
+block that joins every point of one grid with every point of another (`scene.grids`). Loads are linear in time
 within a segment, and the integrators land on the ends of segments, so a kernel never asks on which side of a kink
 it stands. All arrays are read-only; everything is a run-time value, so a changed case compiles nothing anew.
 """
@@ -17,8 +18,9 @@ IndexArray = NDArray[np.int64]
 
 #: rows of `Model.member`
 PX, PY, QX, QY, L0, STIFFNESS, DAMPING, PRELOAD = range(8)
-#: columns of `Model.block`
-PAIR, START, STOP, KIND, DESIGN, COUNT = range(6)
+#: columns of `Model.block`, and how many there are
+PAIR, START, STOP, KIND, DESIGN, COUNT, WIDTH, LENGTH = range(8)
+BLOCK = 8
 #: blocks are padded to a multiple of this
 VECTOR = 16
 #: members of one tile, few enough that all rows stay in the first-level cache while several poses pass over them
@@ -26,6 +28,8 @@ TILE = 512
 #: members of one chunk, and how many there must be in all before they are summed in chunks
 CHUNK = 8 * TILE
 MANY = 4 * CHUNK
+#: rows of a grid that a tile has, where there are so many
+ROWS = 16
 #: of a model that is not `packed`
 NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
 
@@ -48,7 +52,8 @@ class Model(NamedTuple):
     pair          (n_pair, 2)       the two bodies of each pair that members connect: P's, then Q's
     reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
     shortest      (n_pair,)         shortest initial length of a member, m (inf without members)
-    block         (n_block, 6)      pair, start, stop (padded), kind of law, first design variable or -1, count
+    block         (n_block, 8)      pair, start, stop (padded), kind of law, first design variable or -1, count;
+                                    of a grid: places in a row, members in a row (otherwise 0)
     power         (n_block,)        mu of Eq. 12
     member        (8, M_padded)     P, Q in body frames; free length; stiffness, damping, preload at alpha = 1
     times         (n_seg + 1,)      start, kinks of the loads, end

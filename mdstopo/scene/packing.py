@@ -4,6 +4,7 @@
 Python, gives the same `Model` back as views. The first integers are the sizes.
 """
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from mdstopo.jit import kernel
 from mdstopo.native.threads import allowed
-from mdstopo.scene.model import CHUNK, MANY, FloatArray, IndexArray, Model
+from mdstopo.scene.model import BLOCK, CHUNK, MANY, ROWS, START, STOP, WIDTH, FloatArray, IndexArray, Model
 
 #: numbers in a line of the cache
 _LINE = 8
@@ -58,13 +59,18 @@ def pack(model: Model, threads: int | None = None) -> Packed:
 
 
 def chunks_of(block: IndexArray) -> IndexArray:
-    """(n_chunk, 3) block, start, stop of each chunk, in order: whole blocks where there are few members."""
-    most = CHUNK if many_members(block) else MANY
-    chunks = [
-        (k, first, min(first + most, stop))
-        for k, (start, stop) in enumerate(block[:, 1:3].tolist())
-        for first in range(start, stop, most)
-    ]
+    """(n_chunk, 3) block, start, stop of each chunk, in order: whole blocks where there are few members.
+
+    Of grids chunks are whole rows, and several: what belongs to rows and columns is found once in each.
+    """
+    chunks = []
+    many = many_members(block)
+    for k, (start, stop, width) in enumerate(block[:, [START, STOP, WIDTH]].tolist()):
+        most = CHUNK if width == 0 else max(CHUNK // width, ROWS) * width
+        if not many:
+            most = stop - start
+        cuts = [*range(start, stop - max(width - 1, 0), most), stop]
+        chunks += [(k, *ends) for ends in itertools.pairwise(cuts)]
     return np.array(chunks, dtype=np.int64).reshape(-1, 3)
 
 
@@ -94,8 +100,8 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     i = SIZES
     pair = ints[i : i + 2 * n_pair].reshape((n_pair, 2))
     i += 2 * n_pair
-    block = ints[i : i + 6 * n_block].reshape((n_block, 6))
-    i += 6 * n_block
+    block = ints[i : i + BLOCK * n_block].reshape((n_block, BLOCK))
+    i += BLOCK * n_block
     load_body = ints[i : i + n_load]
     i += n_load
     load_follows = ints[i : i + n_load]

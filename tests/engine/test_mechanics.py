@@ -9,6 +9,8 @@ from mdstopo import simulate
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics.start_entry import start_tangents
 from mdstopo.scene.compile import compile_members, compile_scene, state_order
+from mdstopo.scene.grids import places_of
+from mdstopo.scene.model import COUNT, DESIGN
 from mdstopo.scene.packing import pack
 from tests.engine.plain import Plain
 from tests.engine.scenes import FEATURES, random_design, random_scene, read
@@ -81,10 +83,10 @@ def test_tangents_are_the_differentials_of_the_forces(seed):
     q[:moving] += rng.uniform(-0.2, 0.2, moving)
     v[:moving] += rng.uniform(-1.0, 1.0, moving)
     strength = model.member[5:8].copy()
-    for start, stop, first, count, mu in zip(*model.block[:, [1, 2, 4, 5]].T, model.power, strict=True):
-        if first >= 0:
-            strength[:, start : start + count] *= alpha[first : first + count] ** mu
-            strength[:, start + count : stop] = 0.0
+    for block, mu in zip(model.block.tolist(), model.power, strict=True):
+        if block[DESIGN] >= 0:
+            first = block[DESIGN]
+            strength[:, places_of(block)] *= alpha[first : first + block[COUNT]] ** mu
     segment = 1
     t = model.times[segment]
     pairs = len(model.pair)

@@ -73,7 +73,8 @@ def random_scene(
         rows.append(member)
         pair = pairs.index((g.a, g.b))
         reach[pair] = max(reach[pair], 0.57)
-        blocks.append([pair, start, stop, int(g.damping > 0 or g.preload != 0), first if g.design else -1, g.count])
+        kind = int(g.damping > 0 or g.preload != 0)
+        blocks.append([pair, start, stop, kind, first if g.design else -1, g.count, 0, 0])
         powers.append(g.power)
         first += g.count if g.design else 0
         start = stop
@@ -120,7 +121,7 @@ def figure_3(acceleration=(9.8, 0.0), turn=20.0, end=0.2) -> Scene:
     q0 = np.array([0.0, 0, 0, 0, -1, 0])
     model = Model(
         inv_mass=inv_mass, q0=q0, v0=np.zeros(6), pair=np.array([[0, 1]]), reach=np.array([2.1]),
-        shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020]]), power=np.ones(1), member=member,
+        shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020, 0, 0]]), power=np.ones(1), member=member,
         times=np.array([0.0, end]), force=force, load_body=np.zeros(0, np.int64),
         load_follows=np.zeros(0, np.int64), load_arm=np.zeros((0, 2)), load_force=np.zeros((1, 0, 2, 2)),
     )  # fmt: skip

@@ -1,0 +1,99 @@
+"""The passes over members that join every point of one grid with every point of another, tile by tile.
+
+A tile has some rows and some columns, few enough that its numbers stay in the first-level cache while several poses
+pass over them. Sums are added tile by tile, in order.
+"""
+
+import numpy as np
+
+from mdstopo.jit import kernel
+from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
+from mdstopo.native.vector import lanes
+from mdstopo.scene.model import ROWS, TILE
+
+#: places of a tile: of each it reads two numbers, where `passes` reads six
+PLACES = 4 * TILE
+
+
+@kernel
+def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
+    """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is energy that is looked at."""
+    for i in range(3):
+        out[i] += found[i]
+    if counted:
+        out[3] += found[3]
+        for i in range(3):
+            out[4 + i] -= found[i]
+
+
+@kernel
+def add_tangent(found, out):  # type: ignore[no-untyped-def]
+    """Add the upper triangle xx, xy, yy, xt, yt, tt of K to out (SUMS,)."""
+    kxx, kxy, kyy, kxt, kyt, ktt = found
+    out[7] += kxx
+    out[8] += kxy
+    out[9] += kxt
+    out[10] += kxy
+    out[11] += kyy
+    out[12] += kyt
+    out[13] += kxt
+    out[14] += kyt
+    out[15] += ktt
+
+
+@kernel
+def _tile(rows, width):  # type: ignore[no-untyped-def]
+    """Rows and columns of a tile."""
+    tall = rows if rows * width <= PLACES else min(rows, ROWS)
+    return tall, min(width, PLACES // tall // lanes() * lanes())
+
+
+@kernel
+def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+    """Add the rows from start to stop of block k to sums (m, columns, SUMS) at the poses rel (m, n_pair, POSE)."""
+    p = block[k, 0]
+    width = block[k, 6]
+    counted = block[k, 4] >= 0
+    rows = (stop - start) // width
+    tall, wide = _tile(rows, width)
+    room = np.empty((tall, 2))
+    for row in range(0, rows, tall):
+        lo = start + row * width
+        hi = start + min(row + tall, rows) * width
+        px = member[0, lo:hi]
+        py = member[1, lo:hi]
+        qx = member[2, lo:hi]
+        qy = member[3, lo:hi]
+        l0 = member[4, lo:hi]
+        ks = stiffness[lo:hi]
+        own = room[: (hi - lo) // width]
+        for first in range(0, width, wide):
+            last = min(first + wide, width)
+            for j in range(m):
+                r = rel[j, p]
+                o = sums[j, column]
+                if tangent:
+                    found = grid_tangent(px, py, qx, qy, l0, ks, width, first, last, r[0], r[1], r[2], r[3], own)
+                    add_forces(found[:4], counted, o)
+                    add_tangent(found[4:], o)
+                else:
+                    found_force = grid_force(px, py, qx, qy, l0, ks, width, first, last, r[0], r[1], r[2], r[3], own)
+                    add_forces(found_force, counted, o)
+
+
+@kernel
+def design_grid(start, stop, width, member, pose, u, out):  # type: ignore[no-untyped-def]
+    """Add sum_j f_i (b_i . u_j) at the poses pose (m, POSE) to out (M_padded,) for the rows from start to stop."""
+    rows = (stop - start) // width
+    tall, wide = _tile(rows, width)
+    room = np.empty((tall, pose.shape[0], 4))
+    turned = np.empty((pose.shape[0], 2, lanes()))
+    for row in range(0, rows, tall):
+        lo = start + row * width
+        hi = start + min(row + tall, rows) * width
+        own = room[: (hi - lo) // width]
+        for first in range(0, width, wide):
+            grid_design(
+                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
+                member[5, lo:hi], width, first, min(first + wide, width), pose, u, own, turned, out[lo:hi],
+            )  # fmt: skip
