@@ -6,7 +6,7 @@ from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
 from mdstopo.general.forces import drive_state
 from mdstopo.general.projection import project
 from mdstopo.general.track import copy_vector, keep_stage
-from mdstopo.integrators.gauss import fastest_rate
+from mdstopo.integrators.gauss_balance import fastest_rate
 from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import (
     FORCES,

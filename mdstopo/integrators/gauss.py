@@ -17,14 +17,12 @@ from collections import namedtuple
 
 import numpy as np
 
+from mdstopo.integrators.gauss_balance import Room, balance, dense_rows, fastest_rate
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
     copy_row,
     integrate_to_nodes,
-    largest_difference,
     row_width,
-    scale_rows,
-    subtract_rows,
     take_rows,
 )
 from mdstopo.integrators.steps import (
@@ -39,7 +37,6 @@ from mdstopo.integrators.steps import (
     REJECTED,
     STEP_LIMIT,
     STEP_TOO_SMALL,
-    SWEEPS,
     TANGENTS,
     TURN,
     carve,
@@ -52,7 +49,7 @@ from mdstopo.integrators.steps import (
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.assembly import add_loads, add_turning, forces, subtract_products
+from mdstopo.mechanics.assembly import add_loads, forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, scale_members
@@ -72,89 +69,6 @@ SLOW = 0.26
 MOST_CAUTIOUS = 100.0
 
 
-@kernel
-def _balance(  # type: ignore[no-untyped-def]
-    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, k, c, turn, damped, turning, weight, ref, a, q, v, room, work
-):
-    """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
-
-    In: forces f and tangents at ref (2, s, W); a as a first guess; weight (W,) of `motion_weights`; none (W,) zeros;
-    room (3, s, W). Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
-    """
-    before = room[0]
-    dx = room[1]
-    rhs = room[2]
-    q_ref = ref[0]
-    v_ref = ref[1]
-    nodes = planes[0, 0]
-    first = planes[1]
-    second = planes[2]
-    correction = 0.0
-    last = np.inf
-    growing = 0
-    for sweep in range(81):
-        integrate_to_nodes(second, s, s, h * h, q0, hv0, nodes, a, q)
-        if damped:
-            integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
-        if sweep > 0:
-            work[SWEEPS] += 1
-            change = largest_difference(q, before, weight, s)
-            if sweep == 1:
-                correction = largest_difference(q, q_ref, weight, s)
-            if not change <= 1e8:
-                return -1.0
-            if change <= max(1e-3 * correction * correction, 1e-15):
-                break
-            growing = growing + 1 if change >= last else 0
-            if growing >= 3 or sweep == 80:
-                if change < 1e-13:
-                    break
-                return -1.0
-            last = change
-        take_rows(q, s, before)
-        take_rows(f, s, rhs)
-        subtract_rows(q, q_ref, s, dx)
-        subtract_products(pair, k, dx, rhs, s)
-        if turning:
-            add_turning(turn, dx, rhs, s)
-        if damped:
-            subtract_rows(v, v_ref, s, dx)
-            subtract_products(pair, c, dx, rhs, s)
-        scale_rows(inv_mass, rhs, s, a)
-    if not damped:
-        integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
-    return largest_difference(q, q_ref, weight, s)
-
-
-@kernel
-def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
-    """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration."""
-    n = inv_mass.shape[0]
-    x = np.empty((1, n))
-    y = np.empty((1, n))
-    rate = 0.0
-    for part in range(2 if damped else 1):
-        for d in range(n):
-            x[0, d] = np.sqrt(inv_mass[d]) * (1.0 + 0.1 * (d % 7))
-        value = 0.0
-        for _ in range(12):
-            size = 0.0
-            for d in range(n):
-                if inv_mass[d] > 0.0:
-                    size += x[0, d] * x[0, d] / inv_mass[d]
-            value = np.sqrt(size)
-            if value == 0.0:
-                break
-            for d in range(n):
-                x[0, d] /= value
-                y[0, d] = 0.0
-            subtract_products(pair, k if part == 0 else c, x, y, np.int64(1))
-            for d in range(n):
-                x[0, d] = inv_mass[d] * y[0, d]
-        rate = np.sqrt(value) if part == 0 else max(rate, 1.5 * value)
-    return rate
-
-
 @entry
 def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
     """Integrate alpha (N,) over model.times; returns (code, number of windows, time reached).
@@ -167,48 +81,75 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
     model, strength, _ = carrying(whole, strength, np.bool_(True))
+    n = model.q0.shape[0]
+    n_pair = model.pair.shape[0]
+    turning = model.load_body.shape[0] > 0
+    steps = GaussSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
+    own = Room(
+        np.empty(MOST),
+        np.empty((MOST, n_pair, POSE)),
+        np.empty((MOST, n_pair, SUMS)),
+        np.empty((MOST, n_pair, 6, 6)),
+        np.empty((MOST if damped else 1, n_pair, 6, 6)),
+        np.zeros((MOST if turning else 1, n)),
+        np.zeros((2 if damped else 1, MOST, dense_rows(n), row_width(n))),
+        np.zeros((10, MOST, row_width(n))),
+        np.zeros((11, row_width(n))),
+        np.zeros(n_pair),
+        np.empty(n_pair),
+        np.empty(n_pair),
+        np.empty((n_pair, POSE)),
+        np.empty((n_pair, 6, 6)),
+        np.empty((n_pair, 6, 6)),
+    )
+    return _windows(model, tables, strength, settings, limits[0], damped, turning, steps, own, work)
+
+
+@kernel
+def _windows(model, tables, strength, settings, most, damped, turning, steps, own, work):  # type: ignore[no-untyped-def]
+    """Window after window from the start to the end; returns as `simulate` does."""
     tolerance = settings[0]
     newton_tolerance = settings[1]
     fixed_step = settings[2]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     n_level = tables.shape[0]
-    turning = model.load_body.shape[0] > 0
-    steps = GaussSteps(*carve(room, room_ints, n, n_pair, limits[1], limits[2], damped, turning))
     pair = model.pair
     inv_mass = model.inv_mass
     times = model.times
     reach = model.reach
     # numbers written in a call are types of their own, and would have the callee compiled once more
     yes = np.bool_(True)
-    rel = np.empty((MOST, n_pair, POSE))
-    sums = np.empty((MOST, n_pair, SUMS))
-    k = np.empty((MOST, n_pair, 6, 6))
-    c = np.empty((MOST if damped else 1, n_pair, 6, 6))
-    turn = np.zeros((MOST if turning else 1, n))
-    t_node = np.empty(MOST)
-    width = row_width(n)
-    rows = np.zeros((10, MOST, width))
-    ref = rows[0:2]
-    room = rows[2:5]
-    f = rows[5]
-    q = rows[6]
-    v = rows[7]
-    a = rows[8]
-    coef = rows[9]
-    vectors = np.zeros((11, width))
-    weight = vectors[0]
-    load = vectors[1]
-    load_base = vectors[2]
-    hv0 = vectors[3]
-    q_base = vectors[4]
-    f_base = vectors[5]
-    q0 = vectors[6]
-    v0 = vectors[7]
-    v_base = vectors[8]
-    none = vectors[9]
-    inverse = vectors[10]  # of the masses
+    t_node = own.t
+    rel = own.rel
+    sums = own.sums
+    k = own.K
+    c = own.C
+    turn = own.turn
+    ref = own.rows[0:2]
+    f = own.rows[5]
+    q = own.rows[6]
+    v = own.rows[7]
+    a = own.rows[8]
+    coef = own.rows[9]
+    weight = own.vectors[0]
+    load = own.vectors[1]
+    load_base = own.vectors[2]
+    hv0 = own.vectors[3]
+    q_base = own.vectors[4]
+    f_base = own.vectors[5]
+    q0 = own.vectors[6]
+    v0 = own.vectors[7]
+    v_base = own.vectors[8]
+    none = own.vectors[9]
+    inverse = own.vectors[10]  # of the masses
     copy_row(inv_mass, inverse)
+    motion = own.motion
+    noise = own.noise
+    scale = own.scale
+    rel0 = own.rel0
+    k_base = own.K0
+    c_base = own.C0
 
     # the start: forces and tangents give the first prediction, the first window and the scale of what matters
     for d in range(n):
@@ -224,18 +165,12 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     forces(model, strength, np.int64(0), np.int64(1), t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
     work[FORCES] += 1
     work[TANGENTS] += 1
-    rel0 = np.empty((n_pair, POSE))
     copy_rows(rel[0], rel0)
-    k_base = np.empty((n_pair, 6, 6))
-    c_base = np.empty((n_pair, 6, 6))
     copy_tangents(k[0], k_base)
     copy_tangents(c[0], c_base)
     for d in range(n):
         f_base[d] = f[0, d]
     add_loads(model, np.int64(0), t, q0, load_base)
-    motion = np.zeros(n_pair)
-    noise = np.empty(n_pair)
-    scale = np.empty(n_pair)
     for p in range(n_pair):
         stiffness = sums[0, p, 7] + sums[0, p, 11]
         if sums[0, p, 3] > 0.0 and stiffness > 0.0:
@@ -255,7 +190,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     for segment in range(times.shape[0] - 1):
         end = times[segment + 1]
         while t < end:
-            if count >= limits[0]:
+            if count >= most:
                 return STEP_LIMIT, count, t
             pieces = np.ceil((end - t) / wanted - 1e-9)
             h = (end - t) / max(pieces, 1.0)
@@ -312,10 +247,9 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                     for p in range(n_pair):
                         scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
                     motion_weights(pair, rel[0], reach, scale, weight)
-                e = _balance(
-                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, k, c, turn, damped, turning, weight, ref, a, q,
-                    v, room, work,
-                )  # fmt: skip
+                e = balance(
+                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, ref, a, q, v, work
+                )
                 if e < 0.0:
                     break
                 if newton == 0:

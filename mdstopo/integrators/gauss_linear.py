@@ -8,6 +8,7 @@ import numpy as np
 
 from mdstopo.integrators.contract import implement
 from mdstopo.integrators.gauss import COUNTS, TAG, GaussSteps
+from mdstopo.integrators.gauss_balance import dense_rows, fill_dense, pull_back
 from mdstopo.integrators.rows import (
     combine_rows,
     copy_row,
@@ -21,9 +22,7 @@ from mdstopo.integrators.steps import REVERSE, SWEEPS
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import (
     add_turning,
-    add_turning_transposed,
     subtract_products,
-    subtract_transposed,
 )
 
 
@@ -157,18 +156,17 @@ def reverse_step(  # type: ignore[no-untyped-def]
                 for i in range(s):
                     rhs[j, d] += h * h * second[i, j] * stage_q_bar[i, d]
     take_rows(rhs, s, x)
+    dense = np.zeros((2 if damped else 1, s, dense_rows(n), width))
+    if dense.shape[2] > 0:
+        fill_dense(pair, k, turn, turning, inverse, s, np.bool_(True), dense[0])
+        if damped:
+            fill_dense(pair, c, turn, np.bool_(False), inverse, s, np.bool_(True), dense[1])
     last = np.inf
     for _ in range(200):
         work[SWEEPS] += 1
-        scale_rows(inverse, x, s, z_row)
-        u[:] = 0.0
-        subtract_transposed(pair, k, z_row, u, s)
-        if turning:
-            add_turning_transposed(turn, z_row, u, s)
+        pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z_row, u, y)
         combine_rows(back_q, s, s, h * h, rhs, u, value)
         if damped:
-            y[:] = 0.0
-            subtract_transposed(pair, c, z_row, y, s)
             combine_rows(back_v, s, s, h, value, y, value)
         change = largest_difference(value, x, root, s)
         size = largest_difference(value, none, root, s)

@@ -20,7 +20,7 @@ from collections import namedtuple
 import numpy as np
 
 from mdstopo.integrators.banded import factorise, half_width, solve
-from mdstopo.integrators.gauss import fastest_rate
+from mdstopo.integrators.gauss_balance import fastest_rate
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,

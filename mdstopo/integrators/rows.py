@@ -49,6 +49,41 @@ def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):  # 
 
 
 @kernel
+def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx):  # type: ignore[no-untyped-def]
+    """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i, j < s, and dx[i] = out[i] - ref[i].
+
+    Returns max over i and coordinates of weight times the change of out[i]; NaN where one is not finite.
+    """
+    most = zero()
+    lost = zero()
+    for d in range(0, out.shape[1], lanes()):
+        x0 = load(start, d)
+        x1 = load(slope, d)
+        w = load(weight, d)
+        for i in range(s):
+            x = x0 + c[i] * x1
+            for j in range(s):
+                x += (factor * matrix[i, j]) * load(a[j], d)
+            e = w * magnitude(x - load(out[i], d))
+            most = larger(e, most)
+            lost += e - e
+            store(out[i], d, x)
+            store(dx[i], d, x - load(ref[i], d))
+    return np.nan if total(lost) != 0.0 else largest(most)
+
+
+@kernel
+def add_products(matrix, x, s, out):  # type: ignore[no-untyped-def]
+    """out[i] += sum_d x[i, d] matrix[i, d] for i < s; matrix (s, n, W), a row for each coordinate of x[i]."""
+    for e in range(0, out.shape[1], lanes()):
+        for i in range(s):
+            y = load(out[i], e)
+            for d in range(matrix.shape[1]):
+                y += x[i, d] * load(matrix[i, d], e)
+            store(out[i], e, y)
+
+
+@kernel
 def scale_rows(factor, x, s, out):  # type: ignore[no-untyped-def]
     """out[i] = factor x[i] for i < s; factor (W,)."""
     for d in range(0, x.shape[1], lanes()):

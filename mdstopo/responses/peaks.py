@@ -107,10 +107,11 @@ def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-
 
 
 @kernel
-def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, work):  # type: ignore[no-untyped-def]
+def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, pull, work):  # type: ignore[no-untyped-def]
     """Fill peaks (rows, 4) with the highest peaks of sign g (VALUE holds g); return how many.
 
-    Only peaks within `closeness` (relative) of the highest are refined and kept.
+    Only peaks within `closeness` (relative) of the highest are refined and kept. Out: pull (2, n_pair, 3), E_xi at the
+    start and at the end.
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -140,6 +141,9 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     for end in range(2):
         i = end * (samples - 1)
         value, rate = energy_of(ends[end], end_sums[end])
+        for p in range(n_pair):
+            for j in range(3):
+                pull[end, p, j] = end_sums[end, p, 4 + j]
         t[i] = steps.t[end * count]
         g[i] = sign * value
         d[i] = sign * rate

@@ -90,7 +90,7 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
 def _fill(group: MemberGroup, block: list[int], member: FloatArray) -> None:
     """Write the members of a group into the padded arrays member (8, M_padded)."""
     law = _spring(group)
-    _, start, _, _, _, count, width, length = block
+    _, start, stop, _, _, count, width, length = block
     shape = (count // length, length) if width else (1, count)
     rows = member[:, start : start + shape[0] * (width or count)].reshape(8, shape[0], -1)
     own = rows[:, :, : shape[1]]
@@ -98,7 +98,9 @@ def _fill(group: MemberGroup, block: list[int], member: FloatArray) -> None:
     own[2:4] = group.q_local.T.reshape(2, *shape)
     own[4] = (group.length if law.free_length is None else np.full(count, law.free_length)).reshape(shape)
     own[5:8] = np.array([law.stiffness, law.damping, law.preload])[:, None, None]
-    rows[:5, :, shape[1] :] = own[:5, :, -1:]  # the last point once more: no place has a length of its own
+    # what is between and behind them is the last one once more: no place has a length of its own
+    rows[:5, :, shape[1] :] = own[:5, :, -1:]
+    member[:5, start + rows[0].size : stop] = own[:5, -1, -1:]
 
 
 def _spring(group: MemberGroup) -> SpringLaw:

@@ -75,8 +75,9 @@ def energy_rows(  # type: ignore[no-untyped-def]
     weight = np.zeros(stages if integral else 1)
     bar = np.zeros((stages if integral else 0, n))
     mu_q = np.empty(n)
-    pull = np.empty((n_pair, 3))
+    pull = np.empty((3, n_pair, 3))  # E_xi at the start, at the end, elsewhere
     found = 1
+    watched = not integral and reduction != FINAL
     if integral:
         scale = 1.0 / (steps.t[count] - steps.t[0]) if reduction == MEAN else 1.0
         value = 0.0
@@ -97,7 +98,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
         rows[0, 3] = 1.0
     else:
         sign = 1.0 if reduction == MAX else -1.0
-        found = find_peaks(motion, tables, strength, steps, count, damped, sign, closeness, rows, work)
+        found = find_peaks(motion, tables, strength, steps, count, damped, sign, closeness, rows, pull, work)
     if not gradient and reduction != FINAL:
         return found
     for r in range(found):
@@ -115,14 +116,22 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     v[d] = state[1, d]
             else:
                 w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
-            value, _ = energy_at(pair, springs, strength, q, v, rel, sums)
-            work[0] += 1
-            if reduction == FINAL:
-                rows[0, 1] = value
-            for p in range(n_pair):
-                for j in range(3):
-                    pull[p, j] = sums[0, p, 4 + j]
-            energy_slope(pair, rel[0], pull, weight[0], mu_q)
+            at = 2
+            if watched and k == 0 and c == 0.0:
+                at = 0
+            elif watched and k + 1 == count and c >= 1.0:
+                at = 1
+            if at == 2:
+                value, _ = energy_at(pair, springs, strength, q, v, rel, sums)
+                work[0] += 1
+                if reduction == FINAL:
+                    rows[0, 1] = value
+                for p in range(n_pair):
+                    for j in range(3):
+                        pull[2, p, j] = sums[0, p, 4 + j]
+            else:
+                relative_pose(pair, q, v, rel[0])
+            energy_slope(pair, rel[0], pull[at], weight[0], mu_q)
         if not gradient:
             continue
         out = padded[r]

@@ -13,7 +13,7 @@ from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
-from mdstopo.mechanics.passes import SUMS, end_of, member_sums, springs_of, unscale_gradient
+from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -94,7 +94,7 @@ def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-unt
             shortest = np.inf
             for k in range(block.shape[0]):
                 lo = block[k, 1]
-                hi = end_of(block, k)
+                hi = block[k, 2]
                 if block[k, 0] == p:
                     r = rel[p]
                     shortest = min(
@@ -106,7 +106,7 @@ def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-unt
                 if shortest > moved or block[k, 0] != p:
                     continue
                 lo = block[k, 1]
-                hi = end_of(block, k)
+                hi = block[k, 2]
                 j = meeting_in(
                     m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
                     strength[2, lo:hi], before[p], rel[p],

@@ -22,7 +22,7 @@ import math
 import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel
-from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
+from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 ELASTIC = 0
 VISCOUS = 1
@@ -320,15 +320,17 @@ def stored_energy(px, py, qx, qy, l0, k, dx, dy, c, s, weight, out):  # type: ig
         out[i] += weight * 0.5 * k[i] * stretch * stretch
 
 
-@member_kernel
+@kernel
 def shortest_in(px, py, qx, qy, dx, dy, c, s):  # type: ignore[no-untyped-def]
     """Smallest length in the tile, m."""
-    best = np.inf
-    for i in range(px.shape[0]):
-        rx = dx + c * qx[i] - s * qy[i] - px[i]
-        ry = dy + s * qx[i] + c * qy[i] - py[i]
-        best = min(best, rx * rx + ry * ry)
-    return math.sqrt(best)
+    found = zero() - np.inf
+    for i in range(0, px.shape[0], lanes()):
+        u = load(qx, i)
+        v = load(qy, i)
+        rx = c * u - s * v - (load(px, i) - dx)
+        ry = s * u + c * v - (load(py, i) - dy)
+        found = larger(zero() - (rx * rx + ry * ry), found)
+    return math.sqrt(-largest(found))
 
 
 @kernel

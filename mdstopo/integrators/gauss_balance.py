@@ -1,0 +1,188 @@
+"""The linearised balance of a window of Gauss collocation, solved by sweeps that touch no member.
+
+    a_j = M^-1 (F_j - K_j (q_j(a) - q_j) - C_j (v_j(a) - v_j))
+
+and its transpose. Tangents of few coordinates are multiplied as dense matrices, in whole vectors; others by pairs.
+"""
+
+from collections import namedtuple
+
+import numpy as np
+
+from mdstopo.integrators.rows import (
+    add_products,
+    integrate_to_nodes,
+    largest_difference,
+    move_to_nodes,
+    scale_rows,
+    subtract_rows,
+    take_rows,
+)
+from mdstopo.integrators.steps import SWEEPS
+from mdstopo.jit import kernel
+from mdstopo.mechanics.assembly import (
+    add_turning,
+    add_turning_transposed,
+    subtract_products,
+    subtract_transposed,
+)
+
+#: what the windows of one simulation work in: at nodes (first index), of pairs, of the state at the start; rows (10,
+#: nodes, W) and vectors (11, W) as in `rows`. Made once, by a function of its own: arrays that a kernel is given cost
+#: it no counting of references
+Room = namedtuple("Room", "t rel sums K C turn dense rows vectors motion noise scale rel0 K0 C0")
+
+#: coordinates up to which tangents are multiplied as dense matrices
+DENSE = 24
+
+
+@kernel
+def balance(  # type: ignore[no-untyped-def]
+    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, ref, a, q, v, work
+):
+    """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
+
+    In: forces f and tangents (`Room`) at ref (2, s, W); a as a first guess; weight (W,) of `motion_weights`; none (W,)
+    zeros. Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    """
+    k = own.K
+    c = own.C
+    turn = own.turn
+    rest = own.rows[2]
+    dx = own.rows[3]
+    rhs = own.rows[4]
+    dense = own.dense.shape[2] > 0
+    if dense:
+        scale_rows(inv_mass, f, s, rest)
+        fill_dense(pair, k, turn, turning, inv_mass, s, np.bool_(False), own.dense[0])
+        if damped:
+            fill_dense(pair, c, turn, np.bool_(False), inv_mass, s, np.bool_(False), own.dense[1])
+    q_ref = ref[0]
+    v_ref = ref[1]
+    nodes = planes[0, 0]
+    first = planes[1]
+    second = planes[2]
+    correction = 0.0
+    last = np.inf
+    growing = 0
+    for sweep in range(81):
+        change = move_to_nodes(second, s, h * h, q0, hv0, nodes, a, weight, q_ref, q, dx)
+        if damped:
+            integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
+        if sweep > 0:
+            work[SWEEPS] += 1
+            if sweep == 1:
+                correction = largest_difference(q, q_ref, weight, s)
+            if not change <= 1e8:
+                return -1.0
+            if change <= max(1e-3 * correction * correction, 1e-15):
+                break
+            growing = growing + 1 if change >= last else 0
+            if growing >= 3 or sweep == 80:
+                if change < 1e-13:
+                    break
+                return -1.0
+            last = change
+        if dense:
+            take_rows(rest, s, a)
+            add_products(own.dense[0], dx, s, a)
+            if damped:
+                subtract_rows(v, v_ref, s, dx)
+                add_products(own.dense[1], dx, s, a)
+            continue
+        take_rows(f, s, rhs)
+        subtract_products(pair, k, dx, rhs, s)
+        if turning:
+            add_turning(turn, dx, rhs, s)
+        if damped:
+            subtract_rows(v, v_ref, s, dx)
+            subtract_products(pair, c, dx, rhs, s)
+        scale_rows(inv_mass, rhs, s, a)
+    if not damped:
+        integrate_to_nodes(first, s, s, h, v0, none, nodes, a, v)
+    return largest_difference(q, q_ref, weight, s)
+
+
+@kernel
+def dense_rows(n):  # type: ignore[no-untyped-def]
+    """Rows of a dense matrix of n coordinates; none where pairs are multiplied one by one."""
+    return n if n <= DENSE else 0
+
+
+@kernel
+def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ignore[no-untyped-def]
+    """out (s, n, W) = M^-1 (load tangent - K), K (s, n_pair, 6, 6), by columns; transposed: by rows.
+
+    Zeros at and beyond n in each row are kept. The few numbers of a few bodies are multiplied faster in whole vectors
+    than pair by pair.
+    """
+    for i in range(s):
+        m = out[i]
+        for d in range(m.shape[0]):
+            for e in range(m.shape[0]):
+                m[d, e] = 0.0
+        for p in range(pair.shape[0]):
+            a = 3 * pair[p, 0]
+            b = 3 * pair[p, 1]
+            for r in range(6):
+                d = a + r if r < 3 else b + r - 3
+                for j in range(6):
+                    e = a + j if j < 3 else b + j - 3
+                    if transposed:
+                        m[d, e] -= inverse[d] * k[i, p, r, j]
+                    else:
+                        m[e, d] -= inverse[d] * k[i, p, r, j]
+        if turning:
+            for d in range(m.shape[0]):
+                e = d - d % 3 + 2
+                if transposed:
+                    m[d, e] += inverse[d] * turn[i, d]
+                else:
+                    m[e, d] += inverse[d] * turn[i, d]
+
+
+@kernel
+def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
+    """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration."""
+    n = inv_mass.shape[0]
+    x = np.empty((1, n))
+    y = np.empty((1, n))
+    rate = 0.0
+    for part in range(2 if damped else 1):
+        for d in range(n):
+            x[0, d] = np.sqrt(inv_mass[d]) * (1.0 + 0.1 * (d % 7))
+        value = 0.0
+        for _ in range(12):
+            size = 0.0
+            for d in range(n):
+                if inv_mass[d] > 0.0:
+                    size += x[0, d] * x[0, d] / inv_mass[d]
+            value = np.sqrt(size)
+            if value == 0.0:
+                break
+            for d in range(n):
+                x[0, d] /= value
+                y[0, d] = 0.0
+            subtract_products(pair, k if part == 0 else c, x, y, np.int64(1))
+            for d in range(n):
+                x[0, d] = inv_mass[d] * y[0, d]
+        rate = np.sqrt(value) if part == 0 else max(rate, 1.5 * value)
+    return rate
+
+
+@kernel
+def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):  # type: ignore[no-untyped-def]
+    """u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x; z is room."""
+    u[:] = 0.0
+    y[:] = 0.0
+    if dense.shape[2] > 0:
+        add_products(dense[0], x, s, u)
+        if damped:
+            add_products(dense[1], x, s, y)
+        return
+    scale_rows(inverse, x, s, z)
+    subtract_transposed(pair, k, z, u, s)
+    if turning:
+        add_turning_transposed(turn, z, u, s)
+    if damped:
+        subtract_transposed(pair, c, z, y, s)
