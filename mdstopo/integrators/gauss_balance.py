@@ -75,12 +75,10 @@ def balance(  # type: ignore[no-untyped-def]
                 correction = largest_difference(q, q_ref, weight, s)
             if not change <= 1e8:
                 return -1.0
-            if change <= max(1e-3 * correction * correction, 1e-15):
+            if change <= max(1e-3 * correction * correction, 1e-15) or (change >= last and change < 1e-13):
                 break
             growing = growing + 1 if change >= last else 0
             if growing >= 3 or sweep == 80:
-                if change < 1e-13:
-                    break
                 return -1.0
             last = change
         if dense:
@@ -174,7 +172,8 @@ def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
 def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):  # type: ignore[no-untyped-def]
     """u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x; z is room."""
     u[:] = 0.0
-    y[:] = 0.0
+    if damped:
+        y[:] = 0.0
     if dense.shape[2] > 0:
         add_products(dense[0], x, s, u)
         if damped:

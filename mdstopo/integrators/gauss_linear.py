@@ -14,6 +14,7 @@ from mdstopo.integrators.rows import (
     copy_row,
     integrate_to_nodes,
     largest_difference,
+    renew_rows,
     row_width,
     scale_rows,
     take_rows,
@@ -123,14 +124,13 @@ def reverse_step(  # type: ignore[no-untyped-def]
     spread = stage_q_bar.shape[0] > 0
     work[REVERSE] += 1
     width = row_width(n)
-    rows = np.zeros((7, s, width))
+    rows = np.zeros((6, s, width))
     rhs = rows[0]
     x = rows[1]
     u = rows[2]
     y = rows[3]
     z_row = rows[4]
     value = rows[5]
-    none = rows[6]
     inverse = np.zeros(width)  # of the masses
     root = np.zeros(width)
     copy_row(inv_mass, inverse)
@@ -165,12 +165,11 @@ def reverse_step(  # type: ignore[no-untyped-def]
     for _ in range(200):
         work[SWEEPS] += 1
         pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z_row, u, y)
-        combine_rows(back_q, s, s, h * h, rhs, u, value)
         if damped:
-            combine_rows(back_v, s, s, h, value, y, value)
-        change = largest_difference(value, x, root, s)
-        size = largest_difference(value, none, root, s)
-        take_rows(value, s, x)
+            combine_rows(back_v, s, s, h, rhs, y, value)
+            change, size = renew_rows(back_q, s, h * h, value, u, root, x)
+        else:
+            change, size = renew_rows(back_q, s, h * h, rhs, u, root, x)
         if change <= 4e-16 * size or (change >= last and change <= 1e-13 * size):
             break
         last = change

@@ -73,6 +73,26 @@ def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx): 
 
 
 @kernel
+def renew_rows(matrix, s, factor, base, a, weight, out):  # type: ignore[no-untyped-def]
+    """out[i] = base[i] + factor sum_j matrix_ij a[j] for i, j < s.
+
+    Returns max over i and coordinates of weight times the change of out[i], and of weight |out[i]|.
+    """
+    most = zero()
+    size = zero()
+    for d in range(0, out.shape[1], lanes()):
+        w = load(weight, d)
+        for i in range(s):
+            x = load(base[i], d)
+            for j in range(s):
+                x += (factor * matrix[i, j]) * load(a[j], d)
+            most = larger(w * magnitude(x - load(out[i], d)), most)
+            size = larger(w * magnitude(x), size)
+            store(out[i], d, x)
+    return largest(most), largest(size)
+
+
+@kernel
 def add_products(matrix, x, s, out):  # type: ignore[no-untyped-def]
     """out[i] += sum_d x[i, d] matrix[i, d] for i < s; matrix (s, n, W), a row for each coordinate of x[i]."""
     for e in range(0, out.shape[1], lanes()):
