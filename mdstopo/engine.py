@@ -8,20 +8,20 @@ simulation.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from operator import add
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import Case, Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.evaluation import Evaluation, FloatArray, Peak
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.driver import Driver, Looked
-from mdstopo.integrators.steps import WORK, WORK_NAMES
+from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.culprit import Culprits
+from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
 from mdstopo.sensitivity.reductions import REDUCTIONS
@@ -44,9 +44,6 @@ if TYPE_CHECKING:
 #: else exceed ten tolerances on scenes whose members turn fast
 LOOSEST = 5e-5
 
-#: finite numbers from 0 on, read as unsigned integers, are below this; all other numbers are not
-_INFINITY_BITS = 0x7FF0_0000_0000_0000
-
 #: steps that a time history has at least
 HISTORY = 50
 
@@ -67,6 +64,9 @@ class Evaluator:
         self.integrator, self.integrator_reason = choose(case.solver, self.beyond)
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         self._method = method_of(self.integrator, case.solver)
+        # whether `auto` has to give way to the steps that the iterative method is defined on
+        self._gives_way = case.solver.integrator == "auto" and self.integrator != "generalized_alpha"
+        self._may_be_coarse = case.solver.step is not None and self.integrator == "generalized_alpha"
         self._compiles_beside = beside
         self._beside = Beside(self.integrator) if beside and not self.beyond else None
         self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
@@ -74,14 +74,9 @@ class Evaluator:
         self._culprits: dict[str, Culprits] = {}
         self._coarse: dict[str, str] = {}
         self._n = case.n_design
-        self._space = case.space
-        self._rows = np.zeros((len(case.constraints), self._space.length))
-        for i, row in enumerate(case.constraints):
-            if isinstance(row, VolumeRow):
-                self._rows[i, : self._n] = row.coefficients
-                self._rows[i, self._n :] = row.prices if len(row.prices) else 0.0
+        self._design = Design(case)
+        self._rows = self._design.rows.view()
         self._rows.flags.writeable = False
-        self._bounds = np.array([row.bound for row in case.constraints], dtype=np.float64)
         # what is looked at in each load case: objectives, then constraints on a response
         bounded = {i: row for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)}
         limited = {f"constraints[{i}]": row for i, row in bounded.items()}
@@ -98,16 +93,10 @@ class Evaluator:
             for group, part in zip(case.design_groups, case.group_slices.values(), strict=True)
             if group.power < 1.0
         ]
-        self._work = [0] * WORK
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
         self._others: dict[tuple[tuple[str, Any], ...], Evaluator] = {}
 
     # -- what a run asks
-
-    @property
-    def work(self) -> dict[str, int]:
-        """Counts of everything evaluated so far, by name."""
-        return dict(zip(WORK_NAMES, self._work, strict=True))
 
     @property
     def skipped(self) -> list[str]:
@@ -129,61 +118,52 @@ class Evaluator:
         Behind alpha there may be the values (P,) of the case's variables; else these have their initial ones.
         sensitivity: one of the four methods; default the case's.
         """
-        design = self.design(alpha)
         method = sensitivity or self.sensitivity
         if gradient and self.case.variables and method not in BY_PARAMETERS:
             raise CaseError(
                 [self.case.marks.mistake("design.variables", no_parameters(method))],
                 str(self.case.path or self.case.name),
             )
-        if self._is_for_generalized_alpha(method):
-            return self.otherwise(sensitivity="iterative").evaluate(design, gradient, method)
-        edge = self._without_slope(design) if gradient else ""
+        if method == "iterative" and self._gives_way:
+            return self.otherwise(sensitivity="iterative").evaluate(alpha, gradient, method)
+        seen = self._seen  # first: a driver that is made may simulate a design of its own
+        design = self._design.take(alpha)
+        edge = self._without_slope(design) if gradient and self._rooted else ""
         gradient = gradient and not edge
         exact = gradient and method == "adjoint"
         status, message, grazing = Status.OK, "", ""
         looked: dict[str, tuple[Peak, ...]] = {}
-        counts = [0] * WORK
-        for name, objectives in self._by_load_case.items():
-            if not objectives:
-                continue
-            driver = self.driver(name)
+        work: list[list[int]] = []
+        for name, keys, driver in seen:
             too_coarse = self._coarse_step(name, design)
             if too_coarse:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
                 break
             result = driver.evaluate(design, exact)
-            status, culprit = self._verdict(name, design, result)
+            status, culprit = result.status, ""
+            if not status.ok or result.meeting >= 0:
+                status, culprit = self._verdict(name, design, result)
+            gradients = result.gradients if exact else None
+            if status.ok and gradient and not exact:
+                found = _differentiate(method, driver, design, result)
+                status, culprit, gradients = found.status, found.message, found.gradients
+            work.append(driver.work.tolist())
+            message = culprit or message
             if not status.ok:
-                message = culprit
-                counts = _sum(counts, driver.work.tolist())
                 break
             if result.grazing >= 0:
                 grazing = self._member(name, result.grazing)
-            for j, key in enumerate(objectives):
-                looked[key] = _peaks(result, j, exact)
-            if gradient and not exact:
-                found = _differentiate(method, driver, design, result)
-                status, message = found.status, found.message or message
-                if not status.ok:
-                    counts = _sum(counts, driver.work.tolist())
-                    break
-                for j, key in enumerate(objectives):
-                    looked[key] = tuple(
-                        Peak(peak.time, peak.value, found.gradients[j][r]) for r, peak in enumerate(looked[key])
-                    )
-            counts = _sum(counts, driver.work.tolist())
-        self._count(counts)
-        work = dict(zip(WORK_NAMES, counts, strict=True))
+            for j, key in enumerate(keys):
+                looked[key] = _peaks(result, j, gradients)
         if edge and status.ok:
             status, message = Status.NO_GRADIENT, edge
         if grazing and gradient and status.ok:
             status, message = Status.GRAZING, grazing
-        return self._evaluation(design, looked, gradient, work, status, message)
+        return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
         """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors."""
-        if self._is_for_generalized_alpha(sensitivity or self.sensitivity):
+        if (sensitivity or self.sensitivity) == "iterative" and self._gives_way:
             return self.otherwise(sensitivity="iterative").with_errors(alpha, found, sensitivity)
         return found._replace(errors=self._estimator.errors(self.design(alpha), found, sensitivity))
 
@@ -192,11 +172,6 @@ class Evaluator:
         from mdstopo.error_estimate import Estimator
 
         return Estimator(self)
-
-    def _is_for_generalized_alpha(self, method: str) -> bool:
-        """Whether `auto` has to give way to the steps that the iterative method is defined on."""
-        others = self.integrator != "generalized_alpha" and self.case.solver.integrator == "auto"
-        return method == "iterative" and others
 
     def otherwise(self, **solver: Any) -> "Evaluator":
         """The evaluator of the same case with other solver settings, made once for each set of them."""
@@ -221,7 +196,7 @@ class Evaluator:
             meeting = driver.met(steps.count)
             if meeting >= 0:
                 status, message = Status.ZERO_LENGTH, self._member(load_case, meeting)
-        work = dict(zip(WORK_NAMES, driver.work.tolist(), strict=True))
+        work = work_named(driver.work.tolist())
         return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
@@ -292,29 +267,13 @@ class Evaluator:
     # -- how
 
     def design(self, alpha: FloatArray) -> FloatArray:
-        """alpha as (N,) float64, with the values of variables (P,) behind it; ValueError where it is no design.
+        """alpha as (N,) float64, with the values of variables (P,) behind it; ValueError where it is no design."""
+        return checked(self.case, alpha)
 
-        That is where it is not finite, alpha is negative, or it has another length. Values that are left out are the
-        initial ones.
-        """
-        design = self.case.whole(np.ascontiguousarray(alpha, dtype=np.float64))
-        length = self._space.length
-        if design.shape != (length,):
-            raise ValueError(f"alpha must have shape ({self._n},), one value a design member, not {design.shape}")
-        for name, part in self._space.parts.items():
-            if not np.all(np.isfinite(design[part])):
-                raise ValueError(f"values of variables must be finite; those of {name} are {design[part]}")
-        if self._n:
-            own = design[: self._n]
-            bits = own.view(np.uint64)
-            if bits.item(bits.argmax()) >= _INFINITY_BITS:
-                wrong = np.flatnonzero(~((own >= 0.0) & (own < np.inf)))  # -0.0 is not
-                if len(wrong):
-                    raise ValueError(f"alpha must be finite and at least 0; alpha[{wrong[0]}] is {design[wrong[0]]}")
-        return design
-
-    def _count(self, counts: list[int]) -> None:
-        self._work = _sum(self._work, counts)
+    @cached_property
+    def _seen(self) -> "list[tuple[str, tuple[str, ...], AnyDriver]]":
+        """Load cases that somebody looks at: name, names of what is looked at, driver."""
+        return [(name, tuple(looked), self.driver(name)) for name, looked in self._by_load_case.items() if looked]
 
     def _without_slope(self, design: FloatArray) -> str:
         """Why there is no gradient at this design, or nothing: alpha^mu has no slope at 0 where mu < 1."""
@@ -332,7 +291,8 @@ class Evaluator:
             driver: AnyDriver
             if isinstance(scene, Scene):
                 reductions = np.array([REDUCTIONS[each.over_time] for each in looked], dtype=np.int64)
-                driver = Driver(scene, self._method, tolerance, step, reductions, self._n, self._beside)
+                alpha = self._design.values
+                driver = Driver(scene, self._method, tolerance, step, reductions, alpha, self._beside)
             else:
                 from mdstopo.general.driver import GeneralDriver
 
@@ -346,7 +306,7 @@ class Evaluator:
 
     def _coarse_step(self, name: str, design: FloatArray) -> str:
         """Why the fixed step of generalized_alpha is far too large for a load case, or nothing; asked once."""
-        if self.integrator != "generalized_alpha" or self.case.solver.step is None:
+        if not self._may_be_coarse:
             return ""
         if name not in self._coarse:
             from mdstopo.coarse import coarse
@@ -371,9 +331,7 @@ class Evaluator:
         return status, driver.message
 
     def _verdict(self, name: str, design: FloatArray, result: Looked) -> tuple[Status, str]:
-        """Whether the motion of a load case can be trusted, and who is to blame where not."""
-        if result.status.ok and result.meeting < 0:
-            return Status.OK, ""
+        """Why the motion of a load case cannot be trusted, and who is to blame."""
         if result.status.ok:
             return Status.ZERO_LENGTH, self._member(name, result.meeting)
         status, steps = self.driver(name).simulate(design)
@@ -386,7 +344,6 @@ class Evaluator:
 
     def _evaluation(
         self,
-        design: FloatArray,
         looked: Mapping[str, tuple[Peak, ...]],
         gradient: bool,
         work: dict[str, int],
@@ -402,36 +359,37 @@ class Evaluator:
         peaks: dict[str, tuple[Peak, ...]] = {}
         slopes: dict[str, FloatArray] = {}
         for name in self._names:
-            peaks[name] = looked[name]
-            times[name], objectives[name], slope = looked[name][0]
+            found = peaks[name] = looked[name]
+            times[name], objectives[name], slope = found[0]
             if gradient and slope is not None:
                 slopes[name] = slope
-        rows = self._rows
-        constraints = np.einsum("ij,j->i", rows, design) - self._bounds if len(rows) else self._bounds
+        constraints, rows = self._design.excess.copy(), self._rows
+        limits: dict[int, tuple[Peak, ...]] = {}
         if self._limited:
             rows = rows.copy()
             for i, key in self._limited.items():
+                limits[i] = looked[key]
                 peak = looked[key][0]
-                constraints[i] = peak.value - self._bounds[i]
+                constraints[i] = peak.value - self._design.bounds[i]
                 rows[i] = np.nan if peak.gradient is None else peak.gradient
-        limits = {i: looked[key] for i, key in self._limited.items()}
-        found = Evaluation(objectives, slopes, times, constraints, rows, peaks, work, status, message, limits)
-        return self._parted(found, design) if self.case.variables else found
+        made = Evaluation(objectives, slopes, times, constraints, rows, peaks, work, status, message, limits)
+        return self._parted(made) if self.case.variables else made
 
-    def _parted(self, found: Evaluation, design: FloatArray) -> Evaluation:
+    def _parted(self, found: Evaluation) -> Evaluation:
         """What was found with respect to a whole design (N + P,), told by alpha and by variables."""
-        n, named = self._n, self._space.named
+        n, named = self._n, self.case.space.named
         return found._replace(
             gradients={name: slope[:n] for name, slope in found.gradients.items()},
             constraint_gradients=found.constraint_gradients[:, :n],
-            variables=named(design),
+            variables=named(self._design.values.copy()),
             variable_gradients={name: named(slope) for name, slope in found.gradients.items()},
             constraint_variable_gradients=named(found.constraint_gradients),
         )
 
 
-def _sum(some: list[int], others: list[int]) -> list[int]:
-    return list(map(add, some, others))
+def _total(counts: list[list[int]]) -> list[int]:
+    """Work counts (WORK,) of all load cases together."""
+    return counts[0] if len(counts) == 1 else [sum(each) for each in zip([0] * WORK, *counts, strict=True)]
 
 
 def _of_motion(tolerance: float) -> float:
@@ -461,10 +419,13 @@ def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked:
     return Differentiated(Status.OK, message, gradients)
 
 
-def _peaks(result: Looked, j: int, gradient: bool) -> tuple[Peak, ...]:
-    rows = result.rows[j, : result.found[j]].tolist()
-    if not gradient:
-        return tuple(Peak(row[0], row[1], None) for row in rows)
-    gradients = result.gradients[j, : len(rows)].copy()
-    gradients.setflags(write=False)
-    return tuple([Peak(row[0], row[1], gradients[r]) for r, row in enumerate(rows)])
+def _peaks(result: Looked, j: int, gradients: FloatArray | None) -> tuple[Peak, ...]:
+    """What was found of objective j; gradients (n_obj, R, N) of all rows, of which copies are kept."""
+    peaks = []
+    gradient = None
+    for r, row in enumerate(result.rows[j, : result.found[j]].tolist()):
+        if gradients is not None:
+            gradient = gradients[j, r].copy()
+            gradient.setflags(write=False)
+        peaks.append(Peak(row[0], row[1], gradient))
+    return tuple(peaks)

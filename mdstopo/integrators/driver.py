@@ -57,7 +57,10 @@ class Looked(NamedTuple):
 
 
 class Driver:
-    """One scene, one method, ready to run."""
+    """One scene, one method, ready to run.
+
+    alpha (N,): the array that every design is put in; shared with whoever gives designs.
+    """
 
     def __init__(
         self,
@@ -66,14 +69,12 @@ class Driver:
         tolerance: float,
         step: float,
         reductions: IndexArray,
-        n_design: int,
+        alpha: FloatArray,
         beside: Beside | None = None,
     ) -> None:
         self.scene = scene
         self.method = method
         self._entry: Any = None
-        self._simulate: Any = None
-        self._look: Any = None
         self._beside = beside
         self.packed = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
@@ -85,12 +86,12 @@ class Driver:
         self.work = np.zeros(WORK, dtype=np.int64)
         padded = scene.model.member.shape[1]
         count = len(reductions)
-        self._alpha = np.zeros(n_design)  # one array for all designs: a read-only one would be another type
+        self._alpha = alpha  # one array for all designs: a read-only one would be another type
         self.strength = aligned((ROOMY, padded))
         self.padded = np.zeros((ROWS, padded))
         self.rows = np.zeros((count, ROWS, 4))
         self.found = np.zeros(count, dtype=np.int64)
-        self.gradients = np.zeros((count, ROWS, n_design))
+        self.gradients = np.zeros((count, ROWS, len(alpha)))
         self.meeting = np.zeros(2, dtype=np.int64)
         self._make_room(method.steps, method.stages)
 
@@ -123,7 +124,9 @@ class Driver:
         self.limits = np.array([MAX_STEPS, steps, stages], dtype=np.int64)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
-        self._simulate = self._look = None  # they were prepared with the room as it was
+        # prepared calls with this room: `simulate` by whether tangents are wanted, `look` by whether gradients are
+        self._simulate: dict[bool, Callable[..., Any]] = {}
+        self._look: dict[bool, Callable[..., Any]] = {}
 
     def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
         """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call."""
@@ -138,18 +141,19 @@ class Driver:
         return int(self.meeting[0])
 
     def _look_at(self, count: int, gradient: bool) -> None:
-        if self._look is None:
-            self._look = self.looking.look.prepare(*self._look_arguments(count, gradient))
-        self._look((_COUNT, count), (_GRADIENT, gradient))
+        if gradient not in self._look:
+            self._look[gradient] = self.looking.look.prepare(*self._look_arguments(count, gradient))
+        self._look[gradient]((_COUNT, count))
 
     def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
         """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
-        self._alpha[:] = alpha
+        if alpha is not self._alpha:
+            self._alpha[:] = alpha
         while True:
-            self.work[:] = 0
-            if self._simulate is None:
-                self._simulate = self.entry.simulate.prepare(*self._simulate_arguments(tangent))
-            code, count, time = self._simulate((_TANGENT, tangent))
+            self.work.fill(0)
+            if tangent not in self._simulate:
+                self._simulate[tangent] = self.entry.simulate.prepare(*self._simulate_arguments(tangent))
+            code, count, time = self._simulate[tangent]()
             if code != NEEDS_ROOM:
                 return code, count, time
             if not holds_steps(2 * len(self.room)):
@@ -197,8 +201,8 @@ class Driver:
         )  # fmt: skip
 
 
-#: places of the numbers that change from call to call, in `_simulate_arguments` and `_look_arguments`
-_TANGENT, _COUNT, _GRADIENT = 5, 8, 10
+#: place of the number that changes from call to call, in `_look_arguments`
+_COUNT = 8
 
 
 class DenseSteps:

@@ -19,6 +19,8 @@ turn      (S, n)                  derivative of the loads by each body's angle, 
 Each integrator names its own tuple of these arrays (`FIELDS`), by whose type its functions are found (`contract`).
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mdstopo.jit import kernel
@@ -43,10 +45,25 @@ _STATUS = {
 #: scenes of springs, members that were summed over all states
 FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN, SPRINGS = range(9)
 WORK = 9
-WORK_NAMES = (
-    "force_sums", "tangents", "steps", "rejected_steps", "newton_corrections", "body_sweeps", "reverse_steps",
-    "design_states", "spring_states",
-)  # fmt: skip
+
+
+def work_named(counts: Sequence[int]) -> dict[str, int]:
+    """Work counts (WORK,) by their names."""
+    forces, tangents, accepted, rejected, newton, sweeps, reverse, design, springs = counts
+    return {
+        "force_sums": forces,
+        "tangents": tangents,
+        "steps": accepted,
+        "rejected_steps": rejected,
+        "newton_corrections": newton,
+        "body_sweeps": sweeps,
+        "reverse_steps": reverse,
+        "design_states": design,
+        "spring_states": springs,
+    }
+
+
+WORK_NAMES = tuple(work_named(range(WORK)))
 
 
 def status_of(code: int) -> Status:

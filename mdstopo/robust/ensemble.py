@@ -71,16 +71,15 @@ class Ensemble(Evaluator):
 
         A point that cannot be computed fails the evaluation; the message names it and its values.
         """
-        design = self.design(alpha)
+        design = self._design.take(alpha)
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]
         parts = self._parts(wanted, design, gradient, sensitivity)
         status, message = self._verdict_of(parts)
         counts = {name: sum(part.work[name] for part in parts.values()) for name in WORK_NAMES}
-        self._count(list(counts.values()))
         looked: dict[str, tuple[Peak, ...]] = {}
         if status.usable or status is Status.NO_GRADIENT:
             looked = self._looked(parts)
-        found = self._evaluation(design, looked, gradient and status.usable, counts, status, message)
+        found = self._evaluation(looked, gradient and status.usable, counts, status, message)
         return found._replace(all_compete=True)
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
