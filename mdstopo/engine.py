@@ -51,11 +51,11 @@ HISTORY = 50
 class Evaluator:
     """A case, ready to be evaluated again and again.
 
-    beside: compile with a second process at the first use on a machine (`warm`).
+    beside: compile with a second process at the first use on a machine; share: what else that does (`warm`).
     Raises CaseError where the case asks for what the engine cannot do yet.
     """
 
-    def __init__(self, case: Case, beside: bool = True) -> None:
+    def __init__(self, case: Case, beside: bool = True, share: Sequence[str] = ()) -> None:
         refused = refusals(case)
         if refused:
             raise CaseError(refused, str(case.path or case.name))
@@ -68,7 +68,7 @@ class Evaluator:
         self._gives_way = case.solver.integrator == "auto" and self.integrator != "generalized_alpha"
         self._may_be_coarse = case.solver.step is not None and self.integrator == "generalized_alpha"
         self._compiles_beside = beside
-        self._beside = Beside(self.integrator) if beside and not self.beyond else None
+        self._beside = Beside(self.integrator, share) if beside and not self.beyond else None
         self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
         self._drivers: dict[str, AnyDriver] = {}
         self._culprits: dict[str, Culprits] = {}

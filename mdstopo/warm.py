@@ -11,8 +11,9 @@ import gc
 import importlib
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 from mdstopo.native.store import cache_folder
 
@@ -47,19 +48,19 @@ def mark_compiled(integrator: str) -> None:
 
 
 class Beside:
-    """Another process that compiles what looks at an integrator's steps, if that has never been compiled here."""
+    """Another process that compiles what looks at an integrator's steps, if that has never been compiled here.
 
-    #: modules whose `compile_share` the other process calls before that
-    shares: ClassVar[list[str]] = []
+    share: modules whose `compile_share` it calls before that.
+    """
 
-    def __init__(self, integrator: str) -> None:
+    def __init__(self, integrator: str, share: Sequence[str] = ()) -> None:
         self.integrator = integrator
         self._child: subprocess.Popen[bytes] | None = None
         self.due = not is_compiled(integrator)
         if self.due:
             with contextlib.suppress(OSError):
                 self._child = subprocess.Popen(
-                    [sys.executable, "-m", "mdstopo.warm", integrator, *self.shares],
+                    [sys.executable, "-m", "mdstopo.warm", integrator, *share],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,

@@ -47,10 +47,15 @@ class Ensemble(Evaluator):
     """
 
     def __init__(
-        self, case: Case, beside: bool = True, points: dict[int, Evaluator] | None = None, crew: "Crew | None" = None
+        self,
+        case: Case,
+        beside: bool = True,
+        points: dict[int, Evaluator] | None = None,
+        crew: "Crew | None" = None,
+        share: Sequence[str] = (),
     ) -> None:
         assert case.uncertainty is not None
-        super().__init__(case, beside)
+        super().__init__(case, beside, share)
         self.uncertainty = case.uncertainty
         self.sample: Sample = design_sample(case.uncertainty)
         self.crew = crew

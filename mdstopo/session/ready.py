@@ -20,7 +20,7 @@ from mdstopo.case.model import Case
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
 from mdstopo.optimizer.wide import MANY, WIDE
 from mdstopo.scene.family import beyond_springs
-from mdstopo.session.engine import Engine, compiling, make_engine
+from mdstopo.session.engine import Engine, compiling
 from mdstopo.session.starts import first_design, make_optimizer
 from mdstopo.store.contents import Motion
 
@@ -123,16 +123,14 @@ def _main() -> None:
     import gc
     import signal
 
+    from mdstopo.evaluators import evaluator_of
     from mdstopo.session.combining import even, problem_of
-    from mdstopo.warm import Beside
 
     gc.disable()  # what the compiler makes lives on: looking through it again and again takes a tenth of the time
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
     many = case.space.size >= MANY
-    if many:
-        Beside.shares.append("mdstopo.session.ready")
-    engine = make_engine(case)
+    engine = evaluator_of(case, share=["mdstopo.session.ready"] if many else [])
     if many:
         _meet(case, MANY)
     problem = problem_of(engine, even(case))
