@@ -261,10 +261,7 @@ def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows): 
     stage = track.stage[at]
     t = track.when[at]
     if model.response[j, 0] == ENERGY:
-        general_forces(
-            model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk.rel, desk.sums, desk.f,
-            desk.k, desk.c, desk.turn,
-        )  # fmt: skip
+        general_forces(model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk)
     if who < 0 and model.response[j, 0] == MEMBER_FORCE:
         who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
     value = response(

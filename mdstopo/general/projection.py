@@ -8,8 +8,18 @@ all the same, so that these belong to what was computed. Driven coordinates are 
 
 import numpy as np
 
-from mdstopo.general.balance import factor_matrix, gather, gather_multipliers, joint_state, solve_unknowns
+from mdstopo.general.balance import (
+    factor_matrix,
+    gather,
+    gather_multipliers,
+    gather_turned,
+    joint_state,
+    solve_unknowns,
+)
+from mdstopo.general.forces import turn_bodies
+from mdstopo.general.switches import DIAGONAL
 from mdstopo.jit import kernel
+from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 
 #: misfit, relative to the scene, with which a joint counts as torn: its rows were taken for a repetition of others
@@ -49,10 +59,12 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
     for d in range(n):
         start[d] = q[d]
     none = desk.mass
-    none[:] = 0.0
+    if desk.switches[DIAGONAL] == 0:
+        none[:] = 0.0
     last = np.inf
     worst = np.inf
     for _ in range(MOST):
+        turn_bodies(q, desk.turned)
         joint_state(model, q, v, desk)
         worst = misfit(model, desk.phi, which)
         if worst <= 1e-15 * scale or not worst < last:
@@ -70,7 +82,9 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
         solve_unknowns(model, desk, shift, mu)
         for d in range(n):
             q[d] += shift[d]
-    joint_state(model, q, v, desk)
+    else:
+        turn_bodies(q, desk.turned)
+        joint_state(model, q, v, desk)
     singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
     if singular >= 0:
         return singular
@@ -93,7 +107,7 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
 @kernel
 def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[no-untyped-def]
     """h_mu, h_nu (n_pair, 6, 6) = d(Phi_q^T mu)/dq and with nu; slope (n_joint, 3, 6) = d(Phi_q v)/dq."""
-    w = np.empty(6)
+    w = np.empty(PLACES)
     wd = np.empty(6)
     mine = np.empty(3)
     h_mu[:] = 0.0
@@ -101,7 +115,7 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[
     for j in range(model.joint.shape[0]):
         code = model.joint[j, 0]
         par = model.joint_par[j]
-        gather(model, j, q, w)
+        gather_turned(model, j, q, desk.turned, w)
         gather(model, j, v, wd)
         gather_multipliers(model, j, mu, mine)
         joint_stiffness(code, par, w, mine, h_mu[model.joint[j, 3]])
@@ -123,8 +137,9 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-un
     y = np.zeros(mu.shape[0])
     none = np.zeros((n_pair, 6, 6))
     turn = np.zeros(n)
-    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    turn_bodies(q, desk.turned)
     joint_state(model, q, v, desk)
+    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
     desk.by_q[:] = 0.0
     desk.by_v[:] = 0.0
     factor_matrix(model, desk, none, none, turn, none, 0.0, 0.0, np.bool_(True))
@@ -161,8 +176,9 @@ def project_forward(model, q, v, mu, nu, desk, dq, dv):  # type: ignore[no-untyp
     y = np.zeros(mu.shape[0])
     none = np.zeros((n_pair, 6, 6))
     turn = np.zeros(n)
-    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    turn_bodies(q, desk.turned)
     joint_state(model, q, v, desk)
+    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
     desk.by_q[:] = 0.0
     desk.by_v[:] = 0.0
     factor_matrix(model, desk, h_mu, none, turn, none, 1.0, 0.0, np.bool_(False))

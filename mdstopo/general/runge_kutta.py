@@ -16,6 +16,7 @@ from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
+from mdstopo.general.switches import THOROUGH
 from mdstopo.general.track import carve_track, copy_vector, keep_stage, keep_state
 from mdstopo.integrators.runge_kutta import MOST, _error
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
@@ -60,6 +61,7 @@ def advance(  # type: ignore[no-untyped-def]
     """
     n = q0.shape[0]
     vectors = table[2]
+    desk.switches[THOROUGH] = 0  # the end shows what a stage would
     for i in range(s):
         for d in range(n):
             q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
@@ -77,9 +79,11 @@ def advance(  # type: ignore[no-untyped-def]
         singular = balance(model, strength, segment, time, q[i], v[i], tangent, desk, a[i], lam)
         work[FORCES] += 1
         if singular >= 0:
+            desk.switches[THOROUGH] = 1
             return singular
         if o >= 0:
             keep_stage(track, o + i, time, q[i], v[i], a[i], lam, desk, tangent)
+    desk.switches[THOROUGH] = 1
     if tangent:
         work[TANGENTS] += s
     for d in range(n):

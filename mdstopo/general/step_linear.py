@@ -3,6 +3,7 @@
 import numpy as np
 
 from mdstopo.general.balance import factor_matrix, joint_slopes, joint_state, pull_back, push_forward, solve_unknowns
+from mdstopo.general.forces import turn_bodies
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.track import mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
@@ -18,6 +19,7 @@ def lay_out(model, track, o, desk):  # type: ignore[no-untyped-def]
     """Put the joints of stage o on the desk, with their slopes; the members' tangents stay in the track."""
     q = track.stage[o, 0]
     v = track.stage[o, 1]
+    turn_bodies(q, desk.turned)
     joint_state(model, q, v, desk)
     joint_slopes(model, q, v, track.stage[o, 2], track.lam[o], desk)
 

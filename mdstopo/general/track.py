@@ -24,6 +24,7 @@ event     (E, 5) integers       the state at which it happened, member (padded),
 from typing import Any
 
 from mdstopo.general.structures import bundle
+from mdstopo.general.switches import DAMPED
 from mdstopo.jit import kernel
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
@@ -104,7 +105,8 @@ def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-unt
     copy_vector(desk.turn, track.turn[o])
     size = desk.k.size
     copy_vector(desk.k.reshape(size), track.K[o].reshape(size))
-    copy_vector(desk.c.reshape(size), track.C[o].reshape(size))
+    if desk.switches[DAMPED] != 0:  # else nobody reads it
+        copy_vector(desk.c.reshape(size), track.C[o].reshape(size))
     if track.mass.shape[0] > 1:
         copy_vector(desk.mass.reshape(size), track.mass[o].reshape(size))
 

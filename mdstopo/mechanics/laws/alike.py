@@ -7,9 +7,11 @@ preload; r (POSE,): the relative pose. A member of zero length has no direction:
 elongation has.
 """
 
+import numpy as np
+
 from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
+from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 
 @kernel
@@ -182,3 +184,20 @@ def alike_design(member, width, start, stop, p, r, u, weight, out):  # type: ign
         _, _, _, bx, by, bt, x = _seen(member, width, i, r)
         f = p[0] * x + (p[2] + p[1] * (bx * r[4] + by * r[5] + bt * r[6]))
         store(out, i, load(out, i) + f * (bx * u[0] + by * u[1] + bt * u[2]) + half * (x * x))
+
+
+@kernel
+def far(member, width, start, stop, before, after):  # type: ignore[no-untyped-def]
+    """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move."""
+    near = zero() - np.inf
+    for i in range(start, stop, lanes()):
+        px = load(member, i)
+        py = load(member, width + i)
+        u = load(member, 2 * width + i)
+        v = load(member, 3 * width + i)
+        rx = before[2] * u - before[3] * v - (px - before[0])
+        ry = before[3] * u + before[2] * v - (py - before[1])
+        ux = after[2] * u - after[3] * v - (px - after[0]) - rx
+        uy = after[3] * u + after[2] * v - (py - after[1]) - ry
+        near = larger(1.001 * (ux * ux + uy * uy) - (rx * rx + ry * ry), near)
+    return largest(near) < -ZERO_LENGTH_SQUARED
