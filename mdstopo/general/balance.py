@@ -322,9 +322,9 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
     """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,): driven parts 0."""
     pair = model.pair
     joint = model.joint
-    _pull_matrices(pair, k, z, bar_q)
+    pull_matrices(pair, k, z, bar_q)
     if desk.switches[DAMPED] != 0:
-        _pull_matrices(pair, c, z, bar_v)
+        pull_matrices(pair, c, z, bar_v)
     for d in range(z.shape[0]):
         bar_q[d - d % 3 + 2] += turn[d] * z[d]
     by_q = desk.by_q
@@ -344,7 +344,7 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
 
 
 @kernel
-def _pull_matrices(pair, k, z, bar):  # type: ignore[no-untyped-def]
+def pull_matrices(pair, k, z, bar):  # type: ignore[no-untyped-def]
     """bar (n,) -= K^T z, K by pairs (n_pair, 6, 6)."""
     for p in range(pair.shape[0]):
         one = 3 * pair[p, 0]

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mdstopo.general.forces import inerter_force
+from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
 from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
@@ -10,7 +10,8 @@ from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
-from mdstopo.mechanics.laws.table import law
+from mdstopo.mechanics.laws.alike import elastic_designs
+from mdstopo.mechanics.laws.table import SPRING, law
 
 
 @kernel
@@ -23,25 +24,70 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # t
     work[DESIGN] += 1
     rel = np.empty((n_pair, POSE))
     u = np.empty((n_pair, 3))
-    row = np.empty(6)
-    relative_pose(model.pair, q, v, rel)
-    for p in range(n_pair):
-        _virtual(model.pair, rel, p, z, u[p])
+    _poses(model, q, v, z, rel, u)
+    for k in range(model.block.shape[0]):
+        if model.block[k, 4] >= 0 and model.active[segment, k] != 0:
+            _add_block(model, k, segment, t, strength, q, v, a, z, rel, u, weight, out)
+    if model.varied.shape[0] > 0:
+        add_parameters(model, segment, t, strength, q, v, a, z, weight, out)
+
+
+@kernel
+def add_designs(model, segment, track, o, strength, z, out, work):  # type: ignore[no-untyped-def]
+    """`add_design` of the stages from o on, as many as z (S, n) has, without energy: springs are read once."""
+    count = z.shape[0]
+    n_pair = model.pair.shape[0]
+    work[DESIGN] += count
+    rel = np.empty((count, n_pair, POSE))
+    u = np.empty((count, n_pair, 3))
+    for j in range(count):
+        _poses(model, track.stage[o + j, 0], track.stage[o + j, 1], z[j], rel[j], u[j])
     for k in range(model.block.shape[0]):
         if model.block[k, 4] < 0 or model.active[segment, k] == 0:
             continue
-        p = model.block[k, 0]
-        if model.block[k, 3] != INERTER:
-            block_design(model, k, segment, t, strength, strength[1], rel[p], u[p], weight, out)
+        if model.block[k, 3] == SPRING and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
+            width = model.member.shape[1]
+            elastic_designs(
+                model.member.reshape(5 * width), width, model.block[k, 1], model.block[k, 2], model.law[k, 0], rel, u,
+                model.block[k, 0], out,
+            )  # fmt: skip
             continue
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            f = inerter_force(model, k, i, q, v, a, row)
-            value = 0.0
-            for r in range(6):
-                value += row[r] * z[3 * model.pair[p, r // 3] + r % 3]
-            out[i] -= f * value
+        for j in range(count):
+            stage = track.stage[o + j]
+            _add_block(
+                model, k, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], z[j], rel[j], u[j], 0.0,
+                out,
+            )  # fmt: skip
     if model.varied.shape[0] > 0:
-        add_parameters(model, segment, t, strength, q, v, a, z, weight, out)
+        for j in range(count):
+            stage = track.stage[o + j]
+            add_parameters(model, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], z[j], 0.0, out)
+
+
+@kernel
+def _poses(model, q, v, z, rel, u):  # type: ignore[no-untyped-def]
+    """rel (n_pair, POSE), and u (n_pair, 3) = -T z."""
+    turned = np.empty((model.mass.shape[0] // 3, 2))
+    turn_bodies(q, turned)
+    turned_pose(model.pair, turned, q, v, rel)
+    for p in range(model.pair.shape[0]):
+        _virtual(model.pair, rel, p, z, u[p])
+
+
+@kernel
+def _add_block(model, k, segment, t, strength, q, v, a, z, rel, u, weight, out):  # type: ignore[no-untyped-def]
+    """The part of block k in `add_design`."""
+    p = model.block[k, 0]
+    if model.block[k, 3] != INERTER:
+        block_design(model, k, segment, t, strength, strength[1], rel[p], u[p], weight, out)
+        return
+    row = np.empty(6)
+    for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+        f = inerter_force(model, k, i, q, v, a, row)
+        value = 0.0
+        for r in range(6):
+            value += row[r] * z[3 * model.pair[p, r // 3] + r % 3]
+        out[i] -= f * value
 
 
 @kernel

@@ -42,8 +42,14 @@ from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
 
 TAG = (0,)
-#: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own
-MARGIN = 0.02
+#: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own.
+#: Above LOOSE the estimate is larger than the error by more and more (long steps are not where it is a series' next
+#: term), and MARGIN times (tolerance / LOOSE)^SLACK is as safe: over 110 scenes with joints, laws of all kinds, motions
+#: and events errors stay below ten tolerances in 98 of a hundred objectives and gradients, at every tolerance
+MARGIN, LOOSE, SLACK = 0.02, 1e-5, 1.0 / 3.0
+#: a step that may grow does so by this power of what the order allows: where steps are long the estimate rises faster
+#: than the order says, and a step that is rejected costs more than one that could have been longer
+GROWTH = 2.0 / 3.0
 #: what rounding leaves of a margin, relative to the scene's size
 ROUNDING = 4e-15
 #: events within a millionth of the simulated time after which the scene counts as chattering
@@ -182,7 +188,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     grazes so that the motion has no derivative.
     """
     model = unpack_general(ints, floats)
-    tolerance = MARGIN * settings[0]
+    tolerance = MARGIN * settings[0] * max(settings[0] / LOOSE, 1.0) ** SLACK
     fixed_step = settings[2]
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -340,6 +346,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     work[REJECTED] += 1
                     continue
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
+                if change > 1.0:
+                    change **= GROWTH
                 turned = largest_turn(pair, q0, ends[0])
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
                 if error > tolerance or turned > 1.1 * TURN:

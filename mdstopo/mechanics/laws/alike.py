@@ -187,6 +187,32 @@ def alike_design(member, width, start, stop, p, r, u, weight, out):  # type: ign
 
 
 @kernel
+def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ignore[no-untyped-def]
+    """`alike_design` without damping, preload and energy, of stiffness k, summed over the poses of pair p.
+
+    rel (S, n_pair, POSE), u (S, n_pair, 3).
+    """
+    for i in range(start, stop, lanes()):
+        x = load(member, i)
+        y = load(member, width + i)
+        v = load(member, 2 * width + i)
+        w = load(member, 3 * width + i)
+        free = load(member, 4 * width + i)
+        work = zero()
+        for j in range(rel.shape[0]):
+            r = rel[j, p]
+            e = u[j, p]
+            ax = r[2] * v - r[3] * w
+            ay = r[3] * v + r[2] * w
+            rx = ax - (x - r[0])
+            ry = ay - (y - r[1])
+            r2 = rx * rx + ry * ry
+            z = inverse_root(r2, ZERO_LENGTH_SQUARED)
+            work += (r2 * z - free) * z * (rx * e[0] + ry * e[1] + (ax * ry - ay * rx) * e[2])
+        store(out, i, load(out, i) + k * work)
+
+
+@kernel
 def far(member, width, start, stop, before, after):  # type: ignore[no-untyped-def]
     """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move."""
     near = zero() - np.inf
