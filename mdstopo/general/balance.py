@@ -85,8 +85,8 @@ def make_desk(model):  # type: ignore[no-untyped-def]
         np.ones(total),
         inverse_masses(model),
         np.zeros((n_joint, 3, 6)),
-        np.zeros((model.size[0], model.size[3] + 1)),
-        np.ones(model.size[0]),
+        np.zeros(model.size[3]),
+        np.ones((2, model.size[0])),
         carriers(model),
         switches_of(model),
     )
@@ -249,7 +249,7 @@ def factorise_at(band, half, pivots, tangent):  # type: ignore[no-untyped-def]
 def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
     """Solve with the factors on the desk for the right side a (n,), lam (n_row,), in place; driven parts become 0."""
     if desk.switches[OF_JOINTS] != 0:
-        solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.x, a, lam)
+        solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.diagonal, desk.x, a, lam)
         return
     n = model.mass.shape[0]
     x = desk.x

@@ -5,11 +5,14 @@
 
 As long as no inerters couple bodies, M is diagonal, and the joints' matrix is symmetric, positive definite where joints
 are independent, and has as many rows as these: its factors cost a small part of those of the whole
-balance. It couples rows that meet at a body that can move (`GeneralModel.meet`) and is banded in an order of its own
-(`GeneralModel.line`). The factors are L D L^T, which scales of rows leave as they are. Seen with rows scaled to a
-diagonal of ones, the joints are as good as singular where the smallest eigenvalue, the square of the smallest singular
-value of the scaled Phi_q, all but vanishes. A pivot need not show that, as the row that is about to repeat the others
-may be one that has little part in it (`weakest`).
+balance. It couples rows that meet at a body that can move (`GeneralModel.product`). In an order of its own
+(`GeneralModel.line`) each row begins late (`GeneralModel.envelope`): before its first entry its factors have none. A
+closed loop in its natural order has short rows, and long ones where it closes.
+
+The factors are L D L^T, which scales of rows leave as they are. Seen with rows scaled to a diagonal of ones, the joints
+are as good as singular where the smallest eigenvalue, the square of the smallest singular value of the scaled Phi_q,
+all but vanishes. A pivot need not show that, as the row that is about to repeat the others may be one that has little
+part in it (`weakest`).
 """
 
 import numpy as np
@@ -18,6 +21,12 @@ from mdstopo.jit import kernel
 
 #: a pivot, or an eigenvalue, of a scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12
+
+
+@kernel
+def index(i):  # type: ignore[no-untyped-def]
+    """An index that is not negative: else every access has code for counting from the end."""
+    return np.uint64(i)
 
 
 @kernel
@@ -34,141 +43,128 @@ def inverse_masses(model):  # type: ignore[no-untyped-def]
 def factor_joints(model, inverse, jac, pull, gram, diagonal, thorough, x):  # type: ignore[no-untyped-def]
     """Factors of the joints' matrix at slopes jac (n_joint, 3, 6); inverse: as of `inverse_masses`.
 
-    Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (n_row, width + 1), L by rows, and last the inverse of D; diagonal
-    (n_row,), that of the matrix. thorough: whether `weakest` is asked, too. x: scratch (n_row,). Returns the place
-    (`GeneralModel.place`) of a row at which the matrix is singular, or -1.
+    Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (size[3],), L by rows from their first entries on, the diagonal unused;
+    diagonal (2, n_row), that of the matrix and the inverse of D. thorough: whether `weakest` is asked, too. x: scratch
+    (n_row,). Returns the place (`GeneralModel.place`) of a row at which the matrix is singular, or -1.
     """
-    joint = model.joint
-    row = model.row
     line = model.line
-    meet = model.meet
-    width = gram.shape[1] - 1
-    for j in range(joint.shape[0]):
-        a = 3 * joint[j, 1]
-        b = 3 * joint[j, 2]
-        for r in range(joint[j, 4]):
+    product = model.product
+    envelope = model.envelope
+    slope = jac.reshape(jac.size)
+    weighed = pull.reshape(pull.size)
+    for r in range(line.shape[0]):
+        at = line[r, 0]
+        for side in range(2):
+            d = line[r, 1 + side]
             for i in range(3):
-                pull[j, r, i] = jac[j, r, i] * inverse[a + i]
-                pull[j, r, 3 + i] = jac[j, r, 3 + i] * inverse[b + i]
+                e = at + 3 * side + i
+                weighed[index(e)] = slope[index(e)] * inverse[index(d + i)]
     gram[:] = 0.0
-    for m in range(meet.shape[0]):
-        j = meet[m, 0]
-        k = meet[m, 2]
-        one = 3 * meet[m, 1]
-        other = 3 * meet[m, 3]
-        for r in range(joint[j, 4]):
-            if row[j, r] < 0:
-                continue
-            at = line[row[j, r]]
-            x0 = jac[j, r, one]
-            x1 = jac[j, r, one + 1]
-            x2 = jac[j, r, one + 2]
-            for s in range(r + 1 if j == k else joint[k, 4]):
-                if row[k, s] < 0:
-                    continue
-                to = line[row[k, s]]
-                value = x0 * pull[k, s, other] + x1 * pull[k, s, other + 1] + x2 * pull[k, s, other + 2]
-                gram[max(at, to), width - abs(at - to)] += value
-    at = decompose(gram, diagonal)
+    for m in range(product.shape[0]):
+        a = product[m, 1]
+        b = product[m, 2]
+        gram[index(product[m, 0])] += (
+            slope[index(a)] * weighed[index(b)]
+            + slope[index(a + 1)] * weighed[index(b + 1)]
+            + slope[index(a + 2)] * weighed[index(b + 2)]
+        )
+    at = decompose(envelope, gram, diagonal)
     if at < 0 and thorough:
-        at = weakest(gram, diagonal, x)
+        at = weakest(envelope, gram, diagonal, x)
     if at < 0:
         return -1
     for r in range(line.shape[0]):
-        if line[r] == at:
+        if line[r, 3] == at:
             return model.place[model.mass.shape[0] + r]
     return -1
 
 
 @kernel
-def decompose(gram, diagonal):  # type: ignore[no-untyped-def]
-    """Factor a banded matrix in place, as `factor_joints` describes; -1, or a singular row."""
-    width = gram.shape[1] - 1
-    for i in range(gram.shape[0]):
-        own = gram[i]
-        first = max(0, i - width)
-        shift = width - i
+def decompose(envelope, gram, diagonal):  # type: ignore[no-untyped-def]
+    """Factor a matrix in place, as `factor_joints` describes; -1, or a singular row."""
+    inverse = diagonal[1]
+    for i in range(envelope.shape[0]):
+        first = envelope[i, 0]
+        own = envelope[i, 1]
         for j in range(first + 1, i):  # L D
-            other = gram[j]
-            value = own[j + shift]
-            for k in range(max(first, j - width), j):
-                value -= own[k + shift] * other[k - j + width]
-            own[j + shift] = value
-        whole = own[width]
-        diagonal[i] = whole
+            other = envelope[index(j), 1]
+            value = gram[index(own + j)]
+            for k in range(max(first, envelope[index(j), 0]), j):
+                value -= gram[index(own + k)] * gram[index(other + k)]
+            gram[index(own + j)] = value
+        whole = gram[index(own + i)]
         value = whole
         for k in range(first, i):
-            scaled = own[k + shift] * gram[k, width]
-            value -= own[k + shift] * scaled
-            own[k + shift] = scaled
+            scaled = gram[index(own + k)] * inverse[index(k)]
+            value -= gram[index(own + k)] * scaled
+            gram[index(own + k)] = scaled
+        diagonal[0, i] = whole
         if value <= SINGULAR * whole:  # not where it is NaN: that is no fault of the joints
             return i
-        own[width] = 1.0 / value
+        inverse[i] = 1.0 / value
     return -1
 
 
 @kernel
-def weakest(gram, diagonal, x):  # type: ignore[no-untyped-def]
+def weakest(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
     """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `decompose`; else -1.
 
     C = R L D^1/2 are Cholesky's factors with rows scaled by R to a diagonal of ones. With signs e that make y = C^-1 e
     grow, y . y / n is at most the inverse of the eigenvalue, and hardly less than a few times that (the idea of
     LINPACK's estimate of condition numbers, A. K. Cline et al., 1979). x = D^1/2 y.
     """
-    width = gram.shape[1] - 1
     size = 0.0
     most = 0.0
     worst = 0
-    for i in range(gram.shape[0]):
+    for i in range(envelope.shape[0]):
+        own = envelope[i, 1]
         value = 0.0
-        for k in range(max(0, i - width), i):
-            value -= gram[i, k - i + width] * x[k]
-        whole = np.sqrt(diagonal[i])
+        for k in range(envelope[i, 0], i):
+            value -= gram[own + k] * x[k]
+        whole = np.sqrt(diagonal[0, i])
         x[i] = value + (whole if value >= 0.0 else -whole)
-        square = x[i] * x[i] * gram[i, width]
+        square = x[i] * x[i] * diagonal[1, i]
         size += square
         if square > most:
             most = square
             worst = i
-    return worst if size * SINGULAR > gram.shape[0] else -1
+    return worst if size * SINGULAR > envelope.shape[0] else -1
 
 
 @kernel
-def solve_joints(model, inverse, pull, gram, x, a, lam):  # type: ignore[no-untyped-def]
+def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):  # type: ignore[no-untyped-def]
     """Solve with the factors for the right side a (n,), lam (n_row,), in place; driven parts become 0. x: (n_row,)."""
-    joint = model.joint
-    row = model.row
     line = model.line
-    width = gram.shape[1] - 1
-    count = gram.shape[0]
-    for j in range(joint.shape[0]):
-        one = 3 * joint[j, 1]
-        two = 3 * joint[j, 2]
-        for r in range(joint[j, 4]):
-            if row[j, r] >= 0:
-                first = pull[j, r, 0] * a[one] + pull[j, r, 1] * a[one + 1] + pull[j, r, 2] * a[one + 2]
-                second = pull[j, r, 3] * a[two] + pull[j, r, 4] * a[two + 1] + pull[j, r, 5] * a[two + 2]
-                x[line[row[j, r]]] = first + second - lam[row[j, r]]
+    envelope = model.envelope
+    weighed = pull.reshape(pull.size)
+    count = line.shape[0]
+    for r in range(count):
+        e = line[r, 0]
+        first = 0.0
+        second = 0.0
+        for i in range(3):
+            first += weighed[index(e + i)] * a[index(line[r, 1] + i)]
+            second += weighed[index(e + 3 + i)] * a[index(line[r, 2] + i)]
+        x[index(line[r, 3])] = first + second - lam[r]
     for i in range(count):
+        own = envelope[i, 1]
         value = x[i]
-        for k in range(max(0, i - width), i):
-            value -= gram[i, k - i + width] * x[k]
+        for k in range(envelope[i, 0], i):
+            value -= gram[index(own + k)] * x[index(k)]
         x[i] = value
     for i in range(count):
-        x[i] *= gram[i, width]
+        x[i] *= diagonal[1, i]
     for i in range(count - 1, -1, -1):
-        value = x[i]
-        for k in range(max(0, i - width), i):
-            x[k] -= gram[i, k - i + width] * value
+        own = envelope[i, 1]
+        value = x[index(i)]
+        for k in range(envelope[i, 0], i):
+            x[index(k)] -= gram[index(own + k)] * value
     for d in range(a.shape[0]):
         a[d] *= inverse[d]
-    for j in range(joint.shape[0]):
-        one = 3 * joint[j, 1]
-        two = 3 * joint[j, 2]
-        for r in range(joint[j, 4]):
-            if row[j, r] >= 0:
-                value = x[line[row[j, r]]]
-                lam[row[j, r]] = value
-                for i in range(3):
-                    a[one + i] -= pull[j, r, i] * value
-                    a[two + i] -= pull[j, r, 3 + i] * value
+    for r in range(count):
+        e = line[r, 0]
+        value = x[index(line[r, 3])]
+        lam[r] = value
+        for i in range(3):
+            a[index(line[r, 1] + i)] -= weighed[index(e + i)] * value
+            a[index(line[r, 2] + i)] -= weighed[index(e + 3 + i)] * value
