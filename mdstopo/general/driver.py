@@ -99,10 +99,10 @@ class GeneralDriver:
         return self._entry
 
     def _make_room(self, steps: int, stages: int, events: int) -> None:
-        model = self.scene.model
-        sizes = len(model.mass), len(model.pair), int(model.size[0]), self._inertial
-        floats, ints = track_room(*sizes, steps, stages, events)
-        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial], dtype=np.int64)
+        # factors are of use again where stages are no implicit ones and the mass is diagonal
+        factors = self.method.name == "runge_kutta" and not self._inertial
+        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, factors], dtype=np.int64)
+        floats, ints = track_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self._ready = Ready()  # what was prepared with the room as it was would keep it

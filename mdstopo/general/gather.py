@@ -7,6 +7,7 @@ from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
+from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
@@ -24,7 +25,9 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # t
     work[DESIGN] += 1
     rel = np.empty((n_pair, POSE))
     u = np.empty((n_pair, 3))
-    _poses(model, q, v, z, rel, u)
+    turned = np.empty((model.mass.shape[0] // 3, 2))
+    turn_bodies(q, turned)
+    _poses(model, turned, q, v, z, rel, u)
     for k in range(model.block.shape[0]):
         if model.block[k, 4] >= 0 and model.active[segment, k] != 0:
             _add_block(model, k, segment, t, strength, q, v, a, z, rel, u, weight, out)
@@ -40,8 +43,14 @@ def add_designs(model, segment, track, o, strength, z, out, work):  # type: igno
     work[DESIGN] += count
     rel = np.empty((count, n_pair, POSE))
     u = np.empty((count, n_pair, 3))
+    own = np.empty((model.mass.shape[0] // 3, 2))
     for j in range(count):
-        _poses(model, track.stage[o + j, 0], track.stage[o + j, 1], z[j], rel[j], u[j])
+        turned = own
+        if has_factors(track):
+            turned = track.turned[o + j]
+        else:
+            turn_bodies(track.stage[o + j, 0], own)
+        _poses(model, turned, track.stage[o + j, 0], track.stage[o + j, 1], z[j], rel[j], u[j])
     for k in range(model.block.shape[0]):
         if model.block[k, 4] < 0 or model.active[segment, k] == 0:
             continue
@@ -65,10 +74,8 @@ def add_designs(model, segment, track, o, strength, z, out, work):  # type: igno
 
 
 @kernel
-def _poses(model, q, v, z, rel, u):  # type: ignore[no-untyped-def]
-    """rel (n_pair, POSE), and u (n_pair, 3) = -T z."""
-    turned = np.empty((model.mass.shape[0] // 3, 2))
-    turn_bodies(q, turned)
+def _poses(model, turned, q, v, z, rel, u):  # type: ignore[no-untyped-def]
+    """rel (n_pair, POSE), and u (n_pair, 3) = -T z, of bodies that are turned."""
     turned_pose(model.pair, turned, q, v, rel)
     for p in range(model.pair.shape[0]):
         _virtual(model.pair, rel, p, z, u[p])
