@@ -129,7 +129,7 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[
 
 
 @kernel
-def _swept(model, desk, h, x, y):  # type: ignore[no-untyped-def]
+def swept(model, desk, h, x, y):  # type: ignore[no-untyped-def]
     """Solve [M + H^T, Phi_q^T; Phi_q, 0] with the factors of H = 0 on the desk, by sweeps: x (n,), y (n_row,) in place.
 
     H (n_pair, 6, 6) is as small as what a step has drifted. Returns whether the sweeps have settled; else x is as it
@@ -189,7 +189,7 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-un
                 for i in range(6):
                     bar_q[3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
     y[:] = 0.0
-    if not _swept(model, desk, h_mu, bar_q, y):
+    if not swept(model, desk, h_mu, bar_q, y):
         desk.by_q[:] = 0.0
         desk.by_v[:] = 0.0
         factor_matrix(model, desk, h_mu, none, np.zeros(n), none, 1.0, 0.0, np.bool_(True))
