@@ -43,9 +43,9 @@ from mdstopo.mechanics.geometry import POSE, relative_pose
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own.
-#: Above LOOSE the estimate is larger than the error by more and more (long steps are not where it is a series' next
-#: term), and MARGIN times (tolerance / LOOSE)^SLACK is as safe: over 110 scenes with joints, laws of all kinds, motions
-#: and events errors stay below ten tolerances in 98 of a hundred objectives and gradients, at every tolerance
+#: Above LOOSE the estimate is larger than the error by more and more (in long steps it is not the next term of a
+#: series), and MARGIN (tolerance / LOOSE)^SLACK is as safe: over 110 scenes with joints, all laws, motions and events
+#: errors are below ten tolerances in 98 to 99 of a hundred objectives and gradients, at every tolerance
 MARGIN, LOOSE, SLACK = 0.02, 1e-5, 1.0 / 3.0
 #: a step that may grow does so by this power of what the order allows: where steps are long the estimate rises faster
 #: than the order says, and a step that is rejected costs more than one that could have been longer
