@@ -42,12 +42,11 @@ from mdstopo.mechanics.passes import SUMS
 #: what one balance needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope of turning loads,
 #: inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the
 #: scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix the inverse masses,
-#: Phi_q M^-1, the factors and the diagonal; one joint's coordinates, their derivatives and multipliers; what is driven
-#: accelerates by; which pairs carry more than joints, and the switches (`switches`)
+#: Phi_q M^-1, the factors and the diagonal; one joint's own coordinates, their derivatives and multipliers; the known
+#: accelerations of what is driven; which pairs carry more than joints, and the switches (`switches`)
 DESK = (
     "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
-    "x", "scale", "inverse", "pull", "gram", "diagonal", "w", "wd", "wdd", "own", "known",
-    "carries", "switches",
+    "x", "scale", "inverse", "pull", "gram", "diagonal", "own", "known", "carries", "switches",
 )  # fmt: skip
 
 
@@ -89,10 +88,7 @@ def make_desk(model):  # type: ignore[no-untyped-def]
         np.zeros((n_joint, 3, 6)),
         np.zeros(model.size[3]),
         np.ones((2, model.size[0])),
-        np.zeros(PLACES),
-        np.zeros(6),
-        np.zeros(6),
-        np.zeros(3),
+        np.zeros((4, PLACES)),
         np.zeros(n),
         carriers(model),
         switches_of(model),
@@ -131,8 +127,8 @@ def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
 @kernel
 def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
     """Phi, Phi_q and gamma of all joints of bodies that are turned on the desk (`forces.turn_bodies`)."""
-    w = desk.w
-    wd = desk.wd
+    w = desk.own[0]
+    wd = desk.own[1]
     for j in range(model.joint.shape[0]):
         gather_turned(model, j, q, desk.turned, w)
         gather(model, j, v, wd)
@@ -143,10 +139,10 @@ def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
 @kernel
 def joint_slopes(model, q, v, a, lam, desk):  # type: ignore[no-untyped-def]
     """G_q and G_v of all joints, and their stiffness added to K."""
-    w = desk.w
-    wd = desk.wd
-    wdd = desk.wdd
-    mine = desk.own
+    w = desk.own[0]
+    wd = desk.own[1]
+    wdd = desk.own[2]
+    mine = desk.own[3]
     for j in range(model.joint.shape[0]):
         gather_turned(model, j, q, desk.turned, w)
         gather(model, j, v, wd)
