@@ -32,7 +32,7 @@ def any_case(hinges: bool) -> Iterator[Entry]:
 
 def ring() -> Iterator[Entry]:
     """The closed loop, with gradients."""
-    yield from ours(("runge_kutta",), TOLERANCES[:8])
+    yield from ours(("runge_kutta",), (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10))
     for tolerance in (1e-6, 1e-8):
         yield Entry("casadi", {"tolerance": tolerance, "method": "cvodes"})
         yield Entry("casadi", {"tolerance": tolerance, "method": "idas"})
@@ -45,7 +45,7 @@ def ring() -> Iterator[Entry]:
 def forward(hinges: bool) -> Iterator[Entry]:
     """Without gradients."""
     for integrator in ("runge_kutta",) if hinges else ("gauss", "runge_kutta"):
-        for tolerance in (1e-1, 1e-2, *TOLERANCES[:6]):
+        for tolerance in (5e-1, 1e-1, 1e-2, *TOLERANCES[:6]):
             yield Entry(OURS, {"integrator": integrator, "tolerance": tolerance}, gradient=False)
     for steps in (20, 100, 400):
         yield Entry("exudyn", {"steps": steps}, gradient=False)

@@ -13,7 +13,7 @@ from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unk
 from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces
-from mdstopo.general.gather import add_design, explicit_part, force_sign
+from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.parameters import add_event, add_times
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response, value_at
 from mdstopo.general.track import copy_vector, restore_modes
@@ -88,10 +88,10 @@ def sweep(  # type: ignore[no-untyped-def]
         step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, b, r, z, y, desk, work)
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
-        for j in range(end - o):
-            stage = track.stage[o + j]
-            add_design(model, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], z[j], 0.0, out, work)
-            if bar_set.shape[0] > 0:
+        add_designs(model, segment, track, o, strength, z[: end - o], out, work)
+        if bar_set.shape[0] > 0:
+            for j in range(end - o):
+                stage = track.stage[o + j]
                 add_sets(model, segment, strength, stage[0], stage[1], z[j], 0.0, bar_set)
                 if spread:
                     for i in range(bar_set.shape[0]):
@@ -261,10 +261,7 @@ def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows): 
     stage = track.stage[at]
     t = track.when[at]
     if model.response[j, 0] == ENERGY:
-        general_forces(
-            model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk.rel, desk.sums, desk.f,
-            desk.k, desk.c, desk.turn,
-        )  # fmt: skip
+        general_forces(model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk)
     if who < 0 and model.response[j, 0] == MEMBER_FORCE:
         who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
     value = response(

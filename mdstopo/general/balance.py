@@ -24,11 +24,13 @@ from mdstopo.general.forces import (
     drive_state,
     general_forces,
 )
-from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, is_diagonal, solve_joints
+from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints
 from mdstopo.general.structures import bundle
+from mdstopo.general.switches import DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.table import (
     joint_acceleration_slopes,
     joint_gamma,
@@ -37,16 +39,15 @@ from mdstopo.mechanics.joints.table import (
 )
 from mdstopo.mechanics.passes import SUMS
 
-#: what one balance needs and leaves: relative poses, sums, forces, K, C, slope of turning loads, inerters' mass; of the
-#: joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the scales of
-#: its unknowns, which make every row about 1 whatever the masses; of the joints' matrix the inverse masses, Phi_q M^-1,
-#: the factors and scales; and which factors were made last
+#: what one balance needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope of turning loads,
+#: inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the
+#: scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix the inverse masses,
+#: Phi_q M^-1, the factors and the diagonal; one joint's own coordinates, their derivatives and multipliers; the known
+#: accelerations of what is driven; which pairs carry more than joints, and the switches (`switches`)
 DESK = (
-    "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots", "x", "scale",
-    "inverse", "pull", "gram", "root", "factors",
+    "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
+    "x", "scale", "inverse", "pull", "gram", "diagonal", "own", "known", "carries", "switches",
 )  # fmt: skip
-#: places of desk.factors: whether the mass is diagonal; whether the factors are those of the joints' matrix
-DIAGONAL, OF_JOINTS = range(2)
 
 
 class Desk:
@@ -65,9 +66,8 @@ def make_desk(model):  # type: ignore[no-untyped-def]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
     total = model.place.shape[0]
-    factors = np.zeros(2, np.int64)
-    factors[0] = 1 if is_diagonal(model) else 0
     return Desk(
+        np.zeros((n // 3, 2)),
         np.zeros((n_pair, POSE)),
         np.zeros((n_pair, SUMS)),
         np.zeros(n),
@@ -86,9 +86,12 @@ def make_desk(model):  # type: ignore[no-untyped-def]
         np.ones(total),
         inverse_masses(model),
         np.zeros((n_joint, 3, 6)),
-        np.zeros((model.size[0], model.size[3] + 1)),
-        np.ones(model.size[0]),
-        factors,
+        np.zeros(model.size[3]),
+        np.ones((2, model.size[0])),
+        np.zeros((4, PLACES)),
+        np.zeros(n),
+        carriers(model),
+        switches_of(model),
     )
 
 
@@ -103,6 +106,17 @@ def gather(model, j, x, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def gather_turned(model, j, q, turned, w):  # type: ignore[no-untyped-def]
+    """w (PLACES,) of joint j from q (n,) and the turns of `forces.turn_bodies`."""
+    gather(model, j, q, w)
+    one = model.joint[j, 1]
+    two = model.joint[j, 2]
+    for i in range(2):
+        w[6 + i] = turned[one, i]
+        w[8 + i] = turned[two, i]
+
+
+@kernel
 def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
     """out (3,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
     for r in range(3):
@@ -112,11 +126,11 @@ def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
-    """Phi, Phi_q and gamma of all joints."""
-    w = np.empty(6)
-    wd = np.empty(6)
+    """Phi, Phi_q and gamma of all joints of bodies that are turned on the desk (`forces.turn_bodies`)."""
+    w = desk.own[0]
+    wd = desk.own[1]
     for j in range(model.joint.shape[0]):
-        gather(model, j, q, w)
+        gather_turned(model, j, q, desk.turned, w)
         gather(model, j, v, wd)
         joint_rows(model.joint[j, 0], model.joint_par[j], w, desk.phi[j], desk.jac[j])
         joint_gamma(model.joint[j, 0], model.joint_par[j], w, wd, desk.gamma[j])
@@ -125,12 +139,12 @@ def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
 @kernel
 def joint_slopes(model, q, v, a, lam, desk):  # type: ignore[no-untyped-def]
     """G_q and G_v of all joints, and their stiffness added to K."""
-    w = np.empty(6)
-    wd = np.empty(6)
-    wdd = np.empty(6)
-    mine = np.empty(3)
+    w = desk.own[0]
+    wd = desk.own[1]
+    wdd = desk.own[2]
+    mine = desk.own[3]
     for j in range(model.joint.shape[0]):
-        gather(model, j, q, w)
+        gather_turned(model, j, q, desk.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
@@ -148,13 +162,15 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type:
     -1.
     """
     tangent = w_q != 0.0 or w_v != 0.0
-    alone = not tangent and desk.factors[0] != 0
-    desk.factors[1] = 1 if alone else 0
+    alone = not tangent and desk.switches[DIAGONAL] != 0
+    desk.switches[OF_JOINTS] = 1 if alone else 0
     if alone:
-        return factor_joints(model, desk.inverse, desk.jac, desk.pull, desk.gram, desk.root, desk.x)
+        thorough = desk.switches[THOROUGH] != 0
+        return factor_joints(model, desk.inverse, desk.jac, desk.pull, desk.gram, desk.diagonal, thorough, desk.x)
     band = desk.band
     half = model.size[1]
     n = model.mass.shape[0]
+    damped = desk.switches[DAMPED] != 0
     band[:] = 0.0
     scale = desk.scale
     for d in range(n):
@@ -186,7 +202,9 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type:
                     continue
                 value = mass[p, i, j]
                 if tangent:
-                    value += w_q * k[p, i, j] + w_v * c[p, i, j]
+                    value += w_q * k[p, i, j]
+                    if damped:
+                        value += w_v * c[p, i, j]
                 if value != 0.0:
                     put(band, half, scale, model.place[row], model.place[column], value, transposed)
     for j in range(model.joint.shape[0]):
@@ -233,8 +251,8 @@ def factorise_at(band, half, pivots, tangent):  # type: ignore[no-untyped-def]
 @kernel
 def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
     """Solve with the factors on the desk for the right side a (n,), lam (n_row,), in place; driven parts become 0."""
-    if desk.factors[1] != 0:
-        solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.root, desk.x, a, lam)
+    if desk.switches[OF_JOINTS] != 0:
+        solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.diagonal, desk.x, a, lam)
         return
     n = model.mass.shape[0]
     x = desk.x
@@ -262,17 +280,18 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
     """
     n = q.shape[0]
     drive_state(model, segment, t, q, v)
-    general_forces(model, strength, segment, t, q, v, tangent, desk.rel, desk.sums, desk.f, desk.k, desk.c, desk.turn)
-    add_inerters(model, segment, strength, q, v, desk.mass, desk.f)
+    general_forces(model, strength, segment, t, q, v, tangent, desk)
+    if desk.switches[DIAGONAL] == 0:
+        add_inerters(model, segment, strength, q, v, desk.mass, desk.f)
     joint_state(model, q, v, desk)
     singular = factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, np.bool_(False))
     if singular >= 0:
         return singular
-    known = np.zeros(n)
+    known = desk.known  # zero but for what is driven
     drive_acceleration(model, segment, t, known)
     for d in range(n):
         a[d] = desk.f[d]
-    if model.driven.shape[0] > 0:
+    if model.driven.shape[0] > 0 and desk.switches[DIAGONAL] == 0:
         for p in range(model.pair.shape[0]):
             for i in range(6):
                 row = 3 * model.pair[p, i // 3] + i % 3
@@ -296,7 +315,8 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
         a[model.driven[i]] = known[model.driven[i]]
     if tangent:
         joint_slopes(model, q, v, a, lam, desk)
-        add_inerter_tangents(model, segment, strength, q, v, a, desk.k, desk.c)
+        if desk.switches[DIAGONAL] == 0:
+            add_inerter_tangents(model, segment, strength, q, v, a, desk.k, desk.c)
     return -1
 
 
@@ -305,18 +325,9 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
     """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,): driven parts 0."""
     pair = model.pair
     joint = model.joint
-    for p in range(pair.shape[0]):
-        one = 3 * pair[p, 0]
-        two = 3 * pair[p, 1]
-        for i in range(6):
-            value = z[one + i] if i < 3 else z[two + i - 3]
-            if value == 0.0:
-                continue
-            for j in range(3):
-                bar_q[one + j] -= k[p, i, j] * value
-                bar_q[two + j] -= k[p, i, 3 + j] * value
-                bar_v[one + j] -= c[p, i, j] * value
-                bar_v[two + j] -= c[p, i, 3 + j] * value
+    pull_matrices(pair, k, z, bar_q)
+    if desk.switches[DAMPED] != 0:
+        pull_matrices(pair, c, z, bar_v)
     for d in range(z.shape[0]):
         bar_q[d - d % 3 + 2] += turn[d] * z[d]
     by_q = desk.by_q
@@ -336,14 +347,35 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
 
 
 @kernel
+def pull_matrices(pair, k, z, bar):  # type: ignore[no-untyped-def]
+    """bar (n,) -= K^T z, K by pairs (n_pair, 6, 6)."""
+    for p in range(pair.shape[0]):
+        one = 3 * pair[p, 0]
+        two = 3 * pair[p, 1]
+        z0 = z[one]
+        z1 = z[one + 1]
+        z2 = z[one + 2]
+        z3 = z[two]
+        z4 = z[two + 1]
+        z5 = z[two + 2]
+        m = k[p]
+        for j in range(6):
+            d = one + j if j < 3 else two + j - 3
+            bar[d] -= (m[0, j] * z0 + m[1, j] * z1 + m[2, j] * z2) + (m[3, j] * z3 + m[4, j] * z4 + m[5, j] * z5)
+
+
+@kernel
 def push_forward(model, desk, k, c, turn, dq, dv, force, row):  # type: ignore[no-untyped-def]
     """force (n,) -= K dq + C dv (turning loads with their sign), row (n_row,) -= G_q dq + G_v dv."""
+    damped = desk.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
         for i in range(6):
             value = 0.0
             for j in range(6):
                 column = 3 * model.pair[p, j // 3] + j % 3
-                value += k[p, i, j] * dq[column] + c[p, i, j] * dv[column]
+                value += k[p, i, j] * dq[column]
+                if damped:
+                    value += c[p, i, j] * dv[column]
             force[3 * model.pair[p, i // 3] + i % 3] -= value
     for d in range(dq.shape[0]):
         force[d] += turn[d] * dq[d - d % 3 + 2]

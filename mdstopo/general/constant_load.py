@@ -76,9 +76,7 @@ def hold(  # type: ignore[no-untyped-def]
         explicit_part(model, segment, j, who, t, strength, q, v, a, sign, padded)
         unscale_general(model.block, model.power, alpha, padded, out)
         return
-    general_forces(
-        model, strength, segment, t, q, v, np.bool_(True), desk.rel, desk.sums, desk.f, desk.k, desk.c, desk.turn
-    )
+    general_forces(model, strength, segment, t, q, v, np.bool_(True), desk)
     joint_slopes(model, q, v, a, lam, desk)
     matrix[:] = 0.0
     for d in range(n):

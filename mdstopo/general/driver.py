@@ -1,6 +1,5 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
@@ -15,8 +14,9 @@ from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
 from mdstopo.general.kinks import landed
-from mdstopo.general.landings import INTEGRALS, ROUNDS, landings
+from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
+from mdstopo.general.ready import Ready
 from mdstopo.general.rivals import compete, members_peaks
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
@@ -65,6 +65,11 @@ class GeneralDriver:
         self.found = np.zeros(count, dtype=np.int64)
         self.gradients = np.zeros((count, ROWS, n_design + varied))
         self.where = np.full(3, -1, dtype=np.int64)
+        n = len(model.mass)
+        #: what `visit` is given for the end alone, and `pull` for a row
+        self._end = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
+        self._row, self._pulled = np.zeros(COLUMNS), np.zeros(n_design + varied)
+        self._pulled_start = np.zeros(n if case.solver.settle else 0)
         self.events = 0
         #: where the steps of the last evaluation had to end (`landings`)
         self.landings: list[float] = []
@@ -94,12 +99,13 @@ class GeneralDriver:
         return self._entry
 
     def _make_room(self, steps: int, stages: int, events: int) -> None:
-        model = self.scene.model
-        sizes = len(model.mass), len(model.pair), int(model.size[0]), self._inertial
-        floats, ints = track_room(*sizes, steps, stages, events)
-        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial], dtype=np.int64)
+        # factors are of use again where stages are no implicit ones and the mass is diagonal
+        factors = self.method.name == "runge_kutta" and not self._inertial
+        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, factors], dtype=np.int64)
+        floats, ints = track_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
+        self._ready = Ready()  # what was prepared with the room as it was would keep it
 
     def _fit(self) -> None:
         """Refuse joints that do not fit at the start, or move the start where the case asks for it (CaseError)."""
@@ -183,7 +189,7 @@ class GeneralDriver:
         if compete(self.scene.model.response[j, 0], reduction):
             found = ranked(members_peaks(self, j, t, reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
         elif reduction == "final":
-            value, rate, who = see(np.array([[count - 1.0, 1.0]]), True)[0]
+            value, rate, who = self._see_end(j, count)
             found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
         else:
             samples = sample(t, see)
@@ -219,7 +225,7 @@ class GeneralDriver:
             else steps.kept
         )
         out = np.zeros((3, len(places), len(model.mass)))
-        lam = np.zeros((len(places), int(model.size[0]) + len(model.driven)))
+        lam = np.zeros((len(places), self._multipliers))
         seen = np.zeros((len(places), 3))
         self.entry.visit(
             self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, strength, exact, rates, j,
@@ -227,18 +233,36 @@ class GeneralDriver:
         )  # fmt: skip
         return out, lam, seen
 
+    @property
+    def _multipliers(self) -> int:
+        """How many `visit` gives: of the solved rows and of the driven coordinates."""
+        return int(self.scene.model.size[0]) + len(self.scene.model.driven)
+
+    def _see_end(self, j: int, count: int) -> FloatArray:
+        """(3,) value, rate, member of response j at the end."""
+        places, out, lam, seen = self._end
+        places[0] = count - 1.0, 1.0
+        self._ready(
+            "visit", self.entry.visit, self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count,
+            self.room, self.room_ints, self.strength, True, True, j, -1, places, out, lam, seen, self.work,
+        )  # fmt: skip
+        found: FloatArray = seen[0]
+        return found
+
     def steps_arguments(self, count: int) -> tuple[Any, ...]:
         """What every entry that differentiates begins with."""
         return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
 
     def _pull(self, j: int, row: FloatArray, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
-        start = np.zeros(0 if self.start is None else len(self.scene.model.mass))
-        total: float = self.entry.pull(
-            *self.steps_arguments(count), j, integral, gradient, row, self.room, self.room_ints, self.strength,
-            self.padded, out, start, self.work,
+        self._row[:] = row
+        total: float = self._ready(
+            "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self._row, self.room,
+            self.room_ints, self.strength, self.padded, self._pulled, self._pulled_start, self.work,
         )  # fmt: skip
-        if self.start is not None and gradient:
-            self.start.pull(start, out)
+        if gradient:
+            out[:] = self._pulled
+            if self.start is not None:
+                self.start.pull(self._pulled_start, out)
         return total
 
     def start_from(self, q: FloatArray) -> None:
@@ -266,9 +290,9 @@ class GeneralDriver:
         self.ints, self.floats = pack_general(landed(self._with_start(), landings)) if landings else self._packed
         while True:
             self.work[:] = 0
-            code, count, self.events, time = self.entry.simulate(
-                self.ints, self.floats, self.method.tables, self._alpha, tangent, self.settings, self.limits, self.room,
-                self.room_ints, self.strength, self.work, self.where,
+            code, count, self.events, time = self._ready(
+                "simulate", self.entry.simulate, self.ints, self.floats, self.method.tables, self._alpha, tangent,
+                self.settings, self.limits, self.room, self.room_ints, self.strength, self.work, self.where,
             )  # fmt: skip
             if code != NEEDS_ROOM:
                 self._message = self._explain(code, time)
@@ -371,16 +395,6 @@ class GeneralDriver:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
         code, count, _ = self.run(alpha, False)
         return status_of(code), GeneralSteps(self, count)
-
-
-def reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
-    """Mean, integral or rms from the integral over time (of the square), and its derivative by that."""
-    if reduction == "integral":
-        return total, 1.0
-    if reduction == "mean":
-        return total / span, 1.0 / span
-    value = math.sqrt(max(total / span, 0.0))
-    return value, 0.5 / (span * value) if value > 0.0 else 0.0
 
 
 class GeneralSteps:

@@ -12,9 +12,49 @@ import numpy as np
 from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
+from mdstopo.general.switches import DAMPED
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangents
-from mdstopo.mechanics.geometry import add_pair_force, relative_pose
+from mdstopo.mechanics.geometry import add_pair_force
+
+
+@kernel
+def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
+    """turned (n_body, 2) = cos and sin of every body's angle: pairs and joints share them."""
+    for b in range(turned.shape[0]):
+        turned[b, 0] = math.cos(q[3 * b + 2])
+        turned[b, 1] = math.sin(q[3 * b + 2])
+
+
+@kernel
+def turned_pose(pair, turned, q, v, rel):  # type: ignore[no-untyped-def]
+    """`mechanics.geometry.relative_pose` of bodies that are turned by `turn_bodies`."""
+    for p in range(pair.shape[0]):
+        one = pair[p, 0]
+        two = pair[p, 1]
+        a = 3 * one
+        b = 3 * two
+        ca = turned[one, 0]
+        sa = turned[one, 1]
+        cb = turned[two, 0]
+        sb = turned[two, 1]
+        x = q[b] - q[a]
+        y = q[b + 1] - q[a + 1]
+        u = v[b] - v[a]
+        w = v[b + 1] - v[a + 1]
+        dx = ca * x + sa * y
+        dy = ca * y - sa * x
+        omega = v[a + 2]
+        rel[p, 0] = dx
+        rel[p, 1] = dy
+        rel[p, 2] = ca * cb + sa * sb
+        rel[p, 3] = ca * sb - sa * cb
+        rel[p, 4] = ca * u + sa * w + omega * dy
+        rel[p, 5] = ca * w - sa * u - omega * dx
+        rel[p, 6] = v[b + 2] - omega
+        rel[p, 7] = ca
+        rel[p, 8] = sa
+        rel[p, 9] = omega
 
 
 @kernel
@@ -272,21 +312,35 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):  # ty
 
 
 @kernel
-def general_forces(model, strength, segment, t, q, v, tangent, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
-    """F (n,) without inerters at one state, and on demand tangents k_out, c_out (n_pair, 6, 6), turn (n,).
-
-    Out: rel (n_pair, POSE), sums (n_pair, SUMS) too.
+def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: ignore[no-untyped-def]
+    """F (n,) without inerters at one state, and on demand tangents: f, k, c and turn of the desk; with turned, rel and
+    sums.
     """
     pair = model.pair
-    relative_pose(pair, q, v, rel)
+    rel = desk.rel
+    sums = desk.sums
+    f = desk.f
+    carries = desk.carries
+    turn_bodies(q, desk.turned)
+    turned_pose(pair, desk.turned, q, v, rel)
     general_sums(model, segment, t, strength, rel, tangent, sums)
     add_bushings(model, rel, q, tangent, sums)
     f[:] = 0.0
     add_loads(model, segment, t, q, f)
     for p in range(pair.shape[0]):
-        add_pair_force(pair, rel, p, sums[p, 0], sums[p, 1], sums[p, 2], f)
+        if carries[p] != 0:
+            add_pair_force(pair, rel, p, sums[p, 0], sums[p, 1], sums[p, 2], f)
     if tangent:
-        pair_tangents(pair, rel, q, sums, np.bool_(True), k_out, c_out)
-        load_tangent(model, segment, t, q, turn)
+        damped = desk.switches[DAMPED] != 0
+        k = desk.k
+        c = desk.c
+        for p in range(pair.shape[0]):
+            e = p + 1
+            if carries[p] != 0:
+                pair_tangents(pair[p:e], rel[p:e], q, sums[p:e], damped, k[p:e], c[p:e])
+            else:
+                none = k[p]
+                none[:] = 0.0
+        load_tangent(model, segment, t, q, desk.turn)
     if model.contact_pair.shape[0] > 0:
-        add_contacts(model, strength, q, v, tangent, f, k_out, c_out)
+        add_contacts(model, strength, q, v, tangent, f, desk.k, desk.c)

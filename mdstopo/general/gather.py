@@ -2,15 +2,17 @@
 
 import numpy as np
 
-from mdstopo.general.forces import inerter_force
+from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
 from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
+from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
-from mdstopo.mechanics.laws.table import law
+from mdstopo.mechanics.laws.alike import elastic_designs
+from mdstopo.mechanics.laws.table import SPRING, law
 
 
 @kernel
@@ -19,29 +21,70 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # t
 
     Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
     """
-    n_pair = model.pair.shape[0]
+    n = model.mass.shape[0]
     work[DESIGN] += 1
-    rel = np.empty((n_pair, POSE))
-    u = np.empty((n_pair, 3))
+    when = np.empty(1)
+    stage = np.empty((1, 3, n))
+    turned = np.empty((1, n // 3, 2))
+    when[0] = t
+    for d in range(n):
+        stage[0, 0, d] = q[d]
+        stage[0, 1, d] = v[d]
+        stage[0, 2, d] = a[d]
+    turn_bodies(q, turned[0])
+    _add(model, segment, when, strength, stage, turned, z.reshape((1, n)), weight, out)
+
+
+@kernel
+def add_designs(model, segment, track, o, strength, z, out, work):  # type: ignore[no-untyped-def]
+    """`add_design` of the stages from o on, as many as z (S, n) has, without energy: springs are read once."""
+    end = o + z.shape[0]
+    work[DESIGN] += z.shape[0]
+    if has_factors(track):
+        turned = track.turned[o:end]
+    else:
+        turned = np.empty((z.shape[0], model.mass.shape[0] // 3, 2))
+        for j in range(z.shape[0]):
+            turn_bodies(track.stage[o + j, 0], turned[j])
+    _add(model, segment, track.when[o:end], strength, track.stage[o:end], turned, z, 0.0, out)
+
+
+@kernel
+def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type: ignore[no-untyped-def]
+    """`add_design` at the times when (S,), of stage (S, 3, n) with the bodies turned (S, n_body, 2)."""
+    count = z.shape[0]
+    n_pair = model.pair.shape[0]
+    rel = np.empty((count, n_pair, POSE))
+    u = np.empty((count, n_pair, 3))
     row = np.empty(6)
-    relative_pose(model.pair, q, v, rel)
-    for p in range(n_pair):
-        _virtual(model.pair, rel, p, z, u[p])
+    for j in range(count):
+        turned_pose(model.pair, turned[j], stage[j, 0], stage[j, 1], rel[j])
+        for p in range(n_pair):
+            _virtual(model.pair, rel[j], p, z[j], u[j, p])
     for k in range(model.block.shape[0]):
+        code = model.block[k, 3]
         if model.block[k, 4] < 0 or model.active[segment, k] == 0:
             continue
         p = model.block[k, 0]
-        if model.block[k, 3] != INERTER:
-            block_design(model, k, segment, t, strength, strength[1], rel[p], u[p], weight, out)
+        lo = model.block[k, 1]
+        if code == SPRING and weight == 0.0 and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
+            width = model.member.shape[1]
+            rows = model.member.reshape(5 * width)
+            elastic_designs(rows, width, lo, model.block[k, 2], model.law[k, 0], rel, u, p, out)
             continue
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            f = inerter_force(model, k, i, q, v, a, row)
-            value = 0.0
-            for r in range(6):
-                value += row[r] * z[3 * model.pair[p, r // 3] + r % 3]
-            out[i] -= f * value
+        for j in range(count):
+            if code != INERTER:
+                block_design(model, k, segment, when[j], strength, strength[1], rel[j, p], u[j, p], weight, out)
+                continue
+            for i in range(lo, lo + model.block[k, 5]):
+                f = inerter_force(model, k, i, stage[j, 0], stage[j, 1], stage[j, 2], row)
+                value = 0.0
+                for r in range(6):
+                    value += row[r] * z[j, 3 * model.pair[p, r // 3] + r % 3]
+                out[i] -= f * value
     if model.varied.shape[0] > 0:
-        add_parameters(model, segment, t, strength, q, v, a, z, weight, out)
+        for j in range(count):
+            add_parameters(model, segment, when[j], strength, stage[j, 0], stage[j, 1], stage[j, 2], z[j], weight, out)
 
 
 @kernel

@@ -4,20 +4,29 @@
     [Phi_q   0 ] [lam] = [g]        a = M^-1 (f - Phi_q^T lam)
 
 As long as no inerters couple bodies, M is diagonal, and the joints' matrix is symmetric, positive definite where joints
-are independent, and has as many rows as these: Cholesky's factors of it cost a small part of those of the whole
-balance. It couples rows that meet at a body that can move (`GeneralModel.meet`) and is banded in an order of its own
-(`GeneralModel.line`). Its rows are scaled to a diagonal of ones. Then the joints are as good as singular where its
-smallest eigenvalue, the square of the smallest singular value of the scaled Phi_q, all but vanishes. A pivot need not
-show that, as the row that is about to repeat the others may be one that has little part in it (`weakest`).
+are independent, and has as many rows as these: its factors cost a small part of those of the whole
+balance. It couples rows that meet at a body that can move (`GeneralModel.product`). In an order of its own
+(`GeneralModel.line`) each row begins late (`GeneralModel.envelope`): before its first entry its factors have none. A
+closed loop in its natural order has short rows, and long ones where it closes.
+
+The factors are L D L^T, which scales of rows leave as they are. Seen with rows scaled to a diagonal of ones, the joints
+are as good as singular where the smallest eigenvalue, the square of the smallest singular value of the scaled Phi_q,
+all but vanishes. A pivot need not show that, as the row that is about to repeat the others may be one that has little
+part in it (`weakest`).
 """
 
 import numpy as np
 
-from mdstopo.general.model import INERTER
 from mdstopo.jit import kernel
 
 #: a pivot, or an eigenvalue, of a scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12
+
+
+@kernel
+def index(i):  # type: ignore[no-untyped-def]
+    """An index that is not negative: else every access has code for counting from the end."""
+    return np.uint64(i)
 
 
 @kernel
@@ -31,145 +40,131 @@ def inverse_masses(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def is_diagonal(model):  # type: ignore[no-untyped-def]
-    """Whether the mass is: nothing but inerters couples accelerations."""
-    inertial = 0
-    for k in range(model.block.shape[0]):
-        inertial += model.block[k, 3] == INERTER
-    return inertial == 0
-
-
-@kernel
-def factor_joints(model, inverse, jac, pull, gram, root, x):  # type: ignore[no-untyped-def]
+def factor_joints(model, inverse, jac, pull, gram, diagonal, thorough, x):  # type: ignore[no-untyped-def]
     """Factors of the joints' matrix at slopes jac (n_joint, 3, 6); inverse: as of `inverse_masses`.
 
-    Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (n_row, width + 1), the lower factor by rows, the diagonal last, as its
-    inverse; root (n_row,), the scales of rows. x: scratch (n_row,). Returns the place (`GeneralModel.place`) of a row
-    at which the matrix is singular, or -1.
+    Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (size[3],), L by rows from their first entries on, the diagonal unused;
+    diagonal (2, n_row), that of the matrix and the inverse of D. thorough: whether `weakest` is asked, too. x: scratch
+    (n_row,). Returns the place (`GeneralModel.place`) of a row at which the matrix is singular, or -1.
     """
-    joint = model.joint
-    row = model.row
     line = model.line
-    meet = model.meet
-    width = gram.shape[1] - 1
-    for j in range(joint.shape[0]):
-        a = 3 * joint[j, 1]
-        b = 3 * joint[j, 2]
-        for r in range(3):
+    product = model.product
+    envelope = model.envelope
+    slope = jac.reshape(jac.size)
+    weighed = pull.reshape(pull.size)
+    for r in range(line.shape[0]):
+        at = line[r, 0]
+        for side in range(2):
+            d = line[r, 1 + side]
             for i in range(3):
-                pull[j, r, i] = jac[j, r, i] * inverse[a + i]
-                pull[j, r, 3 + i] = jac[j, r, 3 + i] * inverse[b + i]
+                e = at + 3 * side + i
+                weighed[index(e)] = slope[index(e)] * inverse[index(d + i)]
     gram[:] = 0.0
-    for m in range(meet.shape[0]):
-        j = meet[m, 0]
-        k = meet[m, 2]
-        one = 3 * meet[m, 1]
-        other = 3 * meet[m, 3]
-        for r in range(3):
-            if row[j, r] < 0:
-                continue
-            for s in range(r + 1 if j == k else 3):
-                if row[k, s] < 0:
-                    continue
-                value = 0.0
-                for i in range(3):
-                    value += jac[j, r, one + i] * pull[k, s, other + i]
-                at = line[row[j, r]]
-                to = line[row[k, s]]
-                gram[max(at, to), width - abs(at - to)] += value
-    for i in range(gram.shape[0]):
-        root[i] = 1.0 / np.sqrt(gram[i, width]) if gram[i, width] > 0.0 else 1.0
-        for c in range(max(width - i, 0), width + 1):
-            gram[i, c] *= root[i] * root[i - width + c]
-    at = cholesky(gram)
-    if at < 0:
-        at = weakest(gram, x)
+    for m in range(product.shape[0]):
+        a = product[m, 1]
+        b = product[m, 2]
+        gram[index(product[m, 0])] += (
+            slope[index(a)] * weighed[index(b)]
+            + slope[index(a + 1)] * weighed[index(b + 1)]
+            + slope[index(a + 2)] * weighed[index(b + 2)]
+        )
+    at = decompose(envelope, gram, diagonal)
+    if at < 0 and thorough:
+        at = weakest(envelope, gram, diagonal, x)
     if at < 0:
         return -1
     for r in range(line.shape[0]):
-        if line[r] == at:
+        if line[r, 3] == at:
             return model.place[model.mass.shape[0] + r]
     return -1
 
 
 @kernel
-def cholesky(gram):  # type: ignore[no-untyped-def]
-    """Factor a banded matrix with a diagonal of ones in place, as `factor_joints` describes; -1, or a singular row."""
-    width = gram.shape[1] - 1
-    for i in range(gram.shape[0]):
-        first = max(0, i - width)
-        for j in range(first, i):
-            value = gram[i, j - i + width]
-            for k in range(first, j):
-                value -= gram[i, k - i + width] * gram[j, k - j + width]
-            gram[i, j - i + width] = value * gram[j, width]
-        value = gram[i, width]
+def decompose(envelope, gram, diagonal):  # type: ignore[no-untyped-def]
+    """Factor a matrix in place, as `factor_joints` describes; -1, or a singular row."""
+    inverse = diagonal[1]
+    for i in range(envelope.shape[0]):
+        first = envelope[i, 0]
+        own = envelope[i, 1]
+        for j in range(first + 1, i):  # L D
+            other = envelope[index(j), 1]
+            value = gram[index(own + j)]
+            for k in range(max(first, envelope[index(j), 0]), j):
+                value -= gram[index(own + k)] * gram[index(other + k)]
+            gram[index(own + j)] = value
+        whole = gram[index(own + i)]
+        value = whole
         for k in range(first, i):
-            value -= gram[i, k - i + width] ** 2
-        if value < SINGULAR:  # not where it is NaN: that is no fault of the joints
+            scaled = gram[index(own + k)] * inverse[index(k)]
+            value -= gram[index(own + k)] * scaled
+            gram[index(own + k)] = scaled
+        diagonal[0, i] = whole
+        if value <= SINGULAR * whole:  # not where it is NaN: that is no fault of the joints
             return i
-        gram[i, width] = 1.0 / np.sqrt(value)
+        inverse[i] = 1.0 / value
     return -1
 
 
 @kernel
-def weakest(gram, x):  # type: ignore[no-untyped-def]
-    """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `cholesky`; else -1.
+def weakest(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+    """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `decompose`; else -1.
 
-    With signs e that make x = L^-1 e grow, x . x / n is at most the inverse of the eigenvalue, and hardly less than a
-    few times that (the idea of LINPACK's estimate of condition numbers, A. K. Cline et al., 1979).
+    C = R L D^1/2 are Cholesky's factors with rows scaled by R to a diagonal of ones. With signs e that make y = C^-1 e
+    grow, y . y / n is at most the inverse of the eigenvalue, and hardly less than a few times that (the idea of
+    LINPACK's estimate of condition numbers, A. K. Cline et al., 1979). x = D^1/2 y.
     """
-    width = gram.shape[1] - 1
     size = 0.0
+    most = 0.0
     worst = 0
-    for i in range(gram.shape[0]):
+    for i in range(envelope.shape[0]):
+        own = envelope[i, 1]
         value = 0.0
-        for k in range(max(0, i - width), i):
-            value -= gram[i, k - i + width] * x[k]
-        x[i] = (value + (1.0 if value >= 0.0 else -1.0)) * gram[i, width]
-        size += x[i] * x[i]
-        if abs(x[i]) > abs(x[worst]):
+        for k in range(envelope[i, 0], i):
+            value -= gram[own + k] * x[k]
+        whole = np.sqrt(diagonal[0, i])
+        x[i] = value + (whole if value >= 0.0 else -whole)
+        square = x[i] * x[i] * diagonal[1, i]
+        size += square
+        if square > most:
+            most = square
             worst = i
-    return worst if size * SINGULAR > gram.shape[0] else -1
+    return worst if size * SINGULAR > envelope.shape[0] else -1
 
 
 @kernel
-def solve_joints(model, inverse, pull, gram, root, x, a, lam):  # type: ignore[no-untyped-def]
+def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):  # type: ignore[no-untyped-def]
     """Solve with the factors for the right side a (n,), lam (n_row,), in place; driven parts become 0. x: (n_row,)."""
-    joint = model.joint
-    row = model.row
     line = model.line
-    width = gram.shape[1] - 1
-    count = gram.shape[0]
-    for j in range(joint.shape[0]):
-        one = 3 * joint[j, 1]
-        two = 3 * joint[j, 2]
-        for r in range(3):
-            if row[j, r] >= 0:
-                value = -lam[row[j, r]]
-                for i in range(3):
-                    value += pull[j, r, i] * a[one + i] + pull[j, r, 3 + i] * a[two + i]
-                at = line[row[j, r]]
-                x[at] = value * root[at]
+    envelope = model.envelope
+    weighed = pull.reshape(pull.size)
+    count = line.shape[0]
+    for r in range(count):
+        e = line[r, 0]
+        first = 0.0
+        second = 0.0
+        for i in range(3):
+            first += weighed[index(e + i)] * a[index(line[r, 1] + i)]
+            second += weighed[index(e + 3 + i)] * a[index(line[r, 2] + i)]
+        x[index(line[r, 3])] = first + second - lam[r]
     for i in range(count):
+        own = envelope[i, 1]
         value = x[i]
-        for k in range(max(0, i - width), i):
-            value -= gram[i, k - i + width] * x[k]
-        x[i] = value * gram[i, width]
+        for k in range(envelope[i, 0], i):
+            value -= gram[index(own + k)] * x[index(k)]
+        x[i] = value
+    for i in range(count):
+        x[i] *= diagonal[1, i]
     for i in range(count - 1, -1, -1):
-        x[i] *= gram[i, width]
-        for k in range(max(0, i - width), i):
-            x[k] -= gram[i, k - i + width] * x[i]
+        own = envelope[i, 1]
+        value = x[index(i)]
+        for k in range(envelope[i, 0], i):
+            x[index(k)] -= gram[index(own + k)] * value
     for d in range(a.shape[0]):
         a[d] *= inverse[d]
-    for j in range(joint.shape[0]):
-        one = 3 * joint[j, 1]
-        two = 3 * joint[j, 2]
-        for r in range(3):
-            if row[j, r] >= 0:
-                at = line[row[j, r]]
-                value = x[at] * root[at]
-                lam[row[j, r]] = value
-                for i in range(3):
-                    a[one + i] -= pull[j, r, i] * value
-                    a[two + i] -= pull[j, r, 3 + i] * value
+    for r in range(count):
+        e = line[r, 0]
+        value = x[index(line[r, 3])]
+        lam[r] = value
+        for i in range(3):
+            a[index(line[r, 1] + i)] -= weighed[index(e + i)] * value
+            a[index(line[r, 2] + i)] -= weighed[index(e + 3 + i)] * value

@@ -8,6 +8,7 @@ them is landed on; since steps are chosen anew in between, that is looked at onc
 stay.
 """
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
@@ -98,3 +99,13 @@ def halves(t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolera
         low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])
         step = np.concatenate([step[bad], step[bad]])
     return found
+
+
+def reduced(reduction: str, total: float, span: float) -> tuple[float, float]:
+    """Mean, integral or rms from the integral over time (of the square), and its derivative by that."""
+    if reduction == "integral":
+        return total, 1.0
+    if reduction == "mean":
+        return total / span, 1.0 / span
+    value = math.sqrt(max(total / span, 0.0))
+    return value, 0.5 / (span * value) if value > 0.0 else 0.0

@@ -5,6 +5,7 @@ watches that it stays fulfilled. Unknowns are ordered so that bodies that are ti
 Cuthill-McKee where there are many); so are the rows alone, for the matrix that is left of them without the bodies.
 """
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -19,14 +20,18 @@ FEW = 30
 
 
 class Layout(NamedTuple):
-    """row, place, size[0:2], line, meet, size[3] of `GeneralModel`; redundant: names of joints with rows left out."""
+    """row, place, size[0:2], line, envelope, product, size[3] of `GeneralModel`.
+
+    redundant: names of joints with rows left out.
+    """
 
     row: IndexArray
     place: IndexArray
     size: tuple[int, int]
     line: IndexArray
-    meet: IndexArray
-    width: int
+    envelope: IndexArray
+    product: IndexArray
+    entries: int
     redundant: tuple[str, ...]
 
 
@@ -65,8 +70,12 @@ def arrange(
                 columns.append([d for d in coordinates if free[d]])
     place, half = _order(len(free), free, pair, columns)
     meet = _meetings(joint, free)
-    line, width = _order_rows(row, meet, len(columns), many=len(place) > FEW)
-    return Layout(row, place, (len(columns), half), line, meet, width, tuple(dict.fromkeys(redundant)))
+    order, envelope, entries = _order_rows(row, meet, len(columns), many=len(place) > FEW)
+    line = np.zeros((len(columns), 4), dtype=np.int64)
+    for j, r in np.argwhere(row >= 0).tolist():
+        line[row[j, r]] = 18 * j + 6 * r, 3 * joint[j, 1], 3 * joint[j, 2], order[row[j, r]]
+    products = _products(row, meet, order, envelope)
+    return Layout(row, place, (len(columns), half), line, envelope, products, entries, tuple(dict.fromkeys(redundant)))
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, q0: FloatArray) -> FloatArray:
@@ -109,13 +118,47 @@ def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
     return np.array(found, dtype=np.int64).reshape(-1, 4)
 
 
-def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, int]:
-    """Place of each row among the rows, and the distance from the diagonal to the farthest entry."""
+def _products(row: IndexArray, meet: IndexArray, order: IndexArray, envelope: IndexArray) -> IndexArray:
+    """`GeneralModel.product`."""
+    found = []
+    for j, side, k, other in meet.tolist():
+        for r, s in product(range(3), range(3)):
+            if row[j, r] >= 0 and row[k, s] >= 0 and (j != k or s <= r):
+                low, high = sorted((int(order[row[j, r]]), int(order[row[k, s]])))
+                found.append((envelope[high, 1] + low, 18 * j + 6 * r + 3 * side, 18 * k + 6 * s + 3 * other))
+    return np.array(found, dtype=np.int64).reshape(-1, 3)
+
+
+def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, IndexArray, int]:
+    """Place of each row among the rows, `GeneralModel.envelope` and the number of entries: of the order that is cheaper
+    to factor.
+    """
     links = {
         (r, s) for j, _, k, _ in meet.tolist() for r in row[j].tolist() for s in row[k].tolist() if r >= 0 and s >= 0
     }
-    line = _reordered(links, count) if many and links else np.arange(count, dtype=np.int64)
-    return line, _width(links, line)
+    orders = [np.arange(count, dtype=np.int64)]
+    if many and links:
+        orders.append(_reordered(links, count))
+    line, first = min(((order, _first(links, order)) for order in orders), key=lambda pair: _cost(pair[1]))
+    lengths = np.arange(count) - first + 1
+    ends = np.cumsum(lengths)
+    envelope = np.stack([first, ends - lengths - first], axis=1).astype(np.int64)
+    return line, envelope.reshape(count, 2), int(lengths.sum())
+
+
+def _first(links: set[tuple[int, int]], line: IndexArray) -> IndexArray:
+    """Of each place the first one that its row reaches."""
+    first = np.arange(len(line), dtype=np.int64)
+    for r, s in links:
+        low, high = sorted((int(line[r]), int(line[s])))
+        first[high] = min(first[high], low)
+    return first
+
+
+def _cost(first: IndexArray) -> int:
+    """Products in the factors of rows that begin there."""
+    places = np.arange(len(first))
+    return sum(int((places[f:i] - np.maximum(first[f:i], f) + 2).sum()) for i, f in enumerate(first.tolist()))
 
 
 def _reordered(links: set[tuple[int, int]], total: int) -> IndexArray:

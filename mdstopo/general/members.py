@@ -15,8 +15,8 @@ import math
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
-from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
 from mdstopo.mechanics.laws.table import CRUSH, SPRING, law, law_first_set, law_start
 
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
@@ -121,6 +121,9 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
 @kernel
 def add_springs(member, strength, start, stop, p, r, counted, tangent, o):  # type: ignore[no-untyped-def]
     """`add_block` of springs, which are places start to stop of member (5, M_padded) and strength, padding included."""
+    if p[1] == 0.0 and p[2] == 0.0:
+        add_elastic(member, strength, start, stop, p[0], r, counted, tangent, o)
+        return
     width = member.shape[1]
     rows = member.reshape(5 * width)
     scale = strength.reshape(strength.size)
@@ -129,6 +132,38 @@ def add_springs(member, strength, start, stop, p, r, counted, tangent, o):  # ty
         alike_tangent(rows, width, scale, start, stop, p, r, o)
         if p[1] != 0.0:
             alike_damping(rows, width, scale, start, stop, p, r, o)
+
+
+@kernel
+def add_elastic(member, strength, start, stop, k, r, counted, tangent, o):  # type: ignore[no-untyped-def]
+    """`add_springs` without damping and preload, of stiffness k."""
+    px = member[0, start:stop]
+    py = member[1, start:stop]
+    qx = member[2, start:stop]
+    qy = member[3, start:stop]
+    l0 = member[4, start:stop]
+    scale = strength[0, start:stop]
+    if tangent:
+        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(px, py, qx, qy, l0, scale, r[0], r[1], r[2], r[3])
+        o[7] += k * kxx
+        o[8] += k * kxy
+        o[9] += k * kxt
+        o[10] += k * kxy
+        o[11] += k * kyy
+        o[12] += k * kyt
+        o[13] += k * kxt
+        o[14] += k * kyt
+        o[15] += k * ktt
+    else:
+        x, y, t, e = elastic_force(px, py, qx, qy, l0, scale, r[0], r[1], r[2], r[3])
+    o[0] += k * x
+    o[1] += k * y
+    o[2] += k * t
+    if counted:
+        o[3] += k * e
+        o[4] -= k * x
+        o[5] -= k * y
+        o[6] -= k * t
 
 
 @kernel
@@ -249,6 +284,8 @@ def meeting(model, segment, t, strength, before, after):  # type: ignore[no-unty
         w = after[model.block[k, 0]]
         m = model.member
         lo = model.block[k, 1]
+        if far(m.reshape(m.size), m.shape[1], lo, model.block[k, 2], r, w):
+            continue
         value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
         for i in range(lo, lo + model.block[k, 5]):
             x = r[0] + r[2] * m[2, i] - r[3] * m[3, i] - m[0, i]

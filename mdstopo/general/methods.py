@@ -4,9 +4,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.general.driver import reduced
 from mdstopo.general.extremes import RATE, SIGN
-from mdstopo.general.landings import INTEGRALS
+from mdstopo.general.landings import INTEGRALS, reduced
 from mdstopo.integrators.driver import Looked
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray

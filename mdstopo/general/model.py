@@ -50,11 +50,15 @@ class GeneralModel(NamedTuple):
     joint         (n_joint, 5)      code, first and second body, pair, rows; `joint_par` (n_joint, 12)
     row           (n_joint, 3)      the place of each of its rows among the solved ones, or -1
     place         (n + n_row,)      where each coordinate, then each row, stands in the banded matrix
-    size          (4,)              n_row; half width of the band; whether anything depends on velocity; half width of
-                                    the joints' own matrix
-    line          (n_row,)          where each row stands in the joints' own matrix (`joint_matrix`)
-    meet          (n_meet, 4)       a joint, its side (0 or 1), another joint or itself, its side: both on one body
-                                    that is not driven in all
+    size          (4,)              n_row; half width of the band; whether anything depends on velocity; entries of the
+                                    joints' own matrix
+    line          (n_row, 4)        of each row: where its slopes (6,) begin among those of all joints (n_joint, 3, 6),
+                                    the first coordinate of each of its bodies, and where it stands in the joints' own
+                                    matrix (`joint_matrix`)
+    envelope      (n_row, 2)        of each place there the first place that its row reaches, and where the row would
+                                    begin among the entries of all rows if it reached the place 0
+    product       (n_product, 3)    what that matrix is made of: an entry, and where the slopes (3,) of two rows by the
+                                    coordinates of one body begin whose product belongs there
     response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point, its place at the start
     contact_pair  (n_contact,)      the pair of edge and point; `contact` (n_contact, 11): see `mechanics.contact`
     varied        (n_varied, 4)     parameters that vary: block, place (`mechanics.laws.table`), which value, and
@@ -91,7 +95,8 @@ class GeneralModel(NamedTuple):
     place: IndexArray
     size: IndexArray
     line: IndexArray
-    meet: IndexArray
+    envelope: IndexArray
+    product: IndexArray
     response: IndexArray
     response_par: FloatArray
     contact_pair: IndexArray
@@ -114,7 +119,7 @@ def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
         len(model.mass), len(model.pair), len(model.block), model.member.shape[1], len(model.curves),
         len(model.times) - 1, len(model.load_body), len(model.bushing_pair), len(model.driven), len(model.joint),
         len(model.place), len(model.response), len(model.contact_pair), len(model.varied),
-        len(model.meet),
+        len(model.product),
     ]  # fmt: skip
     ints = [np.asarray(sizes, dtype=np.int64), *(each.ravel() for each in model if each.dtype.kind == "i")]
     floats = [each.ravel() for each in model if each.dtype.kind == "f"]
@@ -138,7 +143,7 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     n_resp = ints[11]
     n_contact = ints[12]
     n_varied = ints[13]
-    n_meet = ints[14]
+    n_product = ints[14]
     i = 15
     free = ints[i : i + n]
     i += n
@@ -164,10 +169,12 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     i += n_place
     size = ints[i : i + 4]
     i += 4
-    line = ints[i : i + n_place - n]
-    i += n_place - n
-    meet = ints[i : i + 4 * n_meet].reshape((n_meet, 4))
-    i += 4 * n_meet
+    line = ints[i : i + 4 * (n_place - n)].reshape((n_place - n, 4))
+    i += 4 * (n_place - n)
+    envelope = ints[i : i + 2 * (n_place - n)].reshape((n_place - n, 2))
+    i += 2 * (n_place - n)
+    product = ints[i : i + 3 * n_product].reshape((n_product, 3))
+    i += 3 * n_product
     response = ints[i : i + 6 * n_resp].reshape((n_resp, 6))
     i += 6 * n_resp
     contact_pair = ints[i : i + n_contact]
@@ -209,5 +216,5 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     return ModelView(
         free, mass, q0, v0, pair, reach, block, law, active, level, power, member, curves, times, force, load_body,
         load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row, place, size,
-        line, meet, response, response_par, contact_pair, contact, varied,
+        line, envelope, product, response, response_par, contact_pair, contact, varied,
     )  # fmt: skip

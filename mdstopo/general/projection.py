@@ -8,14 +8,28 @@ all the same, so that these belong to what was computed. Driven coordinates are 
 
 import numpy as np
 
-from mdstopo.general.balance import factor_matrix, gather, gather_multipliers, joint_state, solve_unknowns
+from mdstopo.general.balance import (
+    factor_matrix,
+    gather,
+    gather_multipliers,
+    gather_turned,
+    joint_state,
+    pull_matrices,
+    solve_unknowns,
+)
+from mdstopo.general.forces import turn_bodies
+from mdstopo.general.switches import DIAGONAL
 from mdstopo.jit import kernel
+from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 
 #: misfit, relative to the scene, with which a joint counts as torn: its rows were taken for a repetition of others
 MISFIT = 1e-7
 #: corrections of the position at most; each squares the misfit
 MOST = 12
+#: sweeps at most until what the multipliers do to the reverse has settled, and the change of the last one by which it
+#: has, relative, as the root of mass times square
+SWEEPS, SETTLED = 8, 1e-16
 
 
 @kernel
@@ -49,10 +63,12 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
     for d in range(n):
         start[d] = q[d]
     none = desk.mass
-    none[:] = 0.0
+    if desk.switches[DIAGONAL] == 0:
+        none[:] = 0.0
     last = np.inf
     worst = np.inf
     for _ in range(MOST):
+        turn_bodies(q, desk.turned)
         joint_state(model, q, v, desk)
         worst = misfit(model, desk.phi, which)
         if worst <= 1e-15 * scale or not worst < last:
@@ -70,7 +86,9 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
         solve_unknowns(model, desk, shift, mu)
         for d in range(n):
             q[d] += shift[d]
-    joint_state(model, q, v, desk)
+    else:
+        turn_bodies(q, desk.turned)
+        joint_state(model, q, v, desk)
     singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
     if singular >= 0:
         return singular
@@ -93,7 +111,7 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
 @kernel
 def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[no-untyped-def]
     """h_mu, h_nu (n_pair, 6, 6) = d(Phi_q^T mu)/dq and with nu; slope (n_joint, 3, 6) = d(Phi_q v)/dq."""
-    w = np.empty(6)
+    w = np.empty(PLACES)
     wd = np.empty(6)
     mine = np.empty(3)
     h_mu[:] = 0.0
@@ -101,13 +119,47 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[
     for j in range(model.joint.shape[0]):
         code = model.joint[j, 0]
         par = model.joint_par[j]
-        gather(model, j, q, w)
+        gather_turned(model, j, q, desk.turned, w)
         gather(model, j, v, wd)
         gather_multipliers(model, j, mu, mine)
         joint_stiffness(code, par, w, mine, h_mu[model.joint[j, 3]])
         gather_multipliers(model, j, nu, mine)
         joint_stiffness(code, par, w, mine, h_nu[model.joint[j, 3]])
         joint_velocity_slope(code, par, w, wd, slope[j])
+
+
+@kernel
+def swept(model, desk, h, x, y):  # type: ignore[no-untyped-def]
+    """Solve [M + H^T, Phi_q^T; Phi_q, 0] with the factors of H = 0 on the desk, by sweeps: x (n,), y (n_row,) in place.
+
+    H (n_pair, 6, 6) is as small as what a step has drifted. Returns whether the sweeps have settled; else x is as it
+    was, and y is zero.
+    """
+    n = x.shape[0]
+    right = np.empty(n)
+    last = np.empty(n)
+    for d in range(n):
+        right[d] = x[d]
+        last[d] = 0.0
+    for _ in range(SWEEPS):
+        solve_unknowns(model, desk, x, y)
+        size = 0.0
+        change = 0.0
+        for d in range(n):
+            size = max(size, model.mass[d] * x[d] ** 2)
+            change = max(change, model.mass[d] * (x[d] - last[d]) ** 2)
+            last[d] = x[d]
+            x[d] = right[d]
+        for r in range(y.shape[0]):
+            y[r] = 0.0
+        if change <= SETTLED**2 * size:
+            for d in range(n):
+                x[d] = last[d]
+            return True
+        pull_matrices(model.pair, h, last, x)
+    for d in range(n):
+        x[d] = right[d]
+    return False
 
 
 @kernel
@@ -121,19 +173,15 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-un
     h_nu = np.empty((n_pair, 6, 6))
     slope = np.zeros((model.joint.shape[0], 3, 6))
     y = np.zeros(mu.shape[0])
-    none = np.zeros((n_pair, 6, 6))
-    turn = np.zeros(n)
-    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    none = desk.mass
+    if desk.switches[DIAGONAL] == 0:
+        none[:] = 0.0
+    turn_bodies(q, desk.turned)
     joint_state(model, q, v, desk)
-    desk.by_q[:] = 0.0
-    desk.by_v[:] = 0.0
-    factor_matrix(model, desk, none, none, turn, none, 0.0, 0.0, np.bool_(True))
+    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    factor_matrix(model, desk, none, none, bar_q, none, 0.0, 0.0, np.bool_(True))
     solve_unknowns(model, desk, bar_v, y)
-    for p in range(n_pair):
-        for i in range(6):
-            value = bar_v[3 * model.pair[p, i // 3] + i % 3]
-            for j in range(6):
-                bar_q[3 * model.pair[p, j // 3] + j % 3] -= h_nu[p, i, j] * value
+    pull_matrices(model.pair, h_nu, bar_v, bar_q)
     for j in range(model.joint.shape[0]):
         for r in range(3):
             own = model.row[j, r]
@@ -141,8 +189,11 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-un
                 for i in range(6):
                     bar_q[3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
     y[:] = 0.0
-    factor_matrix(model, desk, h_mu, none, turn, none, 1.0, 0.0, np.bool_(True))
-    solve_unknowns(model, desk, bar_q, y)
+    if not swept(model, desk, h_mu, bar_q, y):
+        desk.by_q[:] = 0.0
+        desk.by_v[:] = 0.0
+        factor_matrix(model, desk, h_mu, none, np.zeros(n), none, 1.0, 0.0, np.bool_(True))
+        solve_unknowns(model, desk, bar_q, y)
     for d in range(n):
         bar_q[d] *= model.mass[d]
         bar_v[d] *= model.mass[d]
@@ -161,8 +212,9 @@ def project_forward(model, q, v, mu, nu, desk, dq, dv):  # type: ignore[no-untyp
     y = np.zeros(mu.shape[0])
     none = np.zeros((n_pair, 6, 6))
     turn = np.zeros(n)
-    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
+    turn_bodies(q, desk.turned)
     joint_state(model, q, v, desk)
+    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
     desk.by_q[:] = 0.0
     desk.by_v[:] = 0.0
     factor_matrix(model, desk, h_mu, none, turn, none, 1.0, 0.0, np.bool_(False))

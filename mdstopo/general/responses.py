@@ -13,6 +13,7 @@ from mdstopo.general.forces import inerter_force
 from mdstopo.general.model import INERTER
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import add_pair_force
+from mdstopo.mechanics.joints.revolute import PLACES, turn
 from mdstopo.mechanics.joints.table import joint_transmitted
 from mdstopo.mechanics.laws.table import law
 from mdstopo.responses.kinematics import angle_response, point_response
@@ -148,11 +149,12 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
             _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars)
         return sign * f
     joint = model.response[j, 5]
-    w = np.empty(6)
+    w = np.empty(PLACES)
     mine = np.empty(3)
     by_lam = np.empty(3)
     by_q = np.empty(6)
     gather(model, joint, q, w)
+    turn(w)
     gather_multipliers(model, joint, lam, mine)
     value = joint_transmitted(
         model.joint[joint, 0], model.joint_par[joint], w, mine, model.response[j, 4], by_lam, by_q

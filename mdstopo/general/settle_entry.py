@@ -37,10 +37,7 @@ def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
     n = model.mass.shape[0]
     v = np.zeros(n)
     rest(model, alpha, strength, q, v)
-    general_forces(
-        model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk.rel, desk.sums, desk.f, desk.k, desk.c,
-        desk.turn,
-    )  # fmt: skip
+    general_forces(model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk)
     joint_state(model, q, v, desk)
     joint_slopes(model, q, v, np.zeros(n), lam, desk)
     for d in range(n):

@@ -3,10 +3,12 @@
 import numpy as np
 
 from mdstopo.general.balance import factor_matrix, joint_slopes, joint_state, pull_back, push_forward, solve_unknowns
+from mdstopo.general.forces import turn_bodies
+from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.track import mass_of
+from mdstopo.general.track import has_factors, mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.integrators.steps import REVERSE
+from mdstopo.integrators.steps import REVERSE, copy_rows
 from mdstopo.jit import kernel
 
 #: change of a sweep of the iterative method, relative, at which it has settled
@@ -18,8 +20,25 @@ def lay_out(model, track, o, desk):  # type: ignore[no-untyped-def]
     """Put the joints of stage o on the desk, with their slopes; the members' tangents stay in the track."""
     q = track.stage[o, 0]
     v = track.stage[o, 1]
-    joint_state(model, q, v, desk)
+    if has_factors(track):
+        copy_rows(track.turned[o], desk.turned)
+    else:
+        turn_bodies(q, desk.turned)
+        joint_state(model, q, v, desk)
     joint_slopes(model, q, v, track.stage[o, 2], track.lam[o], desk)
+
+
+@kernel
+def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):  # type: ignore[no-untyped-def]
+    """Solve with W(w_q, w_v) of stage o, which is laid out, or its transpose; a (n,), lam (n_row,) in place.
+
+    Where factors are kept, weights are 0 and the matrix is symmetric.
+    """
+    if has_factors(track):
+        solve_joints(model, desk.inverse, track.pull[o], track.gram[o], track.diagonal[o], desk.x, a, lam)
+        return
+    factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, transposed)
+    solve_unknowns(model, desk, a, lam)
 
 
 @kernel
@@ -28,8 +47,7 @@ def stage_back(model, track, o, w_q, w_v, desk, z, y, bar_q, bar_v):  # type: ig
     its balance, in place; and what that pulls on the stage's state, added to bar_q, bar_v (n,).
     """
     lay_out(model, track, o, desk)
-    factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(True))
-    solve_unknowns(model, desk, z, y)
+    solve_stage(model, track, o, w_q, w_v, np.bool_(True), desk, z, y)
     pull_back(model, desk, track.K[o], track.C[o], track.turn[o], z, y, bar_q, bar_v)
 
 
@@ -135,8 +153,7 @@ def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row): 
     push_forward(model, desk, track.K[o], track.C[o], track.turn[o], dq, dv, force, row)
     if sweeps > 0 and (w_q != 0.0 or w_v != 0.0):
         return _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row)
-    factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(False))
-    solve_unknowns(model, desk, force, row)
+    solve_stage(model, track, o, w_q, w_v, np.bool_(False), desk, force, row)
     return True
 
 

@@ -14,6 +14,9 @@ stage     (S, 3, n)             q, v, a
 lam       (S, n_row)            multipliers of the joints
 K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters
 turn      (S, n)                slope of the turning loads
+turned    (S, n_body, 2)        cos and sin of the bodies' angles; pull (S, n_joint, 3, 6), gram (S, size[3]), diagonal
+                                (S, 2, n_row): the factors of the joints' matrix (`joint_matrix`); one row of each where
+                                they are not kept
 salt      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
 kept      (E, 3)                the permanent set of its member before and after an event; slope of its time by it
 event     (E, 5) integers       the state at which it happened, member (padded), mode before and after; whether it
@@ -23,13 +26,19 @@ event     (E, 5) integers       the state at which it happened, member (padded),
 
 from typing import Any
 
+from mdstopo.general.model import GeneralModel
 from mdstopo.general.structures import bundle
+from mdstopo.general.switches import DAMPED
 from mdstopo.jit import kernel
+from mdstopo.scene.model import IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES = range(5)
 
-TRACK = ("t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "salt", "kept", "event")
+TRACK = (
+    "t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "turned", "pull", "gram",
+    "diagonal", "salt", "kept", "event",
+)  # fmt: skip
 
 
 class Track:
@@ -41,18 +50,21 @@ class Track:
 bundle(Track, TRACK)
 
 
-def track_room(
-    n: int, n_pair: int, n_row: int, inertial: bool, steps: int, stages: int, events: int
-) -> tuple[int, int]:
+def track_room(model: GeneralModel, limits: IndexArray) -> tuple[int, int]:
     """Lengths of the flat arrays of floats and integers that `carve_track` needs."""
+    n, n_pair, n_row = len(model.mass), len(model.pair), int(model.size[0])
+    _, steps, stages, events, inertial, factors = limits.tolist()
     per_stage = 1 + 4 * n + n_row + 72 * n_pair
     floats = (steps + 1) * (1 + 2 * n + 2 * n_row) + stages * per_stage + events * (3 * n + 3)
+    floats += (2 * (n // 3) + 18 * len(model.joint) + int(model.size[3]) + 2 * n_row) * (stages if factors else 1)
     return floats + 36 * n_pair * (stages if inertial else 1), 4 * (steps + 1) + 5 * events
 
 
 @kernel
 def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
-    """A `Track` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are inerters."""
+    """A `Track` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are inerters,
+    whether the factors of the joints' matrix are kept.
+    """
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     n_row = model.size[0]
@@ -80,13 +92,26 @@ def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
     f += size
     turn = floats[f : f + n * stages].reshape((stages, n))
     f += n * stages
+    rows = stages if limits[5] != 0 else 1
+    turned = floats[f : f + 2 * (n // 3) * rows].reshape((rows, n // 3, 2))
+    f += 2 * (n // 3) * rows
+    n_joint = model.joint.shape[0]
+    pull = floats[f : f + 18 * n_joint * rows].reshape((rows, n_joint, 3, 6))
+    f += 18 * n_joint * rows
+    entries = model.size[3]
+    gram = floats[f : f + entries * rows].reshape((rows, entries))
+    f += entries * rows
+    diagonal = floats[f : f + 2 * n_row * rows].reshape((rows, 2, n_row))
+    f += 2 * n_row * rows
     salt = floats[f : f + 3 * n * events].reshape((events, 3, n))
     f += 3 * n * events
     kept = floats[f : f + 3 * events].reshape((events, 3))
     f += 3 * events
     rows = stages if limits[4] != 0 else 1
     mass = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
-    return Track(t, state, push, index, when, stage, lam, k, c, mass, turn, salt, kept, event)
+    return Track(
+        t, state, push, index, when, stage, lam, k, c, mass, turn, turned, pull, gram, diagonal, salt, kept, event
+    )  # fmt: skip
 
 
 @kernel
@@ -104,9 +129,27 @@ def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-unt
     copy_vector(desk.turn, track.turn[o])
     size = desk.k.size
     copy_vector(desk.k.reshape(size), track.K[o].reshape(size))
-    copy_vector(desk.c.reshape(size), track.C[o].reshape(size))
+    if desk.switches[DAMPED] != 0:  # else nobody reads it
+        copy_vector(desk.c.reshape(size), track.C[o].reshape(size))
     if track.mass.shape[0] > 1:
         copy_vector(desk.mass.reshape(size), track.mass[o].reshape(size))
+    if has_factors(track):
+        _copy(desk.turned, track.turned[o])
+        _copy(desk.pull, track.pull[o])
+        copy_vector(desk.gram, track.gram[o])
+        _copy(desk.diagonal, track.diagonal[o])
+
+
+@kernel
+def _copy(source, target):  # type: ignore[no-untyped-def]
+    """target = source, contiguous and of any shape."""
+    copy_vector(source.reshape(source.size), target.reshape(target.size))
+
+
+@kernel
+def has_factors(track):  # type: ignore[no-untyped-def]
+    """Whether the stages' factors of the joints' matrix are kept."""
+    return track.turned.shape[0] == track.when.shape[0]
 
 
 @kernel

@@ -4,7 +4,8 @@ Numba's own `Lower` leaves the same to LLVM to find out. What is computed is the
 may fuse or reorder what it sees:
 
 What a function got from its caller lives as long as the call. So neither it nor views of it are counted: a scene is a
-tuple of thirty arrays, each of which would be counted at every mention of it.
+tuple or structure of thirty arrays, each of which would be counted at every mention of it. The fields of a structure
+are set when it is made, and never again.
 
 A variable that is assigned once, before all its uses, is a value and needs no place in memory; and a part of a tuple or
 array that has just been put together is known.
@@ -19,6 +20,7 @@ from llvmlite.ir.instructions import InsertValue
 from numba.core import analysis, cgutils, ir, types
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.lowering import Lower as NumbaLower
+from numba.experimental.structref import _Utils as _Structure
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
 #: places of an array's fields in Numba's structure of it
@@ -76,6 +78,18 @@ class Lower(NumbaLower):
             super().lower_inst(inst)
         finally:
             self.context = self._counting
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        if self.context is self._plain and expr.op == "getattr":
+            kind = self.typeof(expr.value.name)
+            if isinstance(kind, types.StructRef):
+                return self._field(kind, self.loadvar(expr.value.name), expr.attr, resty)
+        return super().lower_expr(resty, expr)
+
+    def _field(self, kind: Any, given: Any, name: str, wanted: Any) -> Any:
+        """A field of a structure that lives as long as the call, not counted."""
+        fields = _Structure(self._counting, self.builder, kind).get_data_struct(given)
+        return self.context.cast(self.builder, getattr(fields, name), kind.field_dict[name], wanted)
 
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         array, wanted = signature.args
@@ -239,6 +253,8 @@ def _borrows(value: Any, names: set[str], typemap: Any) -> bool:
     if value.op not in ("getattr", "getitem", "static_getitem", "exhaust_iter") or value.value.name not in names:
         return False
     whole = typemap[value.value.name]
+    if isinstance(whole, types.StructRef):
+        return bool(value.op == "getattr")
     if isinstance(whole, types.BaseTuple):
         return True
     index = {"getitem": "index", "static_getitem": "index_var"}.get(value.op)

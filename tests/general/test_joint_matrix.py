@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.general.balance import OF_JOINTS, factor_matrix, joint_state, make_desk, solve_unknowns
+from mdstopo.general.balance import factor_matrix, joint_state, make_desk, solve_unknowns
 from mdstopo.general.compile import compile_general
-from mdstopo.general.joint_matrix import cholesky, weakest
+from mdstopo.general.forces import turn_bodies
+from mdstopo.general.joint_matrix import decompose, weakest
 from mdstopo.general.model import pack_general, unpack_general
+from mdstopo.general.switches import OF_JOINTS
 
 #: every kind of joint; two of them share both bodies, one body is driven in part and one in all
 MECHANISM = """
@@ -54,14 +56,21 @@ joints:
 def _solve(ints, floats, q, transposed, a, lam, jac, factors):
     model = unpack_general(ints, floats)
     desk = make_desk(model)
+    turn_bodies(q, desk.turned)
     joint_state(model, q, np.zeros_like(q), desk)
     singular = factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, transposed)
     jac[:] = desk.jac
-    factors[:] = desk.factors
+    factors[:] = desk.switches
     if singular < 0:
         solve_unknowns(model, desk, a, lam)
         solve_unknowns(model, desk, a, lam)  # the factors stay
     return singular
+
+
+@numba.njit
+def _singular(envelope, gram, diagonal):
+    found = decompose(envelope, gram, diagonal)
+    return found if found >= 0 else weakest(envelope, gram, diagonal, np.zeros(len(gram)))
 
 
 def model_of(text):
@@ -71,7 +80,7 @@ def model_of(text):
 
 def solved(model, q, a, lam, transposed=False):
     """The place at which the balance is singular, Phi_q (n_row, n) and which factors were made; a, lam in place."""
-    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(2, np.int64)
+    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(4, np.int64)
     singular = _solve(*pack_general(model), q, transposed, a, lam, jac, factors)
     dense = np.zeros((len(lam), len(a)))
     for j, (_, one, two, *_) in enumerate(model.joint.tolist()):
@@ -130,19 +139,17 @@ def test_a_small_eigenvalue_is_found_whatever_row_it_belongs_to(seed, least, reg
     rest = np.linalg.qr(np.column_stack([part, rng.normal(size=(n, n - 1))]))[0]
     values = np.append(least, rng.uniform(0.5, 2.0, n - 1))
     dense = (rest * values) @ rest.T
-    scale = 1.0 / np.sqrt(np.diag(dense))
+    scale = rng.uniform(0.1, 10.0, n) / np.sqrt(np.diag(dense))
     dense *= np.outer(scale, scale)
-    gram = np.zeros((n, n))
-    for i in range(n):
-        gram[i, n - 1 - i :] = dense[i, : i + 1]
-    found = cholesky.py_func(gram)
-    if found < 0:
-        found = weakest.py_func(gram, np.zeros(n))
+    gram = np.concatenate([dense[i, : i + 1] for i in range(n)])
+    envelope = np.array([[0, i * (i + 1) // 2] for i in range(n)])
+    diagonal = np.zeros((2, n))
+    found = _singular(envelope, gram, diagonal)
     assert (found < 0) == regular
 
 
-def test_its_band_stays_narrow_however_long_a_closed_loop_is():
-    widths = []
+def test_it_costs_a_closed_loop_what_its_length_costs():
+    costs = []
     for count in (12, 48):
         turn = 2 * np.pi * np.arange(count + 1) / count
         x, y = np.cos(turn), np.sin(turn)
@@ -155,5 +162,10 @@ def test_its_band_stays_narrow_however_long_a_closed_loop_is():
             for i in range(count)
         )
         joints += f"  - {{type: revolute, bodies: [ground, b0], at: [{x[0]}, {y[0]}]}}\n"
-        widths.append(int(model_of(f"format: 1\ntime: {{end: 1}}\nbodies:\n{bodies}joints:\n{joints}").size[3]))
-    assert widths[0] == widths[1] <= 9
+        model = model_of(f"format: 1\ntime: {{end: 1}}\nbodies:\n{bodies}joints:\n{joints}")
+        first = model.envelope[:, 0].tolist()
+        products = sum(j - max(first[i], first[j]) for i in range(len(first)) for j in range(first[i], i))
+        costs.append((int(model.size[3]), products))
+    for short, long in zip(*costs, strict=True):
+        assert long <= 4.5 * short
+    assert costs[0][0] <= 26 * 6

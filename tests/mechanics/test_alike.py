@@ -29,6 +29,16 @@ def _design(member, start, stop, p, r, u, weight, out):
     alike.alike_design(member.reshape(member.size), member.shape[1], start, stop, p, r, u, weight, out)
 
 
+@numba.njit
+def _designs(member, start, stop, k, rel, u, pair, out):
+    alike.elastic_designs(member.reshape(member.size), member.shape[1], start, stop, k, rel, u, pair, out)
+
+
+@numba.njit
+def _far(member, before, after):
+    return alike.far(member.reshape(member.size), member.shape[1], START, STOP, before, after)
+
+
 def scene(law, seed=0):
     """Members (5, COUNT), the last six of the block padding; their scales; parameters; a pose with its rate."""
     rng = np.random.default_rng(seed)
@@ -110,3 +120,32 @@ def test_a_member_without_length_has_energy_but_no_force():
     o = sums(member, scale, p, x, rate)
     assert o[3] == pytest.approx((scale * 0.5 * p[0] * member[4] ** 2)[START:STOP].sum(), rel=1e-13)
     assert not np.delete(o, 3).any()
+
+
+def test_the_design_gradient_of_many_poses_is_the_sum_of_theirs():
+    member, _, p, _, _ = scene("elastic", 4)
+    rng = np.random.default_rng(4)
+    rel, u = np.zeros((3, 2, POSE)), rng.normal(size=(3, 2, 3))
+    for j in range(3):
+        rel[j, 1] = pose(rng.normal(size=3), rng.normal(size=3))
+    one, all_at_once = np.zeros(COUNT), np.zeros(COUNT)
+    for j in range(3):
+        _design(member, START, STOP, p, rel[j, 1], u[j, 1], 0.0, one)
+    _designs(member, START, STOP, p[0], rel, u, 1, all_at_once)
+    assert all_at_once == pytest.approx(one, rel=1e-12, abs=1e-13)
+    assert np.any(one[START:STOP] != 0.0)
+
+
+@pytest.mark.parametrize("who", range(START, STOP - 6, 5))
+def test_ends_that_meet_on_the_way_are_not_far(who):
+    """The second body moves and turns so that one member's end goes through the other, wherever on the way."""
+    member, _, _, x, _ = scene("elastic", 5)
+    x *= 0.1
+    arm = np.exp(1j * x[2]) * complex(*member[2:4, who])
+    gone = complex(*member[:2, who]) - complex(*x[:2]) - arm
+    still, near = pose(x, x), pose(x + 1e-3, x)
+    for overshoot in (1.0, 1.5, 10.0):
+        moved = complex(*x[:2]) + overshoot * gone
+        assert not _far(member, still, pose(np.array([moved.real, moved.imag, x[2]]), x))
+    member[:, STOP - 6 : STOP] = member[:, START : START + 1]  # padding is short where bodies are near
+    assert _far(member, still, near)

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 
 from mdstopo.case.model import DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
 from mdstopo.mechanics.joints import table
+from mdstopo.mechanics.joints.revolute import PLACES
+from mdstopo.mechanics.joints.revolute import turn as fill
 from mdstopo.mechanics.joints.table import CODES, ROWS, WIDTH, describe, parameters
 
 RECORDS = {cls.type: cls for cls in (RevoluteJoint, PrismaticJoint, FixedJoint, DistanceJoint)}
@@ -28,38 +30,47 @@ many = settings(max_examples=25, deadline=None, derandomize=True)
 
 # Kernels have no Python wrapper: these are their callers.
 @numba.njit
+def turned(w):
+    """w (6,) with the turns of both bodies behind it."""
+    places = np.empty(PLACES)
+    places[:6] = w
+    fill(places)
+    return places
+
+
+@numba.njit
 def _rows(code, par, w, phi, jac):
-    table.joint_rows(code, par, w, phi, jac)
+    table.joint_rows(code, par, turned(w), phi, jac)
 
 
 @numba.njit
 def _gamma(code, par, w, wd, gamma):
-    table.joint_gamma(code, par, w, wd, gamma)
+    table.joint_gamma(code, par, turned(w), wd, gamma)
 
 
 @numba.njit
 def _velocity_slope(code, par, w, wd, out):
-    table.joint_velocity_slope(code, par, w, wd, out)
+    table.joint_velocity_slope(code, par, turned(w), wd, out)
 
 
 @numba.njit
 def _acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
-    table.joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v)
+    table.joint_acceleration_slopes(code, par, turned(w), wd, wdd, by_q, by_v)
 
 
 @numba.njit
 def _stiffness(code, par, w, lam, k):
-    table.joint_stiffness(code, par, w, lam, k)
+    table.joint_stiffness(code, par, turned(w), lam, k)
 
 
 @numba.njit
 def _reaction(code, rows, par, w, lam, out):
-    table.joint_reaction(code, rows, par, w, lam, out)
+    table.joint_reaction(code, rows, par, turned(w), lam, out)
 
 
 @numba.njit
 def _transmitted(code, par, w, lam, which, by_lam, by_q):
-    return table.joint_transmitted(code, par, w, lam, which, by_lam, by_q)
+    return table.joint_transmitted(code, par, turned(w), lam, which, by_lam, by_q)
 
 
 @dataclasses.dataclass(frozen=True)

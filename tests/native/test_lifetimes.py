@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 
+from mdstopo.general.structures import bundle
 from mdstopo.jit import entry, kernel
 from mdstopo.native.kernel import Kernel
 
@@ -215,6 +216,46 @@ def generated(times, out):
             out[0] += value
 
 
+class Both:
+    """Two arrays in a structure."""
+
+    def __init__(self, first, second):
+        self.first, self.second = first, second
+
+
+bundle(Both, ("first", "second"))
+
+
+@kernel
+def _fields(both, n):
+    """Fields of a structure that was given, views of them, and own arrays under one name."""
+    total = 0.0
+    now = both.first
+    for k in range(n):
+        if k % 3 == 0:
+            now = both.second
+        elif k % 3 == 1:
+            now = both.first[0:8]
+        else:
+            now = both.second + k
+        line = both.first
+        line[k % 8] += 1.0
+        _over()
+        total += _total(now) + _total(line[1:])
+    return now, both.second[2:], total
+
+
+@entry
+def structures(times, out):
+    """Structures that nobody else holds, let go of before what came out of them."""
+    for k in range(times):
+        both = Both(_made(1.0 + k % 3), _made(2.0))
+        now, part, total = _fields(both, k % 5)
+        one, _, _ = _fields(Both(now, _made(0.5)), k % 2)
+        _over()
+        out[0] += _total(now) + _total(part) + _total(one) + total
+
+
 @entry
 def indexed(x, y, z, places, marks, out):
     """Numbers of every kind as an index, from both ends."""
@@ -284,6 +325,7 @@ _LOOPS = {
     "keeps": (keeps, ()),
     "perhaps": (perhaps, ()),
     "generated": (generated, ()),
+    "structures": (structures, ()),
 }
 
 
@@ -298,7 +340,7 @@ def test_loops_over_own_and_given_arrays_give_what_python_gives(name, in_python)
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="the system does not tell")
-@pytest.mark.parametrize("name", ["views", "tuples", "walks", "keeps", "perhaps"])
+@pytest.mark.parametrize("name", ["views", "tuples", "walks", "keeps", "perhaps", "structures"])
 def test_no_array_is_kept_for_ever(name):
     function, given = _LOOPS[name]
     function(1000, *given, np.zeros(2))

@@ -8,8 +8,6 @@ n . p is constant, so with E = x_B + c - x_A and m = n turned by a right angle
 Parameters: s_A (2), s_B (2), n_0 (2), theta_0.
 """
 
-import math
-
 from mdstopo.jit import kernel
 from mdstopo.mechanics.joints.revolute import arms
 
@@ -18,8 +16,8 @@ from mdstopo.mechanics.joints.revolute import arms
 def _frame(par, w):  # type: ignore[no-untyped-def]
     """n, E, c: normal, second point from the first centre of mass, its arm; global axes."""
     _, _, cx, cy = arms(par, w)
-    ca = math.cos(w[2])
-    sa = math.sin(w[2])
+    ca = w[6]
+    sa = w[7]
     nx = ca * par[4] - sa * par[5]
     ny = sa * par[4] + ca * par[5]
     return nx, ny, w[3] + cx - w[0], w[4] + cy - w[1], cx, cy

@@ -7,14 +7,26 @@ import math
 
 from mdstopo.jit import kernel
 
+#: places of w: x, y, psi of both bodies, then cos and sin of both angles, which many joints share
+PLACES = 10
+
+
+@kernel
+def turn(w):  # type: ignore[no-untyped-def]
+    """Fill in cos and sin of both angles of w (PLACES,)."""
+    w[6] = math.cos(w[2])
+    w[7] = math.sin(w[2])
+    w[8] = math.cos(w[5])
+    w[9] = math.sin(w[5])
+
 
 @kernel
 def arms(par, w):  # type: ignore[no-untyped-def]
     """px, py, cx, cy: the points relative to their centres of mass, global axes."""
-    ca = math.cos(w[2])
-    sa = math.sin(w[2])
-    cb = math.cos(w[5])
-    sb = math.sin(w[5])
+    ca = w[6]
+    sa = w[7]
+    cb = w[8]
+    sb = w[9]
     return (
         ca * par[0] - sa * par[1],
         sa * par[0] + ca * par[1],

@@ -1,6 +1,7 @@
 """The joints: what each contributes to the constrained equations, by its code, and its parameters from the case.
 
-w, wd, wdd (6,): coordinates of the first and the second body, and their time derivatives. The equations of motion are
+w (PLACES,): coordinates of the first and the second body, with the turns of `revolute.turn`; wd, wdd (6,): their time
+derivatives. The equations of motion are
 M a + Phi_q^T lam = F, so the force of a joint on its first body is -Phi_q^T lam.
 """
 

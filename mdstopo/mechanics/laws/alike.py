@@ -7,9 +7,11 @@ preload; r (POSE,): the relative pose. A member of zero length has no direction:
 elongation has.
 """
 
+import numpy as np
+
 from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
+from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 
 @kernel
@@ -182,3 +184,46 @@ def alike_design(member, width, start, stop, p, r, u, weight, out):  # type: ign
         _, _, _, bx, by, bt, x = _seen(member, width, i, r)
         f = p[0] * x + (p[2] + p[1] * (bx * r[4] + by * r[5] + bt * r[6]))
         store(out, i, load(out, i) + f * (bx * u[0] + by * u[1] + bt * u[2]) + half * (x * x))
+
+
+@kernel
+def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ignore[no-untyped-def]
+    """`alike_design` without damping, preload and energy, of stiffness k, summed over the poses of pair p.
+
+    rel (S, n_pair, POSE), u (S, n_pair, 3).
+    """
+    for i in range(start, stop, lanes()):
+        x = load(member, i)
+        y = load(member, width + i)
+        v = load(member, 2 * width + i)
+        w = load(member, 3 * width + i)
+        free = load(member, 4 * width + i)
+        work = zero()
+        for j in range(rel.shape[0]):
+            r = rel[j, p]
+            e = u[j, p]
+            ax = r[2] * v - r[3] * w
+            ay = r[3] * v + r[2] * w
+            rx = ax - (x - r[0])
+            ry = ay - (y - r[1])
+            r2 = rx * rx + ry * ry
+            z = inverse_root(r2, ZERO_LENGTH_SQUARED)
+            work += (r2 * z - free) * z * (rx * e[0] + ry * e[1] + (ax * ry - ay * rx) * e[2])
+        store(out, i, load(out, i) + k * work)
+
+
+@kernel
+def far(member, width, start, stop, before, after):  # type: ignore[no-untyped-def]
+    """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move."""
+    near = zero() - np.inf
+    for i in range(start, stop, lanes()):
+        px = load(member, i)
+        py = load(member, width + i)
+        u = load(member, 2 * width + i)
+        v = load(member, 3 * width + i)
+        rx = before[2] * u - before[3] * v - (px - before[0])
+        ry = before[3] * u + before[2] * v - (py - before[1])
+        ux = after[2] * u - after[3] * v - (px - after[0]) - rx
+        uy = after[3] * u + after[2] * v - (py - after[1]) - ry
+        near = larger(1.001 * (ux * ux + uy * uy) - (rx * rx + ry * ry), near)
+    return largest(near) < -ZERO_LENGTH_SQUARED

@@ -1,0 +1,55 @@
+"""What is known of a scene before it moves, and spares work at every balance."""
+
+import numpy as np
+
+from mdstopo.general.model import INERTER
+from mdstopo.jit import kernel
+from mdstopo.mechanics.laws.table import SPRING
+
+#: places of a desk's `switches`: whether the mass is diagonal; whether the factors on the desk are those of the joints'
+#: matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small eigenvalue
+DIAGONAL, OF_JOINTS, DAMPED, THOROUGH = range(4)
+
+
+@kernel
+def switches_of(model):  # type: ignore[no-untyped-def]
+    """The switches at first."""
+    switches = np.zeros(4, np.int64)
+    switches[DIAGONAL] = 1 if is_diagonal(model) else 0
+    switches[DAMPED] = 1 if is_damped(model) else 0
+    switches[THOROUGH] = 1
+    return switches
+
+
+@kernel
+def is_diagonal(model):  # type: ignore[no-untyped-def]
+    """Whether the mass is: nothing but inerters couples accelerations."""
+    inertial = 0
+    for k in range(model.block.shape[0]):
+        inertial += model.block[k, 3] == INERTER
+    return inertial == 0
+
+
+@kernel
+def is_damped(model):  # type: ignore[no-untyped-def]
+    """Whether forces may depend on rates: all but springs and bushings without damping are taken to do so."""
+    damped = model.contact_pair.shape[0]
+    for k in range(model.block.shape[0]):
+        damped += model.block[k, 3] != SPRING or model.law[k, 1] != 0.0
+    for j in range(model.bushing.shape[0]):
+        for i in range(8, 11):
+            damped += model.bushing[j, i] != 0.0
+    return damped != 0
+
+
+@kernel
+def carriers(model):  # type: ignore[no-untyped-def]
+    """(n_pair,): 1 where members, bushings or contacts act between two bodies, 0 where only joints do."""
+    found = np.zeros(model.pair.shape[0], np.int64)
+    for k in range(model.block.shape[0]):
+        found[model.block[k, 0]] = 1
+    for j in range(model.bushing_pair.shape[0]):
+        found[model.bushing_pair[j]] = 1
+    for j in range(model.contact_pair.shape[0]):
+        found[model.contact_pair[j]] = 1
+    return found
