@@ -28,8 +28,8 @@ from mdstopo.mechanics.assembly import (
 )
 
 #: what the windows of one simulation work in: at nodes (first index), of pairs, of the state at the start; rows (10,
-#: nodes, W) and vectors (11, W) as in `rows`. Made once, by a function of its own: arrays that a kernel is given cost
-#: it no counting of references
+#: nodes, W) and vectors (11, W) as in `rows`: those that `balance` works in are rows 2 to 4, `gauss` names the others.
+#: Made once, by a function of its own: arrays that a kernel is given cost it no counting of references
 Room = namedtuple("Room", "t rel sums K C turn dense rows vectors motion noise scale rel0 K0 C0")
 
 #: coordinates up to which tangents are multiplied as dense matrices
@@ -48,7 +48,7 @@ def balance(  # type: ignore[no-untyped-def]
     k = own.K
     c = own.C
     turn = own.turn
-    rest = own.rows[2]
+    rest = own.rows[2]  # M^-1 f, to which dense products are added; rhs is f and the products by pairs
     dx = own.rows[3]
     rhs = own.rows[4]
     dense = own.dense.shape[2] > 0

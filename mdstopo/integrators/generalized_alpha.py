@@ -99,7 +99,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
 
     tables: (1,) spectral radius. strength: (3, M_padded). step: longest step, s; segments are divided equally.
     newton_tolerance: correction relative to the motion after which the next would be rounding. work: counts, added
-    to. Where `steps` is too small NEEDS_ROOM comes with the number of steps (two more stages a segment).
+    to. NEEDS_ROOM, before any step is taken, where `steps` is too small (there are two more stages a segment).
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -150,7 +150,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
         return STEP_LIMIT, 0
     total = int(wanted)
     if total + 1 > steps.t.shape[0] or total + 2 * n_segment > steps.scalar.shape[0]:
-        return NEEDS_ROOM, total
+        return NEEDS_ROOM, 0
 
     count = 0
     stages = 0

@@ -89,17 +89,20 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
 
 @kernel
 def _row(block, k, at, stop):  # type: ignore[no-untyped-def]
-    """How many members of block k lie one after the other from `at` on, the first's variable, and where the next do."""
+    """How many members of block k lie one after the other from `at` on, the first's variable, and where the next do.
+
+    Behind the last row of a grid there may be eight places that are none of it: blocks are padded to sixteen.
+    """
     width = block[k, 6]
     if width == 0:
-        return min(stop, end_of(block, k)) - at, block[k, 4] + at - block[k, 1], stop
-    if at >= end_of(block, k):
+        return min(stop, _end(block, k)) - at, block[k, 4] + at - block[k, 1], stop
+    if at >= _end(block, k):
         return 0, 0, stop
     return block[k, 7], block[k, 4] + (at - block[k, 1]) // width * block[k, 7], at + width
 
 
 @kernel
-def end_of(block, k):  # type: ignore[no-untyped-def]
+def _end(block, k):  # type: ignore[no-untyped-def]
     """Where the members of block k end, and of a grid the places of its last row."""
     return block[k, 1] + (block[k, 5] if block[k, 6] == 0 else block[k, 5] // block[k, 7] * block[k, 6])
 

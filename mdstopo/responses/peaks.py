@@ -110,8 +110,8 @@ def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-
 def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, pull, work):  # type: ignore[no-untyped-def]
     """Fill peaks (rows, 4) with the highest peaks of sign g (VALUE holds g); return how many.
 
-    Only peaks within `closeness` (relative) of the highest are refined and kept. Out: pull (2, n_pair, 3), E_xi at the
-    start and at the end.
+    Only peaks within `closeness` (relative) of the highest are refined and kept. Out: the first two of pull
+    (2 or more, n_pair, 3), E_xi at the start and at the end.
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]

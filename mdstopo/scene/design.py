@@ -13,6 +13,9 @@ from mdstopo.jit import vector_entry
 class Design:
     """The numbers of the design that is being evaluated; the arrays stay, and the next design overwrites them.
 
+    Drivers compute in `values`, and put designs of their own there (trajectories, the default step): so every
+    evaluation begins with `take`.
+
     values (N + P,): alpha, then the values of the case's variables. rows (n_con, N + P): coefficients of the volume
     rows, zeros in those of other constraints. excess (n_con,): rows values - bounds.
     """

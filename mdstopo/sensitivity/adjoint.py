@@ -16,6 +16,9 @@ from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 
+#: where energies are looked at: `find_peaks` has been at both ends already
+AT_START, AT_END, ELSEWHERE = range(3)
+
 
 @kernel
 def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, work):  # type: ignore[no-untyped-def]
@@ -75,7 +78,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
     weight = np.zeros(stages if integral else 1)
     bar = np.zeros((stages if integral else 0, n))
     mu_q = np.empty(n)
-    pull = np.empty((3, n_pair, 3))  # E_xi at the start, at the end, elsewhere
+    pull = np.empty((3, n_pair, 3))  # E_xi at AT_START, AT_END, ELSEWHERE
     found = 1
     watched = not integral and reduction != FINAL
     if integral:
@@ -116,19 +119,19 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     v[d] = state[1, d]
             else:
                 w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
-            at = 2
+            at = ELSEWHERE
             if watched and k == 0 and c == 0.0:
-                at = 0
+                at = AT_START
             elif watched and k + 1 == count and c >= 1.0:
-                at = 1
-            if at == 2:
+                at = AT_END
+            if at == ELSEWHERE:
                 value, _ = energy_at(pair, springs, strength, q, v, rel, sums)
                 work[0] += 1
                 if reduction == FINAL:
                     rows[0, 1] = value
                 for p in range(n_pair):
                     for j in range(3):
-                        pull[2, p, j] = sums[0, p, 4 + j]
+                        pull[ELSEWHERE, p, j] = sums[0, p, 4 + j]
             else:
                 relative_pose(pair, q, v, rel[0])
             energy_slope(pair, rel[0], pull[at], weight[0], mu_q)

@@ -69,7 +69,8 @@ def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-unt
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
-    one stretch between stages.
+    one stretch between stages. `model` is the whole one, whose padding repeats its members: other padding would have a
+    length of its own.
     """
     meeting[0] = -1
     pair = model.pair

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mdstopo.integrators.steps import STEP_LIMIT
+from mdstopo.integrators.driver import CLOSENESS, NEWTON_TOLERANCE
+from mdstopo.integrators.steps import NEEDS_ROOM, STEP_LIMIT
 from tests.integrators.scenes import Bench, Group, figure_3, random_scene, solved
 
 FREE = [Group(0, 1, 40)]
@@ -115,3 +116,15 @@ def test_too_many_steps_are_refused_before_any_is_taken():
     bench = Bench(random_scene(FREE, MASSES))
     assert bench.run(np.ones(40), step=1e-9) == STEP_LIMIT
     assert bench.work[2] == 0
+
+
+def test_room_is_asked_for_before_any_step_is_taken():
+    bench = solved(random_scene(FREE, MASSES), np.ones(40), step=0.01, gradient=False)
+    settings = np.array([1e-10, NEWTON_TOLERANCE, 3e-6, CLOSENESS])  # 100,000 steps: far more than there is room for
+    work = np.zeros_like(bench.work)
+    code, count, time = bench.entry.simulate(
+        *bench.packed, bench.tables, bench.alpha, bench.scene.damped, True, settings, bench.limits, bench.room,
+        bench.room_ints, bench.strength, work,
+    )  # fmt: skip
+    assert (code, count, time) == (NEEDS_ROOM, 0, bench.t[0])
+    assert work[2] == 0
