@@ -225,7 +225,7 @@ def energies(scene: Scene, q):
     """Stored energy of every design member (N,) at unit strength in the pose q (n,), and mu (N,)."""
     m = scene.model
     out, power = np.zeros(scene.n_design), np.zeros(scene.n_design)
-    for (pair, start, _, _, first, count), mu in zip(m.block.tolist(), m.power.tolist(), strict=True):
+    for (pair, start, _, _, first, count, _, _), mu in zip(m.block.tolist(), m.power.tolist(), strict=True):
         if first < 0:
             continue
         ends = []
