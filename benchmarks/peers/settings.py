@@ -45,7 +45,7 @@ def ring() -> Iterator[Entry]:
 def forward(hinges: bool) -> Iterator[Entry]:
     """Without gradients."""
     for integrator in ("runge_kutta",) if hinges else ("gauss", "runge_kutta"):
-        for tolerance in (5e-1, 1e-1, 1e-2, *TOLERANCES[:6]):
+        for tolerance in (5e-1, 3e-1, 1e-1, 3e-2, 1e-2, *TOLERANCES[:6]):
             yield Entry(OURS, {"integrator": integrator, "tolerance": tolerance}, gradient=False)
     for steps in (20, 100, 400):
         yield Entry("exudyn", {"steps": steps}, gradient=False)
