@@ -165,6 +165,8 @@ class GeneralDriver:
         """A member (padded) that grazes where something is looked at, or -1."""
         if self.where[2] >= 0:
             return int(self.where[2])
+        if self.events == 0:
+            return -1
         steps, events = int(self.limits[1]), int(self.limits[3])
         event = self.room_ints[4 * (steps + 1) :].reshape(events, 5)[: self.events]
         for state, member, *_ in event[event[:, GRAZES] != 0].tolist():
@@ -175,7 +177,7 @@ class GeneralDriver:
 
     def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
         """Rows and gradients of response j, reduced over time."""
-        t = self.states()[0][: count + 1].copy()
+        t = self.states()[0][: count + 1]
         rows = self.rows[j]
         if reduction in INTEGRALS:
             total = self._pull(j, rows[0], INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
@@ -185,13 +187,13 @@ class GeneralDriver:
             self.found[j] = 1
             return
 
-        see = partial(self.see, j, count)
         if compete(self.scene.model.response[j, 0], reduction):
-            found = ranked(members_peaks(self, j, t, reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
+            found = ranked(members_peaks(self, j, t.copy(), reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
         elif reduction == "final":
-            value, rate, who = self._see_end(j, count)
+            value, rate, who = self._see_end(j, count).tolist()
             found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
         else:
+            see, t = partial(self.see, j, count), t.copy()
             samples = sample(t, see)
             found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, CLOSENESS)]
             found = ranked(found, CLOSENESS, ROWS, t[-1] - t[0])

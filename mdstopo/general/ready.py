@@ -1,6 +1,7 @@
 """Calls of compiled entries whose arguments are nearly always the same arrays."""
 
 from collections.abc import Callable
+from operator import is_, itemgetter
 from typing import Any
 
 
@@ -10,13 +11,14 @@ class Ready:
     """
 
     def __init__(self) -> None:
-        self._kept: dict[str, tuple[tuple[Any, ...], list[int], list[int], Callable[..., Any]]] = {}
+        #: by name: the arguments that stay, how they are taken from all, places of the others, the call
+        self._kept: dict[str, tuple[tuple[Any, ...], Callable[..., Any], list[int], Callable[..., Any]]] = {}
 
     def __call__(self, name: str, entry: Any, *arguments: Any) -> Any:
-        """entry(*arguments); the types of arguments are always the same under one name."""
+        """entry(*arguments), two arrays or more among them; their types are always the same under one name."""
         kept = self._kept.get(name)
-        if kept is None or any(arguments[k] is not kept[0][k] for k in kept[1]):
+        if kept is None or not all(map(is_, kept[1](arguments), kept[0])):
             numbers = [k for k, each in enumerate(arguments) if isinstance(each, (bool, int, float))]
-            others = [k for k in range(len(arguments)) if k not in numbers]
-            kept = self._kept[name] = arguments, others, numbers, entry.prepare(*arguments)
+            stay = itemgetter(*(k for k in range(len(arguments)) if k not in numbers))
+            kept = self._kept[name] = stay(arguments), stay, numbers, entry.prepare(*arguments)
         return kept[3](*[(k, arguments[k]) for k in kept[2]])
