@@ -15,7 +15,7 @@ from mdstopo.general.model import INERTER
 from mdstopo.general.switches import DAMPED
 from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangents
-from mdstopo.mechanics.geometry import add_pair_force
+from mdstopo.mechanics.geometry import add_pair_force, fill_pose
 
 
 @kernel
@@ -32,29 +32,11 @@ def turned_pose(pair, turned, q, v, rel):  # type: ignore[no-untyped-def]
     for p in range(pair.shape[0]):
         one = pair[p, 0]
         two = pair[p, 1]
-        a = 3 * one
-        b = 3 * two
         ca = turned[one, 0]
         sa = turned[one, 1]
         cb = turned[two, 0]
         sb = turned[two, 1]
-        x = q[b] - q[a]
-        y = q[b + 1] - q[a + 1]
-        u = v[b] - v[a]
-        w = v[b + 1] - v[a + 1]
-        dx = ca * x + sa * y
-        dy = ca * y - sa * x
-        omega = v[a + 2]
-        rel[p, 0] = dx
-        rel[p, 1] = dy
-        rel[p, 2] = ca * cb + sa * sb
-        rel[p, 3] = ca * sb - sa * cb
-        rel[p, 4] = ca * u + sa * w + omega * dy
-        rel[p, 5] = ca * w - sa * u - omega * dx
-        rel[p, 6] = v[b + 2] - omega
-        rel[p, 7] = ca
-        rel[p, 8] = sa
-        rel[p, 9] = omega
+        fill_pose(pair, p, q, v, ca, sa, ca * cb + sa * sb, ca * sb - sa * cb, rel)
 
 
 @kernel

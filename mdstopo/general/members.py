@@ -15,6 +15,7 @@ import math
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
+from mdstopo.mechanics.grids import add_forces, add_tangent
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
 from mdstopo.mechanics.laws.table import CRUSH, SPRING, law, law_first_set, law_start
@@ -145,25 +146,10 @@ def add_elastic(member, strength, start, stop, k, r, counted, tangent, o):  # ty
     scale = strength[0, start:stop]
     if tangent:
         x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(px, py, qx, qy, l0, scale, r[0], r[1], r[2], r[3])
-        o[7] += k * kxx
-        o[8] += k * kxy
-        o[9] += k * kxt
-        o[10] += k * kxy
-        o[11] += k * kyy
-        o[12] += k * kyt
-        o[13] += k * kxt
-        o[14] += k * kyt
-        o[15] += k * ktt
+        add_tangent((k * kxx, k * kxy, k * kyy, k * kxt, k * kyt, k * ktt), o)
     else:
         x, y, t, e = elastic_force(px, py, qx, qy, l0, scale, r[0], r[1], r[2], r[3])
-    o[0] += k * x
-    o[1] += k * y
-    o[2] += k * t
-    if counted:
-        o[3] += k * e
-        o[4] -= k * x
-        o[5] -= k * y
-        o[6] -= k * t
+    add_forces((k * x, k * y, k * t, k * e), counted, o)
 
 
 @kernel

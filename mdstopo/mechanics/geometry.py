@@ -19,28 +19,33 @@ POSE = 10
 def relative_pose(pair, q, v, rel):  # type: ignore[no-untyped-def]
     """Fill rel (n_pair, POSE) from one state q, v (n,)."""
     for p in range(pair.shape[0]):
-        a = 3 * pair[p, 0]
-        b = 3 * pair[p, 1]
-        ca = math.cos(q[a + 2])
-        sa = math.sin(q[a + 2])
-        theta = q[b + 2] - q[a + 2]
-        x = q[b] - q[a]
-        y = q[b + 1] - q[a + 1]
-        u = v[b] - v[a]
-        w = v[b + 1] - v[a + 1]
-        dx = ca * x + sa * y
-        dy = ca * y - sa * x
-        omega = v[a + 2]
-        rel[p, 0] = dx
-        rel[p, 1] = dy
-        rel[p, 2] = math.cos(theta)
-        rel[p, 3] = math.sin(theta)
-        rel[p, 4] = ca * u + sa * w + omega * dy
-        rel[p, 5] = ca * w - sa * u - omega * dx
-        rel[p, 6] = v[b + 2] - omega
-        rel[p, 7] = ca
-        rel[p, 8] = sa
-        rel[p, 9] = omega
+        turn = q[3 * pair[p, 0] + 2]
+        theta = q[3 * pair[p, 1] + 2] - turn
+        fill_pose(pair, p, q, v, math.cos(turn), math.sin(turn), math.cos(theta), math.sin(theta), rel)
+
+
+@kernel
+def fill_pose(pair, p, q, v, ca, sa, c, s, rel):  # type: ignore[no-untyped-def]
+    """Fill rel[p] from one state and the cos and sin of psi_A and of theta."""
+    a = 3 * pair[p, 0]
+    b = 3 * pair[p, 1]
+    x = q[b] - q[a]
+    y = q[b + 1] - q[a + 1]
+    u = v[b] - v[a]
+    w = v[b + 1] - v[a + 1]
+    dx = ca * x + sa * y
+    dy = ca * y - sa * x
+    omega = v[a + 2]
+    rel[p, 0] = dx
+    rel[p, 1] = dy
+    rel[p, 2] = c
+    rel[p, 3] = s
+    rel[p, 4] = ca * u + sa * w + omega * dy
+    rel[p, 5] = ca * w - sa * u - omega * dx
+    rel[p, 6] = v[b + 2] - omega
+    rel[p, 7] = ca
+    rel[p, 8] = sa
+    rel[p, 9] = omega
 
 
 @kernel

@@ -8,12 +8,11 @@ not turn the points of the second grid once for each member, and sum most of wha
 import numpy as np
 
 from mdstopo.case.model import MemberGroup
+from mdstopo.native.vector import WIDE
 from mdstopo.scene.model import CHUNK, COUNT, LENGTH, START, WIDTH, IndexArray
 
-#: numbers in the widest vector
-LANES = 8
 #: places in a row at least: fewer vectors than two are not worth a row's own sums
-NARROWEST = 2 * LANES
+NARROWEST = 2 * WIDE
 #: places for each member at most: kernels for grids take some 0.7 of the others' time for a place (`carrying` weighs
 #: members of grids and others by the same share), and padding costs memory and the passes that know no grids too
 WASTE = 1.25
@@ -28,9 +27,9 @@ def row_of(group: MemberGroup, elastic: bool) -> tuple[int, int]:
     p, q = group.from_index, group.to_index
     other = np.flatnonzero(p != p[0])
     length = int(other[0]) if len(other) else len(p)
-    width = -(-length // LANES) * LANES
+    width = -(-length // WIDE) * WIDE
     if width % STRIDE == 0:
-        width += LANES
+        width += WIDE
     rows = len(p) // length
     if not elastic or len(p) % length or rows < FEWEST or not NARROWEST <= width <= min(WASTE * length, CHUNK):
         return 0, 0

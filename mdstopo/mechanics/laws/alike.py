@@ -10,7 +10,7 @@ elongation has.
 import numpy as np
 
 from mdstopo.jit import kernel
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_work
 from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 
@@ -200,15 +200,7 @@ def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ign
         free = load(member, 4 * width + i)
         work = zero()
         for j in range(rel.shape[0]):
-            r = rel[j, p]
-            e = u[j, p]
-            ax = r[2] * v - r[3] * w
-            ay = r[3] * v + r[2] * w
-            rx = ax - (x - r[0])
-            ry = ay - (y - r[1])
-            r2 = rx * rx + ry * ry
-            z = inverse_root(r2, ZERO_LENGTH_SQUARED)
-            work += (r2 * z - free) * z * (rx * e[0] + ry * e[1] + (ax * ry - ay * rx) * e[2])
+            work += elastic_work(x, y, v, w, free, rel[j, p], u[j, p])
         store(out, i, load(out, i) + k * work)
 
 

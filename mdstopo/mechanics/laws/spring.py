@@ -281,17 +281,23 @@ def elastic_design(px, py, qx, qy, l0, k, pose, u, out):  # type: ignore[no-unty
         free = load(l0, i)
         work = zero()
         for j in range(pose.shape[0]):
-            c = pose[j, 2]
-            s = pose[j, 3]
-            ax = c * v - s * w
-            ay = s * v + c * w
-            rx = ax - (x - pose[j, 0])
-            ry = ay - (y - pose[j, 1])
-            r2 = rx * rx + ry * ry
-            z = inverse_root(r2, ZERO_LENGTH_SQUARED)
-            along = rx * u[j, 0] + ry * u[j, 1] + (ax * ry - ay * rx) * u[j, 2]
-            work += (r2 * z - free) * z * along
+            work += elastic_work(x, y, v, w, free, pose[j], u[j])
         store(out, i, load(out, i) + load(k, i) * work)
+
+
+@kernel
+def elastic_work(x, y, v, w, free, pose, u):  # type: ignore[no-untyped-def]
+    """Delta (b . u) of the members with P = (x, y), Q = (v, w) and these free lengths at one pose."""
+    c = pose[2]
+    s = pose[3]
+    ax = c * v - s * w
+    ay = s * v + c * w
+    rx = ax - (x - pose[0])
+    ry = ay - (y - pose[1])
+    r2 = rx * rx + ry * ry
+    z = inverse_root(r2, ZERO_LENGTH_SQUARED)
+    along = rx * u[0] + ry * u[1] + (ax * ry - ay * rx) * u[2]
+    return (r2 * z - free) * z * along
 
 
 @member_kernel
