@@ -68,6 +68,11 @@ def largest(vector: Floats) -> float:
     return float(vector.max())
 
 
+def negative(vector: Floats) -> int:
+    """Bit k is set where the number in lane k is below zero."""
+    return int(((vector < 0.0) << np.arange(len(vector))).sum())
+
+
 @when_compiling
 def _register() -> None:
     """Have Numba know them."""

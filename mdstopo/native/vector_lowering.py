@@ -145,6 +145,11 @@ def _unary(build: Any, name: str, x: Any) -> Any:
     return build.call(cgutils.get_or_insert_function(build.module, kind, f"llvm.{name}.v{_LANES}f64"), [x])
 
 
+def _negative(build: Any, _kinds: Any, arguments: Any) -> Any:
+    bits = build.bitcast(build.fcmp_ordered("<", arguments[0], _constant(0.0)), ir.IntType(_LANES))
+    return build.zext(bits, ir.IntType(64))
+
+
 def _inverse_root(build: Any, _kinds: Any, arguments: Any) -> Any:
     x, floor = arguments
     root = _refined if _AVX512 else _divided
@@ -186,3 +191,4 @@ _implement(vector.largest, (VECTOR,), types.float64, _folded(_larger_of))
 _implement(vector.larger, (VECTOR, VECTOR), VECTOR, lambda build, _kinds, both: _larger_of(build, *both))
 _implement(vector.magnitude, (VECTOR,), VECTOR, lambda build, _kinds, given: _unary(build, "fabs", given[0]))
 _implement(vector.inverse_root, (VECTOR, types.float64), VECTOR, _inverse_root)
+_implement(vector.negative, (VECTOR,), types.int64, _negative)

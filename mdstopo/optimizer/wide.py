@@ -22,8 +22,9 @@ from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.wide_kernels import COST, HIGH, LOW, SAMPLE, SLOTS, wide_minimum, wide_rows
-from mdstopo.optimizer.wide_passes import PIECE, wide_adapt, wide_change, wide_largest, wide_residual, wide_sum
+from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
+from mdstopo.optimizer.wide_passes import PIECE, wide_adapt, wide_change, wide_largest, wide_sum
+from mdstopo.optimizer.wide_slots import BLOCK, COST, HIGH, LOW, SLOTS
 
 Indices = NDArray[np.intp]
 T = TypeVar("T")
@@ -87,8 +88,12 @@ class Kept(Generic[T]):
             if all(one is other for one, other in zip(known, arrays, strict=True)):
                 return result
         result = self._function(*arrays)
-        self._kept = [(arrays, result), *self._kept[:1]]
+        self.tell(result, *arrays)
         return result
+
+    def tell(self, result: T, *arrays: Floats) -> None:
+        """What the function gives for these arrays is known."""
+        self._kept = [(arrays, result), *self._kept[:1]]
 
 
 class Measures:
@@ -99,6 +104,25 @@ class Measures:
         self.change = Kept(lambda x, y: largest_change(x, y, space.unit))
         self.excess = Kept(lambda x: excess(space, x))
         self.steepest = Kept(steepest)
+        self.room = Room()
+
+
+class Room:
+    """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
+
+    slots (SLOTS, N), place, found (N,), counts (2, blocks), x (N,).
+    """
+
+    def __init__(self) -> None:
+        self._n = -1
+
+    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
+        """Room for n variables; what it holds is of no account."""
+        if n != self._n:
+            self._n = n
+            place, found, counts = (np.empty(each, dtype=np.int64) for each in (n, n, (2, -(-n // BLOCK))))
+            self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n)
+        return self._arrays
 
 
 def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
@@ -129,19 +153,19 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     share = inf if power == 1.0 else 1.0 - settings.number("shift_margin")
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
     left = float(measures.excess(alpha)[0])
-    trial, slots = np.empty(n), np.empty((SLOTS, n))
-    place, found, x = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64), np.empty(n)
-    multiplier, miss, size, change, count = wide_minimum(
-        alpha, slope, cost, state.shift, lower, upper, limits, bound, left + bound, bool(linear.equal[0]), _stride(n),
-        1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, x,
+    trial, slots, place, found, counts, x = np.empty(n), *measures.room.of(n)
+    multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
+        alpha, slope, cost, state.shift, lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
+        _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, counts, x,
     )  # fmt: skip
-    size += abs(bound)
-    if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > 1e-9 * size and multiplier != 0.0):
+    if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
         return None
-    trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
+    if miss > ROUNDING * size or (linear.equal[0] and miss < -ROUNDING * size):
+        trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
+    else:
+        measures.change.tell((plain, scaled), trial, alpha)
     if not _decides(state, chosen, trial, lower, upper, power):
         return None
-    residual = wide_residual(alpha, slope, cost, lower, upper, multiplier, own, _threads(n, LIGHT))
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
     return Proposal(trial, float(state.rows[row]) + change, max(residual, slack))
 

@@ -21,36 +21,6 @@ def part(x: Floats, n: int, start: int, stop: int) -> Floats:
 
 
 @vector_entry
-def wide_residual(
-    alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float, steepest: float,
-    threads: int,
-) -> float:  # fmt: skip
-    """max |x - clip(x - (slope + multiplier cost)/steepest)|, at most what a step along -gradient moves."""
-    most = np.zeros(_pieces(len(alpha)))
-    counter = np.zeros(1, np.int64)
-    shared(_residuals, threads, (counter, alpha, slope, cost, lower, upper, multiplier, 1.0 / steepest, most))
-    return largest(most)
-
-
-@member_kernel
-def _residuals(
-    counter: Ints, alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float,
-    unit: float, out: Floats,
-) -> None:  # fmt: skip
-    room = np.empty(PIECE)
-    piece = taken(counter)
-    while piece < len(out):
-        start, stop = piece * PIECE, min((piece + 1) * PIECE, len(alpha))
-        x, g, a = alpha[start:stop], slope[start:stop], part(cost, len(alpha), start, stop)
-        low, high = part(lower, len(alpha), start, stop), part(upper, len(alpha), start, stop)
-        for i in range(stop - start):
-            moved = x[i] - (g[i] + multiplier * a[i]) * unit
-            room[i] = x[i] - max(low[i], min(high[i], moved))
-        out[piece] = largest(room[: stop - start])
-        piece = taken(counter)
-
-
-@vector_entry
 def wide_adapt(
     shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float, most: float,
     threads: int, step: Floats, shifts: Floats,

@@ -1,0 +1,287 @@
+"""Where the variables that a bracket of the multiplier leaves undecided go: the root of the volume row's sum.
+
+Arrays, one column for each such variable:
+
+    slots (9, n)  coefficient in the row, ends of the box, iterate, slope, distance of the shifts, kappa, and the
+                  multipliers between which the variable is inside its box; ends[:, k]
+    place (n,)    which variable it is
+    x (n,)        where it is
+"""
+
+import numpy as np
+
+from mdstopo.jit import inline, kernel, member_kernel
+from mdstopo.native.vector import lanes, load, negative
+from mdstopo.optimizer.powers import largest, primitives
+from mdstopo.optimizer.problem import Floats, Ints
+
+BLOCK = 1024
+SLOTS = 9
+COST, LOW, HIGH, ITERATE, SLOPE, REACH, KAPPA, FIRST, LAST = range(SLOTS)
+#: rows of the rooms that the passes below need, each of `BLOCK` numbers
+ROOM, WHOLE = 13, 4
+#: larger than any multiplier, small enough to be multiplied
+BEYOND = 1e200
+MAX_STEPS = 200
+#: smaller than any width that counts
+TINY = 1e-300
+
+
+@inline
+def box(
+    alpha: float, lower: float, upper: float, shift: float, move: float, trust: float, share: float
+) -> tuple[float, float, float, float]:
+    """Ends of the box, distance of the shifts, range."""
+    span = upper - lower if upper > lower else 1.0
+    reach = shift * span
+    most = min(min(move, trust * span), share * reach)
+    return max(lower, alpha - most), min(upper, alpha + most), reach, span
+
+
+@member_kernel
+def chosen(mark: Floats, n: int, found: Ints) -> int:
+    """Write into `found` which of the first n marks are below zero, in order; how many.
+
+    Both have room for n rounded up to vectors. What is found is filled up to whole vectors with the last of it.
+    """
+    for k in range(n, whole_vectors(n)):
+        mark[k] = 0.0
+    count = np.int64(0)
+    for k in range(0, n, lanes()):
+        bits = negative(load(mark, k))
+        if bits:
+            for j in range(lanes()):
+                found[count] = k + j
+                count += (bits >> j) & 1
+    for k in range(count, whole_vectors(count)):
+        found[k] = found[count - 1]
+    return count
+
+
+@inline
+def whole_vectors(n: int) -> int:
+    """n rounded up to a multiple of `lanes()`."""
+    return (n + lanes() - 1) // lanes() * lanes()
+
+
+@kernel
+def enter_slot(
+    slots: Floats, place: Ints, k: int, i: int, alpha: float, slope: float, cost: float, low: float, high: float,
+    reach: float, kappa: float,
+) -> None:  # fmt: skip
+    """Column k is variable i."""
+    place[k] = i
+    slots[COST, k], slots[LOW, k], slots[HIGH, k], slots[ITERATE, k] = cost, low, high, alpha
+    slots[SLOPE, k], slots[REACH, k], slots[KAPPA, k] = slope, reach, kappa
+
+
+@member_kernel
+def _derivative(
+    x: Floats, iterate: Floats, slope: Floats, reach: Floats, kappa: Floats, power: float, first: Floats, z: Floats,
+    out: Floats, whole: Ints,
+) -> None:  # fmt: skip
+    """The model's derivative by each variable; first: t^(power - 1), z = t - 1, where t is how far it is stretched."""
+    n = len(x)
+    for i in range(n):
+        step = x[i] - iterate[i]
+        z[i] = (step if slope[i] < 0.0 else -step) / reach[i]
+    primitives(z[:n], power, out[:n], whole)
+    for i in range(n):
+        first[i] = (1.0 + power * out[i]) / (1.0 + z[i])
+    for i in range(n):
+        out[i] = slope[i] * first[i] + kappa[i] * (x[i] - iterate[i])
+
+
+@member_kernel
+def bracket_slots(slots: Floats, n: int, power: float, room: Floats, whole: Ints) -> tuple[float, float]:
+    """The multipliers between which the variables of the slots are inside their boxes; the least and the largest."""
+    first, z, low, high = room[0], room[1], room[2], room[3]
+    least, most = BEYOND, -BEYOND
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        a, c, s = slots[COST, start:stop], slots[ITERATE, start:stop], slots[SLOPE, start:stop]
+        d, k = slots[REACH, start:stop], slots[KAPPA, start:stop]
+        _derivative(slots[LOW, start:stop], c, s, d, k, power, first, z, low, whole)
+        _derivative(slots[HIGH, start:stop], c, s, d, k, power, first, z, high, whole)
+        begin, end = slots[FIRST, start:stop], slots[LAST, start:stop]
+        for i in range(stop - start):
+            if a[i] == 0.0:  # always inside: the multiplier does not move it
+                begin[i], end[i] = -BEYOND, BEYOND
+            else:
+                one, other = -low[i] / a[i], -high[i] / a[i]
+                begin[i], end[i] = min(one, other), max(one, other)
+                least, most = min(least, begin[i]), max(most, end[i])
+    return least, most
+
+
+@member_kernel
+def _between(slots: Floats, start: int, stop: int, multiplier: float, stay: bool, share: Floats, x: Floats) -> None:
+    """Where the variables are for a multiplier if they moved evenly from one end of their box to the other; the share
+    of the way. Inside they stay where they are if `stay`."""
+    a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
+    first, last = slots[FIRST, start:stop], slots[LAST, start:stop]
+    n = stop - start
+    for i in range(n):
+        share[i] = min(max((multiplier - first[i]) / max(last[i] - first[i], TINY), 0.0), 1.0)
+    for i in range(n):
+        p, q = low[i], high[i]
+        up = share[i] if a[i] < 0.0 else 1.0 - share[i]
+        between = x[i] if stay else p + up * (q - p)
+        x[i] = q if up >= 1.0 else (p if up <= 0.0 else between)
+
+
+@member_kernel
+def _solved(
+    slots: Floats, start: int, multiplier: float, power: float, x: Floats, inside: Ints, count: int, room: Floats,
+    whole: Ints,
+) -> float:  # fmt: skip
+    """Where the multiplier sends those of a block's variables x that are inside their boxes, from where they are.
+
+    inside: which they are, in whole vectors. Returns the slope of their sum of a x.
+    """
+    first, z, g, h, a, low = room[1], room[2], room[3], room[4], room[5], room[6]
+    high, c, s, d, k, y = room[7], room[8], room[9], room[10], room[11], room[12]
+    n = whole_vectors(count)
+    for i in range(n):
+        at = start + inside[i]
+        a[i], low[i], high[i], c[i] = slots[COST, at], slots[LOW, at], slots[HIGH, at], slots[ITERATE, at]
+        s[i], d[i], k[i], y[i] = slots[SLOPE, at], slots[REACH, at], slots[KAPPA, at], x[inside[i]]
+    # the derivative is convex or concave: Newton's iteration ends on one side, or in the box's corner
+    for _ in range(MAX_STEPS):
+        _derivative(y[:n], c[:n], s[:n], d[:n], k[:n], power, first, z, g, whole)
+        for i in range(n):
+            h[i] = k[i] + abs(s[i]) * (1.0 - power) * first[i] / ((1.0 + z[i]) * d[i])
+        for i in range(n):
+            z[i] = min(max(y[i] - (g[i] + multiplier * a[i]) / h[i], low[i]), high[i]) - y[i]
+        for i in range(n):
+            y[i] += z[i]
+        for i in range(n):
+            z[i] /= max(high[i] - low[i], TINY)
+        if not largest(z[:n]) > 1e-9:  # what the next step would correct is that, squared
+            break
+    slope = 0.0
+    for i in range(count):
+        slope -= a[i] * a[i] / h[i]
+    for i in range(n):
+        x[inside[i]] = y[i]
+    return slope
+
+
+@member_kernel
+def _total(
+    slots: Floats, n: int, x: Floats, multiplier: float, power: float, exact: bool, room: Floats, whole: Ints
+) -> tuple[float, float]:
+    """Sum of a x over the slots for a multiplier, and its slope; fills x.
+
+    Exact from an x that is near; otherwise as if they moved evenly.
+    """
+    total, slope = 0.0, 0.0
+    share, mark, inside = room[0], room[1], whole[3]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        m = stop - start
+        a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
+        y = x[start:stop]
+        _between(slots, start, stop, multiplier, exact, share, y)
+        if not exact:
+            begin, end = slots[FIRST, start:stop], slots[LAST, start:stop]
+            for i in range(m):
+                within = share[i] * (1.0 - share[i]) > 0.0
+                slope -= abs(a[i]) * (high[i] - low[i]) / max(end[i] - begin[i], TINY) if within else 0.0
+        else:
+            for i in range(m):
+                mark[i] = -share[i] * (1.0 - share[i])
+            count = chosen(mark, m, inside)
+            if count:
+                slope += _solved(slots, start, multiplier, power, y, inside, count, room, whole)
+        for i in range(m):
+            total += a[i] * y[i]
+    return total, slope
+
+
+@member_kernel
+def root(
+    slots: Floats, n: int, ends: tuple[float, float], x: Floats, goal: float, near: float, guess: float, far: float,
+    power: float, rounding: float, exact: bool, room: Floats, whole: Ints,
+) -> tuple[float, float, int]:  # fmt: skip
+    """The multiplier in [near, far] for which the sum of a x is `goal`, or an end that comes as near as any.
+
+    ends: what `bracket_slots` found. Returns it with what is left of the difference, and whether the root must lie
+    further on (1) or back (-1); x is filled for it. The sum falls with the multiplier.
+    """
+    first, last = ends
+    near, far = max(near, min(first, far)), min(far, max(last, near))
+    multiplier = guess if near <= guess <= far else 0.5 * (near + far)
+    near_tried, far_tried = False, False
+    miss, width = 0.0, far - near
+    for step in range(MAX_STEPS):
+        total, slope = _total(slots, n, x, multiplier, power, exact, room, whole)
+        miss = total - goal
+        if abs(miss) <= rounding:
+            break
+        if miss > 0.0 and multiplier >= far:
+            return multiplier, miss, 1
+        if miss < 0.0 and multiplier <= near:
+            return multiplier, miss, -1
+        if miss > 0.0:
+            near, near_tried = multiplier, True
+        else:
+            far, far_tried = multiplier, True
+        following = multiplier - miss / slope if slope < 0.0 else (far if miss > 0.0 else near)
+        if near_tried and far_tried:
+            lags = step % 3 == 2 and far - near > 0.25 * width
+            if lags or not near < following < far:
+                following = 0.5 * (near + far)
+            if not near < following < far:
+                break
+        else:
+            following = min(max(following, near), far)
+        width = far - near if step % 3 == 2 else width
+        multiplier = following
+    return multiplier, miss, 0
+
+
+@member_kernel
+def settle(slots: Floats, n: int, x: Floats, goal: float, equal: bool, rounding: float) -> float:
+    """Take what is left of the sum's difference from `goal` from the variables inside their boxes; what is left then.
+
+    Without `equal` it may be negative.
+    """
+    a, low, high = slots[COST, :n], slots[LOW, :n], slots[HIGH, :n]
+    miss = 0.0
+    for _ in range(20):
+        total, square = 0.0, 0.0
+        for k in range(n):
+            total += a[k] * x[k]
+        miss = total - goal
+        if abs(miss) <= rounding or (miss < 0.0 and not equal):
+            break
+        for k in range(n):
+            square += a[k] * a[k] if (x[k] > low[k]) & (x[k] < high[k]) else 0.0
+        if square == 0.0:
+            break
+        push = miss / square
+        for k in range(n):
+            moved = min(max(x[k] - push * a[k], low[k]), high[k])
+            x[k] = moved if (x[k] > low[k]) & (x[k] < high[k]) else x[k]
+    return miss
+
+
+@member_kernel
+def promise(slots: Floats, n: int, x: Floats, power: float, room: Floats, whole: Ints) -> float:
+    """The model's change over the slots."""
+    change = 0.0
+    z, value = room[0], room[1]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        c, s, d = slots[ITERATE, start:stop], slots[SLOPE, start:stop], slots[REACH, start:stop]
+        k, y = slots[KAPPA, start:stop], x[start:stop]
+        m = stop - start
+        for i in range(m):
+            step = y[i] - c[i]
+            z[i] = (step if s[i] < 0.0 else -step) / d[i]
+        primitives(z[:m], power, value[:m], whole)
+        for i in range(m):
+            step = y[i] - c[i]
+            change += 0.5 * k[i] * step * step - abs(s[i]) * d[i] * value[i]
+    return change
