@@ -24,7 +24,7 @@ from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
 from mdstopo.optimizer.wide_passes import PIECE, wide_adapt, wide_change, wide_largest, wide_sum
-from mdstopo.optimizer.wide_slots import BLOCK, COST, HIGH, LOW, SLOTS
+from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 
 Indices = NDArray[np.intp]
 T = TypeVar("T")
@@ -110,7 +110,7 @@ class Measures:
 class Room:
     """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
 
-    slots (SLOTS, N), place, found (N,), counts (2, blocks), x (N,).
+    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,).
     """
 
     def __init__(self) -> None:
@@ -120,7 +120,7 @@ class Room:
         """Room for n variables; what it holds is of no account."""
         if n != self._n:
             self._n = n
-            place, found, counts = (np.empty(each, dtype=np.int64) for each in (n, n, (2, -(-n // BLOCK))))
+            place, found, counts = (np.empty(each, dtype=np.int64) for each in (n, n, (2, -(-n // PIECE))))
             self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n)
         return self._arrays
 

@@ -81,7 +81,7 @@ def wide_minimum(
 
     limits: power, move limit, trust, share of the shifts' distance, convex term over the range's unit. at_iterate: a x
     of the iterate. steepest: the unit of the residual. out (N,): the minimiser. slots, place, found, x: room for N;
-    counts (2, blocks). Returns the multiplier, what is left of the row, the size of its sums, the change of the model,
+    counts (2, pieces). Returns the multiplier, what is left of the row, the size of its sums, the change of the model,
     what `measure` finds, and how many columns of `slots` and `place` hold variables that may still be touched up.
     """
     power = limits[0]

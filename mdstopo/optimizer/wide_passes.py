@@ -14,6 +14,12 @@ from mdstopo.optimizer.problem import Floats, Ints
 PIECE = 8192
 
 
+@kernel
+def pieces(n: int) -> int:
+    """How many pieces n variables are."""
+    return (n + PIECE - 1) // PIECE
+
+
 @member_kernel
 def part(x: Floats, n: int, start: int, stop: int) -> Floats:
     """x[start:stop] of an array of n, or of one whose numbers are alike."""
@@ -53,7 +59,7 @@ def _adapted(
 @vector_entry
 def wide_change(x: Floats, y: Floats, unit: Floats, threads: int) -> tuple[float, float]:
     """max |x - y|, and the largest in its unit."""
-    plain, scaled = np.zeros(_pieces(len(x))), np.zeros(_pieces(len(x)))
+    plain, scaled = np.zeros(pieces(len(x))), np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_changes, threads, (counter, x, y, unit, plain, scaled))
     return largest(plain), largest(scaled)
@@ -78,7 +84,7 @@ def _changes(counter: Ints, x: Floats, y: Floats, unit: Floats, plain: Floats, s
 @vector_entry
 def wide_largest(x: Floats, threads: int) -> float:
     """max |x|; NaN where one is NaN."""
-    most = np.zeros(_pieces(len(x)))
+    most = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_sizes, threads, (counter, x, most))
     return largest(most)
@@ -95,7 +101,7 @@ def _sizes(counter: Ints, x: Floats, out: Floats) -> None:
 @vector_entry
 def wide_sum(a: Floats, x: Floats, threads: int) -> float:
     """sum of a x, of pieces and these in their order."""
-    sums = np.zeros(_pieces(len(x)))
+    sums = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_sums, threads, (counter, a, x, sums))
     total = 0.0
@@ -114,8 +120,3 @@ def _sums(counter: Ints, a: Floats, x: Floats, out: Floats) -> None:
             total += one[i] * other[i]
         out[piece] = total
         piece = taken(counter)
-
-
-@kernel
-def _pieces(n: int) -> int:
-    return (n + PIECE - 1) // PIECE

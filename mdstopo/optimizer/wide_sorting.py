@@ -1,26 +1,27 @@
 """Which variables a bracket of the volume row's multiplier decides: compiled passes over all of them.
 
 Most of very many variables rest: they sit on a bound, and every multiplier of the bracket keeps them there. Of those
-nothing is computed but the test; the others of a block, often a few per cent, are gathered first.
+nothing is computed but the test; the others, often a few per cent, are gathered first.
 
-Costs and bounds whose numbers are all alike may be given as the first few of them (`wide_passes`). Threads share blocks
-of variables; sums of the blocks are added in order, so that results do not depend on the number of threads.
+Costs and bounds whose numbers are all alike may be given as the first few of them (`wide_passes`). Threads share pieces
+of variables; sums of the pieces are added in order, so that results do not depend on the number of threads.
 """
 
 import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel
 from mdstopo.native.threads import shared, taken
+from mdstopo.native.vector import lanes, larger, load, magnitude, negative, store, total, zero
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
-from mdstopo.optimizer.wide_passes import part
-from mdstopo.optimizer.wide_slots import BLOCK, WHOLE, box, chosen, enter_slot, whole_vectors
+from mdstopo.optimizer.wide_passes import PIECE, part, pieces
+from mdstopo.optimizer.wide_slots import BLOCK, WHOLE, box, enter_slot, whole_vectors
 
-#: blocks that a thread takes at once
-GROUP = 8
 #: variables that move and from which on threads share what is done with them
 CROWD = 50_000
-#: rows of the room of a block
+#: terms that are added in vectors before these are added: long sums of like terms all round to one side
+_SUM = 256
+#: rows of room, each of `BLOCK` numbers
 _ROOM = 9
 
 
@@ -37,96 +38,115 @@ def sort_out(
 ) -> tuple[int, float, float, float]:  # fmt: skip
     """Fill `out` with the ends of the box where a multiplier in [near, far] leaves no doubt; slots for the others.
 
-    found, from each block's place on: those in doubt, then the others that do not rest; counts (2, blocks): of those in
+    found, from each piece's place on: those in doubt, then the others that do not rest; counts (2, pieces): of those in
     doubt and of both. Returns how many slots there are and, over the decided variables, the sums of a x and |a x| and
     the change of the model.
     """
-    blocks = (len(alpha) + BLOCK - 1) // BLOCK
-    sums = np.empty((blocks, 3))
-    begin = np.empty(blocks + 1, np.int64)
+    count = pieces(len(alpha))
+    sums = np.empty((count, 3))
+    begin = np.empty(count + 1, np.int64)
     counter = np.zeros(2, np.int64)
     shared(
-        _sort_blocks, threads,
+        _sort_pieces, threads,
         (counter[:1], alpha, slope, cost, shift, lower, upper, limits, near, far, out, found, sums, counts),
     )  # fmt: skip
     n: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
-    total, rest, size, change = 0.0, 0.0, 0.0, 0.0
-    for b in range(blocks):
-        change += sums[b, 0]
-        size += sums[b, 2]
-        # with what the addition loses: of a thousand blocks that were more than the row may be missed by
-        before = total
-        total += sums[b, 1]
-        rest += (before - (total - (total - before))) + (sums[b, 1] - (total - before))
-        begin[b] = n
-        n += counts[0, b]
-    begin[blocks] = n
+    held, size, change = 0.0, 0.0, 0.0
+    for piece in range(count):
+        change += sums[piece, 0]
+        held += sums[piece, 1]
+        size += sums[piece, 2]
+        begin[piece] = n
+        n += counts[0, piece]
+    begin[count] = n
     shared(
-        _slot_blocks, threads if n > CROWD else 1,
+        _slot_pieces, threads if n > CROWD else 1,
         (counter[1:], alpha, slope, cost, shift, lower, upper, limits, found, begin, slots, place),
     )  # fmt: skip
-    return n, total + rest, size, change
+    return n, held, size, change
 
 
 @kernel
-def _sort_blocks(
+def _sort_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
     limits: Floats, near: float, far: float, out: Floats, found: Ints, sums: Floats, counts: Ints,
 ) -> None:  # fmt: skip
-    """What `sort_out` does with the blocks that are taken; sums: (blocks, 3) change, a x, |a x|."""
-    room = np.empty((_ROOM, BLOCK))
-    whole = np.empty((WHOLE, BLOCK), dtype=np.int64)
+    """What `sort_out` does with the pieces that are taken; sums: (pieces, 3) change, a x, |a x|."""
+    room, whole = np.empty((_ROOM, BLOCK)), np.empty((WHOLE, BLOCK), dtype=np.int64)
+    which = np.empty(PIECE + BLOCK, dtype=np.int64)
     N = len(alpha)
-    group = taken(counter)
-    while group * GROUP * BLOCK < N:
-        for b in range(group * GROUP, min((group + 1) * GROUP, len(sums))):
-            start, stop = b * BLOCK, min((b + 1) * BLOCK, N)
-            c, s, a, y = alpha[start:stop], slope[start:stop], part(cost, N, start, stop), out[start:stop]
-            low, high = part(lower, N, start, stop), part(upper, N, start, stop)
-            moving = _moving(c, s, a, low, high, near, far, room[0], whole[3], y, sums[b])
-            doubt = 0
-            if moving:
-                doubt = _sort_block(
-                    c, s, a, shift[start:stop], low, high, limits, near, far, moving, room, whole, y, start,
-                    found[start:stop], sums[b],
-                )  # fmt: skip
-            counts[0, b], counts[1, b] = doubt, moving
-        group = taken(counter)
+    piece = taken(counter)
+    while piece < len(sums):
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, N)
+        c, s, a, y = alpha[start:stop], slope[start:stop], part(cost, N, start, stop), out[start:stop]
+        low, high = part(lower, N, start, stop), part(upper, N, start, stop)
+        moving = _moving(c, s, a, low, high, near, far, y, which, sums[piece])
+        places = np.array([0, moving])
+        for k in range(0, moving, BLOCK):
+            _sort_block(
+                c, s, a, shift[start:stop], low, high, limits, near, far, which[k : k + BLOCK], min(moving - k, BLOCK),
+                room, whole, y, start, found[start:stop], places, sums[piece],
+            )  # fmt: skip
+        counts[0, piece], counts[1, piece] = places[0], moving
+        piece = taken(counter)
 
 
 @member_kernel
 def _moving(
-    c: Floats, s: Floats, a: Floats, lower: Floats, upper: Floats, near: float, far: float, mark: Floats, which: Ints,
-    y: Floats, sums: Floats,
+    c: Floats, s: Floats, a: Floats, lower: Floats, upper: Floats, near: float, far: float, y: Floats, which: Ints,
+    sums: Floats,
 ) -> int:  # fmt: skip
-    """Which variables of a block do not rest, in whole vectors; how many. y: the iterate; sums: of those that rest."""
-    m = len(c)
-    for i in range(m):
-        most, least = s[i] + max(near * a[i], far * a[i]), s[i] + min(near * a[i], far * a[i])
-        rests = ((most < 0.0) & (c[i] == upper[i])) | ((least > 0.0) & (c[i] == lower[i]))
-        mark[i] = 0.0 if rests else -1.0
-    for i in range(m):
-        y[i] = c[i]
-    held, weight = 0.0, 0.0
-    for i in range(m):
-        spent = (1.0 + mark[i]) * (a[i] * c[i])
-        held += spent
-        weight += abs(spent)
-    sums[0], sums[1], sums[2] = 0.0, held, weight
-    return chosen(mark, m, which)
+    """Which variables of a piece do not rest, and those beyond its last whole vector; how many.
+
+    y: the iterate; sums: of those that rest.
+    """
+    n = len(c) // lanes() * lanes()
+    every = (1 << lanes()) - 1
+    count: int = np.int64(0)  # type: ignore[assignment]  # as in `sort_out`
+    sums[0], sums[1], sums[2] = 0.0, 0.0, 0.0
+    for start in range(0, n, _SUM):
+        held, weight = zero(), zero()
+        for i in range(start, min(start + _SUM, n), lanes()):
+            at, cost, push = load(c, i), load(a, i), load(s, i)
+            one, other = near * cost, far * cost
+            most, least = push + larger(one, other), larger(-1.0 * one, -1.0 * other) - push
+            store(y, i, at)
+            rising = negative(most) & ~negative(at - load(upper, i))
+            falling = negative(least) & ~negative(load(lower, i) - at)
+            moving = every & ~(rising | falling)
+            if not moving:
+                held += cost * at
+                weight += magnitude(cost * at)
+                continue
+            for k in range(lanes()):
+                moves = (moving >> k) & 1
+                which[count] = i + k
+                count += moves
+                spent = (1 - moves) * (a[i + k] * c[i + k])
+                sums[1] += spent
+                sums[2] += abs(spent)
+        sums[1] += total(held)
+        sums[2] += total(weight)
+    for i in range(n, len(c)):
+        which[count] = i
+        count += 1
+    return count
 
 
 @member_kernel
 def _sort_block(
     c: Floats, s: Floats, a: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats, near: float,
-    far: float, moving: int, room: Floats, whole: Ints, y: Floats, start: int, found: Ints, sums: Floats,
-) -> int:  # fmt: skip
-    """One block of `_sort_blocks`, of which whole[3] tells who does not rest; how many are in doubt."""
+    far: float, which: Ints, moving: int, room: Floats, whole: Ints, y: Floats, start: int, found: Ints, places: Ints,
+    sums: Floats,
+) -> None:  # fmt: skip
+    """A block's worth of a piece's variables that do not rest; places: where in `found` the next that is in doubt goes,
+    and behind the place of the next that is not."""
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
-    which = whole[3]
     slope, cost, reach, kappa, step = room[0], room[1], room[2], room[3], room[4]
     end, z, value, known = room[5], room[6], room[7], room[8]
     n = whole_vectors(moving)
+    for k in range(moving, n):
+        which[k] = which[moving - 1]
     for k in range(n):
         i = which[k]
         low, high, reach[k], span = box(c[i], lower[i], upper[i], shift[i], move, trust, share)
@@ -152,40 +172,38 @@ def _sort_block(
         spent = known[k] * cost[k] * end[k]
         held += spent
         weight += abs(spent)
-    doubt = 0
+    doubt, others = places[0], places[1]
     for k in range(moving):
+        i = which[k]
+        y[i] = end[k]
         if known[k] == 0.0:
-            found[doubt] = start + which[k]
+            found[doubt] = start + i
             doubt += 1
-    others = doubt
-    for k in range(moving):
-        if known[k] != 0.0:
-            found[others] = start + which[k]
-            others += 1
-            y[which[k]] = end[k]
+        else:
+            others -= 1
+            found[others] = start + i
+    places[0], places[1] = doubt, others
     sums[0] += change
     sums[1] += held
     sums[2] += weight
-    return doubt
 
 
 @kernel
-def _slot_blocks(
+def _slot_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
     limits: Floats, found: Ints, begin: Ints, slots: Floats, place: Ints,
 ) -> None:  # fmt: skip
-    """Slots for the variables in doubt, of the blocks that are taken; begin (blocks + 1): their first slots."""
+    """Slots for the variables in doubt, of the pieces that are taken; begin (pieces + 1): their first slots."""
     move, trust, share, convex = limits[1], limits[2], limits[3], limits[4]
-    blocks, N = len(begin) - 1, len(alpha)
-    group = taken(counter)
-    while group * GROUP < blocks:
-        for b in range(group * GROUP, min((group + 1) * GROUP, blocks)):
-            for n in range(begin[b], begin[b + 1]):
-                i = found[b * BLOCK + n - begin[b]]
-                end, other, a = one(lower, N, i), one(upper, N, i), one(cost, N, i)
-                low, high, reach, span = box(alpha[i], end, other, shift[i], move, trust, share)
-                enter_slot(slots, place, n, i, alpha[i], slope[i], a, low, high, reach, convex / span)
-        group = taken(counter)
+    N = len(alpha)
+    piece = taken(counter)
+    while piece < len(begin) - 1:
+        for n in range(begin[piece], begin[piece + 1]):
+            i = found[piece * PIECE + n - begin[piece]]
+            end, other, a = one(lower, N, i), one(upper, N, i), one(cost, N, i)
+            low, high, reach, span = box(alpha[i], end, other, shift[i], move, trust, share)
+            enter_slot(slots, place, n, i, alpha[i], slope[i], a, low, high, reach, convex / span)
+        piece = taken(counter)
 
 
 @kernel
@@ -195,39 +213,39 @@ def measure(
 ) -> tuple[float, float, float]:  # fmt: skip
     """Of the variables that do not rest, which are all that can tell: max |x - clip(x - (slope + multiplier
     cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range."""
-    blocks = counts.shape[1]
-    most = np.empty((blocks, 3))
+    count = counts.shape[1]
+    most = np.empty((count, 3))
     moving = 0
-    for b in range(blocks):
-        moving += counts[1, b]
+    for piece in range(count):
+        moving += counts[1, piece]
     counter = np.zeros(1, np.int64)
     shared(
-        _measure_blocks, threads if moving > CROWD else 1,
+        _measure_pieces, threads if moving > CROWD else 1,
         (counter, alpha, slope, cost, lower, upper, multiplier, 1.0 / steepest, out, found, counts, most),
     )  # fmt: skip
     residual, plain, scaled = 0.0, 0.0, 0.0
-    for b in range(blocks):
-        residual, plain, scaled = max(residual, most[b, 0]), max(plain, most[b, 1]), max(scaled, most[b, 2])
+    for piece in range(count):
+        residual = max(residual, most[piece, 0])
+        plain, scaled = max(plain, most[piece, 1]), max(scaled, most[piece, 2])
     return residual, plain, scaled
 
 
 @kernel
-def _measure_blocks(
+def _measure_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float,
     unit: float, out: Floats, found: Ints, counts: Ints, most: Floats,
 ) -> None:  # fmt: skip
-    blocks, N = len(most), len(alpha)
-    group = taken(counter)
-    while group * GROUP < blocks:
-        for b in range(group * GROUP, min((group + 1) * GROUP, blocks)):
-            residual, plain, scaled = 0.0, 0.0, 0.0
-            for k in range(b * BLOCK, b * BLOCK + counts[1, b]):
-                i = found[k]
-                x, low, high = alpha[i], one(lower, N, i), one(upper, N, i)
-                moved = x - (slope[i] + multiplier * one(cost, N, i)) * unit
-                change = abs(out[i] - x)
-                residual = max(residual, abs(x - max(low, min(high, moved))))
-                plain = max(plain, change)
-                scaled = max(scaled, change / (high - low if high > low else 1.0))
-            most[b, 0], most[b, 1], most[b, 2] = residual, plain, scaled
-        group = taken(counter)
+    N = len(alpha)
+    piece = taken(counter)
+    while piece < len(most):
+        residual, plain, scaled = 0.0, 0.0, 0.0
+        for k in range(piece * PIECE, piece * PIECE + counts[1, piece]):
+            i = found[k]
+            x, low, high = alpha[i], one(lower, N, i), one(upper, N, i)
+            moved = x - (slope[i] + multiplier * one(cost, N, i)) * unit
+            change = abs(out[i] - x)
+            residual = max(residual, abs(x - max(low, min(high, moved))))
+            plain = max(plain, change)
+            scaled = max(scaled, change / (high - low if high > low else 1.0))
+        most[piece, 0], most[piece, 1], most[piece, 2] = residual, plain, scaled
+        piece = taken(counter)
