@@ -36,9 +36,9 @@ from mdstopo.optimizer.safeguards import (
     scaled_violation,
     verdict,
 )
-from mdstopo.optimizer.state import History, State
+from mdstopo.optimizer.state import History, State, Step
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Measures, Space, adapt, is_wide, propose, ranges
+from mdstopo.optimizer.wide import WIDE, Measures, Space, is_wide, next_wide_shift, propose, ranges
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -93,7 +93,7 @@ class Gsao:
             predicted=0.0,
             kkt=float("nan"),
             shift=np.full(n, self.settings.number("shift_start")),
-            step=np.zeros(n),
+            step=Step(alpha, alpha),
             trust=self.settings.number("trust_start") if self.trusted else 1.0,
             convex=self.settings.number("convex_start"),
             price=price,
@@ -171,11 +171,9 @@ class Gsao:
             state.best_violation, state.best_plain = violation, plain
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
-            if len(state.alpha) >= WIDE:
-                state.step, state.shift = adapt(state, settings)
-            else:
-                last, state.step = state.step, state.trial - state.alpha
-                state.shift = next_shift(state.shift, last, state.step, settings)
+            last, state.step = state.step, Step(state.trial, state.alpha)
+            adapted = next_wide_shift if len(state.alpha) >= WIDE else next_shift
+            state.shift = adapted(state.shift, last, state.step, settings)
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
             state.rows, state.gradients = sample.rows, sample.gradients

@@ -12,7 +12,7 @@ import numpy as np
 
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Sample
-from mdstopo.optimizer.state import State
+from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide import finite
 from mdstopo.status import RunStatus, Status
 
@@ -158,10 +158,10 @@ def next_convex(convex: float, ratio: float, too_low: bool, settings: Settings) 
     return convex
 
 
-def next_shift(shift: Floats, last: Floats, step: Floats, settings: Settings) -> Floats:
+def next_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Floats:
     """Distances of the shifts in ranges, (N,): wider where a step agrees with the last one, narrower where it
     opposes it."""
-    agreement = last * step
+    agreement = last.array() * step.array()
     factor = np.where(
         agreement > 0.0,
         settings.number("shift_grow"),

@@ -105,6 +105,19 @@ def _reported(sample: Sample, name: str, before: list[Floats] | None) -> Floats:
 _COLUMN_TYPES: dict[str, type] = {"evaluations": np.int64, "accepted": np.bool_}
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A step by the designs (N,) that it led to and came from: of very many variables the difference is not formed and
+    kept only because its sign will be asked for."""
+
+    to: Floats
+    origin: Floats
+
+    def array(self) -> Floats:
+        """The difference, (N,)."""
+        return self.to - self.origin
+
+
 @dataclass(slots=True)
 class State:
     """What the optimiser knows after an iteration.
@@ -115,9 +128,10 @@ class State:
     (K, N); `forgotten`, the objective at which they were last dropped.
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
     the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
-    shifts, `step` (N,) the last accepted step, `trust` the half width of the trust box in ranges,
-    `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge` (C,) in
-    the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
+    shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the trust box in
+    ranges, `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge`
+    (C,) in the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row,
+    `seconds`.
     The best so far: `best_alpha` (N,), `best_objective`, `best_violation`, and `best_plain`, its violation
     relative to the bounds alone.
     """
@@ -136,7 +150,7 @@ class State:
     predicted: float
     kkt: float
     shift: Floats
-    step: Floats
+    step: Step
     trust: float
     convex: float
     price: Floats
@@ -178,6 +192,8 @@ class State:
             value = getattr(self, f.name)
             if isinstance(value, History):
                 out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
+            elif isinstance(value, Step):
+                out[f.name] = value.array()
             elif isinstance(value, str):
                 out[f.name] = np.frombuffer(value.encode(), dtype=np.uint8).copy()
             else:
@@ -200,6 +216,8 @@ class State:
             if f.name in ("status", "reason"):
                 text = array.tobytes().decode()
                 values[f.name] = RunStatus(text) if f.name == "status" else text
+            elif f.name == "step":
+                values[f.name] = Step(np.array(array), np.zeros(array.shape))
             else:
                 values[f.name] = array.item() if array.ndim == 0 else np.array(array)
         return cls(**values)  # type: ignore[arg-type]

@@ -21,9 +21,9 @@ from mdstopo.native.threads import allowed
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
-from mdstopo.optimizer.state import State
+from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
-from mdstopo.optimizer.wide_passes import PIECE, wide_adapt, wide_change, wide_largest, wide_sum
+from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_largest, wide_shift, wide_sum
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 
 Indices = NDArray[np.intp]
@@ -189,14 +189,14 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
     return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())
 
 
-def adapt(state: State, settings: Settings) -> tuple[Floats, Floats]:
-    """The step (N,) and the distances of the shifts (N,), after the trial was accepted."""
-    step, shifts = np.empty_like(state.step), np.empty_like(state.shift)
+def next_wide_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Floats:
+    """As `safeguards.next_shift`, in one pass."""
+    shifts = np.empty_like(shift)
     grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
     least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
     threads = _threads(len(shifts), LIGHT)
-    wide_adapt(state.shift, state.step, state.trial, state.alpha, grow, shrink, least, most, threads, step, shifts)
-    return step, shifts
+    wide_shift(shift, last.to, last.origin, step.to, step.origin, grow, shrink, least, most, threads, shifts)
+    return shifts
 
 
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:

@@ -27,30 +27,27 @@ def part(x: Floats, n: int, start: int, stop: int) -> Floats:
 
 
 @vector_entry
-def wide_adapt(
-    shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float, most: float,
-    threads: int, step: Floats, shifts: Floats,
+def wide_shift(
+    shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float,
+    most: float, threads: int, shifts: Floats,
 ) -> None:  # fmt: skip
-    """In one pass what follows an accepted step, `last` being the one before it: `step` (N,) and the new `shifts`."""
+    """The new `shifts` after the step from alpha to the trial, which followed the one from `before` to `last`."""
     counter = np.zeros(1, np.int64)
-    shared(_adapted, threads, (counter, shift, last, trial, alpha, grow, shrink, least, most, step, shifts))
+    shared(_shifted, threads, (counter, shift, last, before, trial, alpha, grow, shrink, least, most, shifts))
 
 
 @member_kernel
-def _adapted(
-    counter: Ints, shift: Floats, last: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float,
-    least: float, most: float, step: Floats, shifts: Floats,
+def _shifted(
+    counter: Ints, shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, grow: float,
+    shrink: float, least: float, most: float, shifts: Floats,
 ) -> None:  # fmt: skip
     piece = taken(counter)
     while piece * PIECE < len(shift):
         start, stop = piece * PIECE, min((piece + 1) * PIECE, len(shift))
-        now, far = step[start:stop], shifts[start:stop]
-        before, x, y, was = last[start:stop], alpha[start:stop], trial[start:stop], shift[start:stop]
-        n = stop - start
-        for i in range(n):
-            now[i] = y[i] - x[i]
-        for i in range(n):
-            agreement = before[i] * now[i]
+        was, far, to, origin = shift[start:stop], shifts[start:stop], last[start:stop], before[start:stop]
+        y, x = trial[start:stop], alpha[start:stop]
+        for i in range(stop - start):
+            agreement = (to[i] - origin[i]) * (y[i] - x[i])
             factor = grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
             far[i] = min(max(was[i] * factor, least), most)
         piece = taken(counter)
