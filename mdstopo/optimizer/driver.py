@@ -129,6 +129,7 @@ class Gsao:
         state = replace(state, iteration=state.iteration + 1, evaluations=state.evaluations + 1)
         tried, origin = state.trial, state.alpha
         sample = self.problem.evaluate(tried)
+        self._measures.look(sample.gradients, tried)
         wrong = failure(sample, self._measures.steepest)
         accepted = False
         if wrong:
@@ -172,8 +173,10 @@ class Gsao:
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
             last, state.step = state.step, Step(state.trial, state.alpha)
-            adapted = next_wide_shift if len(state.alpha) >= WIDE else next_shift
-            state.shift = adapted(state.shift, last, state.step, settings)
+            if len(state.alpha) >= WIDE:
+                state.shift = next_wide_shift(state.shift, last, state.step, settings, self._measures.room)
+            else:
+                state.shift = next_shift(state.shift, last, state.step, settings)
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
             state.rows, state.gradients = sample.rows, sample.gradients
@@ -241,6 +244,8 @@ class Gsao:
     def _competing(self, state: State) -> Indices:
         """The rows that compete for the objective, by their places."""
         settings = self.settings
+        if len(state.rows) == 1:
+            return np.zeros(1, dtype=np.intp)
         if self.competitors is not None and settings.number("peaks") > 1:
             return np.arange(len(state.rows))[: self.competitors]
         highest = float(state.rows.max())

@@ -7,6 +7,7 @@ approximation (Svanberg 2002).
 """
 
 from collections.abc import Callable
+from math import isfinite
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
     """Why a sample cannot be used, as a sentence; empty if it can. steepest: as `wide.steepest`."""
     if sample.status is Status.OK:
         numbers = (sample.rows, sample.constraint_rows, sample.constraint_gradients)
-        known = np.isfinite(sample.objective) and all(finite(number) for number in numbers if number.size)
+        known = isfinite(sample.objective) and all(finite(number) for number in numbers if number.size)
         if known and len(sample.rows) and finite(steepest(sample.gradients)):
             return ""
         return Status.NON_FINITE.value
@@ -122,6 +123,8 @@ def first_price(sample: Sample, settings: Settings) -> Floats:
 
 def plain_violation(sample: Sample) -> float:
     """The largest constraint violation c itself, relative to the bound: what a user is told."""
+    if not len(sample.constraint_rows):
+        return 0.0
     return float(np.maximum(sample.constraint_rows, 0.0).max(initial=0.0))
 
 

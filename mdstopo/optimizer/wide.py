@@ -23,7 +23,7 @@ from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
-from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_largest, wide_shift, wide_sum
+from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_largest, wide_look, wide_shift, wide_sum
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 
 Indices = NDArray[np.intp]
@@ -38,6 +38,8 @@ SHARED = 200_000
 #: where a pass does little, so that making threads would cost as much
 LIGHT = 400_000
 _LEAST_SAMPLE = 256
+#: and up to which Python is faster with numbers than NumPy
+FEW = 8
 
 
 class Proposal(NamedTuple):
@@ -96,6 +98,26 @@ class Kept(Generic[T]):
         self._kept = [(arrays, result), *self._kept[:1]]
 
 
+class Room:
+    """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
+
+    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,). made: trial and iterate of the step of which found
+    and counts tell who moves, None where they tell of none.
+    """
+
+    def __init__(self) -> None:
+        self._n = -1
+        self.made: tuple[Floats, Floats] | None = None
+
+    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
+        """Room for n variables; what it holds is of no account."""
+        if n != self._n:
+            self._n = n
+            place, found, counts = (np.empty(each, dtype=np.int64) for each in (n, n, (2, -(-n // PIECE))))
+            self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n)
+        return self._arrays
+
+
 class Measures:
     """What is asked of designs and of gradients more than once: `largest_change`, `excess`, `steepest`."""
 
@@ -106,23 +128,13 @@ class Measures:
         self.steepest = Kept(steepest)
         self.room = Room()
 
-
-class Room:
-    """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
-
-    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,).
-    """
-
-    def __init__(self) -> None:
-        self._n = -1
-
-    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
-        """Room for n variables; what it holds is of no account."""
-        if n != self._n:
-            self._n = n
-            place, found, counts = (np.empty(each, dtype=np.int64) for each in (n, n, (2, -(-n // PIECE))))
-            self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n)
-        return self._arrays
+    def look(self, gradients: Floats, x: Floats) -> None:
+        """Find `steepest` of the gradients (R, N) and `excess` of x at once, where one pass can."""
+        rows = self.space.rows
+        if len(x) >= WIDE and gradients.shape == (1, len(x)) and gradients.flags.c_contiguous and len(rows) == 1:
+            most, total = wide_look(gradients[0], rows[0], x, _threads(len(x), LIGHT))
+            self.steepest.tell(np.array([most]), gradients)
+            self.excess.tell(np.array([total]) - self.space.linear.b, x)
 
 
 def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:
@@ -153,6 +165,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     share = inf if power == 1.0 else 1.0 - settings.number("shift_margin")
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
     left = float(measures.excess(alpha)[0])
+    measures.room.made = None
     trial, slots, place, found, counts, x = np.empty(n), *measures.room.of(n)
     multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
         alpha, slope, cost, state.shift, lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
@@ -164,6 +177,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
         trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
     else:
         measures.change.tell((plain, scaled), trial, alpha)
+        measures.room.made = trial, alpha
     if not _decides(state, chosen, trial, lower, upper, power):
         return None
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
@@ -189,13 +203,15 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
     return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())
 
 
-def next_wide_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Floats:
-    """As `safeguards.next_shift`, in one pass."""
+def next_wide_shift(shift: Floats, last: Step, step: Step, settings: Settings, room: Room) -> Floats:
+    """As `safeguards.next_shift`, in one pass; of a step that was made in the room it is known who moved."""
     shifts = np.empty_like(shift)
-    grow, shrink = settings.number("shift_grow"), settings.number("shift_shrink")
-    least, most = settings.number("shift_minimum"), settings.number("shift_maximum")
-    threads = _threads(len(shifts), LIGHT)
-    wide_shift(shift, last.to, last.origin, step.to, step.origin, grow, shrink, least, most, threads, shifts)
+    rule = np.array([settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")])
+    _, _, found, counts, _ = room.of(len(shift))
+    wide_shift(
+        shift, last.to, last.origin, step.to, step.origin, rule, _threads(len(shift), LIGHT), found, counts,
+        room.made is not None and room.made[0] is step.to and room.made[1] is step.origin, shifts,
+    )  # fmt: skip
     return shifts
 
 
@@ -224,6 +240,8 @@ def steepest(gradients: Floats) -> Floats:
 
 def finite(numbers: Floats) -> bool:
     """Whether all are."""
+    if numbers.size <= FEW:
+        return all(map(isfinite, numbers.ravel().tolist()))
     if numbers.size < WIDE or not numbers.flags.c_contiguous:
         return bool(np.isfinite(numbers).all())
     return isfinite(_largest(numbers.reshape(-1)))

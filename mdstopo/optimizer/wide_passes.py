@@ -5,13 +5,15 @@ Of an array whose numbers are all alike the first `PIECE` may be given: what is 
 
 import numpy as np
 
-from mdstopo.jit import kernel, member_kernel, vector_entry
+from mdstopo.jit import inline, kernel, member_kernel, vector_entry
 from mdstopo.native.threads import shared, taken
+from mdstopo.native.vector import lanes, load, total, zero
 from mdstopo.optimizer.powers import largest
 from mdstopo.optimizer.problem import Floats, Ints
 
-#: variables that a thread takes at once
-PIECE = 8192
+#: variables that a thread takes at once, and how many are summed in vectors before these are: long sums of like terms
+#: are all rounded to one side
+PIECE, RUN = 8192, 512
 
 
 @kernel
@@ -28,29 +30,46 @@ def part(x: Floats, n: int, start: int, stop: int) -> Floats:
 
 @vector_entry
 def wide_shift(
-    shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, grow: float, shrink: float, least: float,
-    most: float, threads: int, shifts: Floats,
+    shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, rule: Floats, threads: int,
+    found: Ints, counts: Ints, known: bool, shifts: Floats,
 ) -> None:  # fmt: skip
-    """The new `shifts` after the step from alpha to the trial, which followed the one from `before` to `last`."""
+    """The new `shifts` after the step from alpha to the trial, which followed the one from `before` to `last`.
+
+    rule: factors where the steps agree and oppose each other, smallest and largest shift. found, counts: if `known`,
+    which variables of each piece may have moved, as `wide_minimum` tells it; the others are not looked at.
+    """
     counter = np.zeros(1, np.int64)
-    shared(_shifted, threads, (counter, shift, last, before, trial, alpha, grow, shrink, least, most, shifts))
+    shared(_shifted, threads, (counter, shift, last, before, trial, alpha, rule, found, counts, known, shifts))
 
 
 @member_kernel
 def _shifted(
-    counter: Ints, shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, grow: float,
-    shrink: float, least: float, most: float, shifts: Floats,
+    counter: Ints, shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, rule: Floats,
+    found: Ints, counts: Ints, known: bool, shifts: Floats,
 ) -> None:  # fmt: skip
+    grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
     piece = taken(counter)
     while piece * PIECE < len(shift):
         start, stop = piece * PIECE, min((piece + 1) * PIECE, len(shift))
         was, far, to, origin = shift[start:stop], shifts[start:stop], last[start:stop], before[start:stop]
         y, x = trial[start:stop], alpha[start:stop]
-        for i in range(stop - start):
-            agreement = (to[i] - origin[i]) * (y[i] - x[i])
-            factor = grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
-            far[i] = min(max(was[i] * factor, least), most)
+        if known:
+            for i in range(stop - start):
+                far[i] = min(max(was[i], least), most)
+            for k in range(start, start + counts[1, piece]):
+                i = found[k] - start
+                factor = _factor((to[i] - origin[i]) * (y[i] - x[i]), grow, shrink)
+                far[i] = min(max(was[i] * factor, least), most)
+        else:
+            for i in range(stop - start):
+                factor = _factor((to[i] - origin[i]) * (y[i] - x[i]), grow, shrink)
+                far[i] = min(max(was[i] * factor, least), most)
         piece = taken(counter)
+
+
+@inline
+def _factor(agreement: float, grow: float, shrink: float) -> float:
+    return grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
 
 
 @vector_entry
@@ -97,23 +116,63 @@ def _sizes(counter: Ints, x: Floats, out: Floats) -> None:
 
 @vector_entry
 def wide_sum(a: Floats, x: Floats, threads: int) -> float:
-    """sum of a x, of pieces and these in their order."""
+    """sum of a x, the same to the bit as `wide_look` finds it."""
     sums = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_sums, threads, (counter, a, x, sums))
-    total = 0.0
-    for piece in range(len(sums)):
-        total += sums[piece]
-    return total
+    return _in_order(sums)
 
 
-@member_kernel
+@kernel
 def _sums(counter: Ints, a: Floats, x: Floats, out: Floats) -> None:
     piece = taken(counter)
     while piece < len(out):
         start, stop = piece * PIECE, min((piece + 1) * PIECE, len(x))
-        one, other, total = part(a, len(x), start, stop), x[start:stop], 0.0
-        for i in range(stop - start):
-            total += one[i] * other[i]
-        out[piece] = total
+        out[piece] = _product(part(a, len(x), start, stop), x[start:stop])
         piece = taken(counter)
+
+
+@vector_entry
+def wide_look(gradient: Floats, a: Floats, x: Floats, threads: int) -> tuple[float, float]:
+    """max |gradient|, NaN where one is NaN, and the sum of a x."""
+    most, sums = np.zeros(pieces(len(x))), np.zeros(pieces(len(x)))
+    counter = np.zeros(1, np.int64)
+    shared(_looks, threads, (counter, gradient, a, x, most, sums))
+    return largest(most), _in_order(sums)
+
+
+@kernel
+def _looks(counter: Ints, gradient: Floats, a: Floats, x: Floats, most: Floats, sums: Floats) -> None:
+    piece = taken(counter)
+    while piece < len(most):
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, len(x))
+        most[piece] = largest(gradient[start:stop])
+        sums[piece] = _product(part(a, len(x), start, stop), x[start:stop])
+        piece = taken(counter)
+
+
+@kernel
+def _product(a: Floats, x: Floats) -> float:
+    """sum of a x of a piece, in an order that no compiler changes: what one pass finds another may have to."""
+    n = len(x) // lanes() * lanes()
+    whole = 0.0
+    for start in range(0, n, RUN):
+        one, other = zero(), zero()
+        stop = min(start + RUN, n)
+        for i in range(start, stop - lanes(), 2 * lanes()):
+            one += load(a, i) * load(x, i)
+            other += load(a, i + lanes()) * load(x, i + lanes())
+        if (stop - start) // lanes() % 2:
+            one += load(a, stop - lanes()) * load(x, stop - lanes())
+        whole += total(one + other)
+    for i in range(n, len(x)):
+        whole += a[i] * x[i]
+    return whole
+
+
+@kernel
+def _in_order(x: Floats) -> float:
+    whole = 0.0
+    for i in range(len(x)):
+        whole += x[i]
+    return whole

@@ -157,7 +157,7 @@ def _solved(
             y[i] += z[i]
         for i in range(n):
             z[i] /= max(high[i] - low[i], TINY)
-        if not largest(z[:n]) > 1e-9:  # what the next step would correct is that, squared
+        if not largest(z[:n]) > 1e-8:  # what the next step would correct is that, squared
             break
     slope = 0.0
     for i in range(count):

@@ -14,13 +14,11 @@ from mdstopo.native.threads import shared, taken
 from mdstopo.native.vector import lanes, larger, load, magnitude, negative, store, total, zero
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
-from mdstopo.optimizer.wide_passes import PIECE, part, pieces
+from mdstopo.optimizer.wide_passes import PIECE, RUN, part, pieces
 from mdstopo.optimizer.wide_slots import BLOCK, WHOLE, box, enter_slot, whole_vectors
 
 #: variables that move and from which on threads share what is done with them
 CROWD = 50_000
-#: terms that are added in vectors before these are added: long sums of like terms all round to one side
-_SUM = 256
 #: rows of room, each of `BLOCK` numbers
 _ROOM = 9
 
@@ -104,9 +102,9 @@ def _moving(
     every = (1 << lanes()) - 1
     count: int = np.int64(0)  # type: ignore[assignment]  # as in `sort_out`
     sums[0], sums[1], sums[2] = 0.0, 0.0, 0.0
-    for start in range(0, n, _SUM):
+    for start in range(0, n, RUN):
         held, weight = zero(), zero()
-        for i in range(start, min(start + _SUM, n), lanes()):
+        for i in range(start, min(start + RUN, n), lanes()):
             at, cost, push = load(c, i), load(a, i), load(s, i)
             one, other = near * cost, far * cost
             most, least = push + larger(one, other), larger(-1.0 * one, -1.0 * other) - push

@@ -132,7 +132,7 @@ def test_shifts_and_steps_are_those_of_the_plain_rule():
     state = states(Many(6, True), 5)[-1]
     step = Step(state.trial, state.alpha)
     assert np.array_equal(step.array(), state.trial - state.alpha)
-    shifts = wide.next_wide_shift(state.shift, state.step, step, chosen)
+    shifts = wide.next_wide_shift(state.shift, state.step, step, chosen, wide.Room())
     assert np.array_equal(shifts, next_shift(state.shift, state.step, step, chosen))
     assert len(np.unique(shifts)) > 2
 
