@@ -5,6 +5,7 @@ import ctypes
 import functools
 import struct
 from collections.abc import Callable
+from itertools import accumulate
 from typing import Any
 
 import llvmlite.binding as llvm
@@ -13,11 +14,9 @@ from numpy.typing import NDArray
 
 from mdstopo.native.store import CALL, Code
 
-IndexArray = NDArray[np.int64]
-
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
-
+_first_byte: Callable[[Any], Any] = ctypes.c_char.from_buffer
 
 #: the eight bytes of a result, by its letter
 _SLOTS = {"f": "d", "i": "q", "b": "?7x"}
@@ -41,6 +40,21 @@ def _target() -> Any:
     return llvm.Target.from_default_triple()
 
 
+def _address(array: NDArray[Any]) -> int:
+    """Where an array's numbers are."""
+    try:
+        return ctypes.addressof(_first_byte(array))
+    except (TypeError, ValueError):  # what is read only or empty is asked, which takes five times as long
+        return int(array.__array_interface__["data"][0])
+
+
+def _format(kind: str) -> str:
+    """How an argument is packed, by its letters in `native.entry.types_of`."""
+    if kind[0] in "dq?":
+        return "q" * (1 + int(kind[1:]))
+    return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
+
+
 class Native:
     """An entry's machine code for one set of types of arguments."""
 
@@ -54,57 +68,67 @@ class Native:
         self._call = _CALL(self._engine.get_function_address(CALL))
         self._name = name
         self._kinds = types.split()
-        self._result = code.result.strip("()")
         self._single = not code.result.startswith("(")
-        self._unpack = struct.Struct("".join(_SLOTS[letter] for letter in self._result)).unpack_from
+        result = code.result.strip("()")
+        self._unpack = struct.Struct("".join(_SLOTS[letter] for letter in result)).unpack_from if result else None
+        formats = [_format(kind) for kind in self._kinds]
+        self._pack = struct.Struct("".join(formats)).pack_into
+        #: where in the block each argument begins, and what they return
+        *self._places, self._after = (8 * n for n in accumulate(map(len, formats), initial=0))
+        self._block = ctypes.c_int64 * (self._after // 8 + len(result) + 1)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self._block_of(arguments)[0]()
+        block = self._block_of(arguments)
+        if self._call(block):
+            self._fail(block[-1])
+        return self._found(block)
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """These arguments as a block, ready to be called; see `Entry.prepare`."""
-        bare, block, places = self._block_of(arguments)
-        number = block.view(np.float64)
-        placed = [(number if kind == "f" else block, place) for kind, place in zip(self._kinds, places, strict=True)]
+        block = self._block_of(arguments)
+        number = np.frombuffer(block, dtype=np.float64)
+        whole = number.view(np.int64)
+        placed = [
+            (number if kind == "f" else whole, place // 8)
+            for kind, place in zip(self._kinds, self._places, strict=True)
+        ]
+        address = ctypes.c_void_p(ctypes.addressof(block))
+        function, found = self._call, self._found
 
-        def call(*changes: tuple[int, Any]) -> Any:
+        # `kept`: the block holds addresses only, and the arrays have to live as long as the call
+        def call(*changes: tuple[int, Any], kept: Any = arguments) -> Any:
             for which, value in changes:
                 view, place = placed[which]
                 view[place] = value
-            return bare()
+            if function(address):
+                self._fail(block[-1])
+            return found(block)
 
         return call
 
-    def _block_of(self, arguments: tuple[Any, ...]) -> tuple[Callable[[], Any], IndexArray, list[int]]:
-        """A call with these arguments, its block, and where each argument begins in it."""
-        numbers: list[int] = []
-        places: list[int] = []
+    def _block_of(self, arguments: tuple[Any, ...]) -> Any:
+        """The block of numbers for these arguments."""
+        numbers: list[Any] = []
         for kind, argument in zip(self._kinds, arguments, strict=True):
-            places.append(len(numbers))
-            if kind[0] in "dq?":
-                numbers.append(argument.__array_interface__["data"][0])
+            if kind in "fi":
+                numbers.append(argument)
+            elif kind[0] in "dq?":
+                numbers.append(_address(argument))
                 numbers.extend(argument.shape)
             elif kind[0] == "t":
                 numbers.extend(argument)
-            elif kind == "f":
-                numbers.append(*struct.unpack("q", struct.pack("d", argument)))
             else:
                 numbers.append(int(argument))
-        first = len(numbers)
-        block = np.array(numbers + [0] * (len(self._result) + 1), dtype=np.int64)
-        unpack, results, nothing = self._unpack, block[first:].data, not self._result
-        address = ctypes.c_void_p(block.__array_interface__["data"][0])
-        function, single = self._call, self._single
+        block = self._block()
+        self._pack(block, 0, *numbers)
+        return block
 
-        # `kept`: the block holds addresses only, and the arrays have to live as long as the call
-        def call(kept: Any = arguments) -> Any:
-            if function(address):
-                self._fail(block.item(-1))
-            if nothing:
-                return None
-            return unpack(results)[0] if single else unpack(results)
-
-        return call, block, places
+    def _found(self, block: Any) -> Any:
+        """What the call has left behind the arguments."""
+        if self._unpack is None:
+            return None
+        results = self._unpack(block, self._after)
+        return results[0] if self._single else results
 
     def _fail(self, address: int) -> None:
         """Raise what the compiled code raised: its class and arguments, pickled where Numba keeps them.
