@@ -36,6 +36,7 @@ from mdstopo.optimizer.safeguards import (
     scaled_violation,
     verdict,
 )
+from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import History, State, Step
 from mdstopo.optimizer.subproblem import solve
 from mdstopo.optimizer.wide import WIDE, Measures, Space, is_wide, next_wide_shift, propose, ranges
@@ -92,7 +93,7 @@ class Gsao:
             trial=alpha,
             predicted=0.0,
             kkt=float("nan"),
-            shift=np.full(n, self.settings.number("shift_start")),
+            shift=Shifts(np.full(n, self.settings.number("shift_start"))),
             step=Step(alpha, alpha),
             trust=self.settings.number("trust_start") if self.trusted else 1.0,
             convex=self.settings.number("convex_start"),
@@ -176,7 +177,7 @@ class Gsao:
             if len(state.alpha) >= WIDE:
                 state.shift = next_wide_shift(state.shift, last, state.step, settings, self._measures.room)
             else:
-                state.shift = next_shift(state.shift, last, state.step, settings)
+                state.shift = Shifts(next_shift(state.shift.array(), last, state.step, settings))
             state.alpha = state.trial
             state.objective, state.violation = sample.objective, violation
             state.rows, state.gradients = sample.rows, sample.gradients
@@ -258,7 +259,7 @@ class Gsao:
         slopes = np.concatenate(
             [state.gradients[chosen], state.cut_gradients.reshape(-1, n), state.constraint_gradients.reshape(-1, n)]
         )
-        distance = state.shift * self.range
+        distance = state.shift.array() * self.range
         below = distance
         if settings.flag("zero_shift"):
             # A variable at zero would have its shift on top of it.

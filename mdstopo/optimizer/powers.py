@@ -11,6 +11,8 @@ from mdstopo.optimizer.problem import Floats, Ints
 
 #: terms that the series of `primitives` may have, a multiple of four, and what the next one may be of the first
 LONGEST, NEGLIGIBLE = 48, 1e-17
+#: numbers from which on it would not do
+FARTHEST = 0.6
 #: all bits of a float but its sign
 SIZE = 0x7FFF_FFFF_FFFF_FFFF
 LN2 = 0.6931471805599453
@@ -99,13 +101,15 @@ def primitives(z: Floats, power: float, value: Floats, room: Ints) -> None:
             value[i] = z[i] / (1.0 + z[i])
         return
     most = largest(z)
-    coefficient = np.empty(LONGEST + 1)
+    ratio, coefficient = np.empty(LONGEST), np.empty(LONGEST + 1)
+    for k in range(LONGEST):
+        ratio[k] = (power - 1.0 - k) / (2.0 + k)
     coefficient[0] = 1.0
     last, reach = 0, 1.0
-    while last < LONGEST and reach > NEGLIGIBLE:
-        for k in range(last + 1, last + 5):
-            coefficient[k] = coefficient[k - 1] * (power - k) / (k + 1.0)
-            reach *= most * abs((power - k) / (k + 1.0))
+    while last < LONGEST and reach > NEGLIGIBLE and most < FARTHEST:
+        for k in range(last, last + 4):
+            coefficient[k + 1] = coefficient[k] * ratio[k]
+            reach *= most * abs(ratio[k])
         last += 4
     if reach <= NEGLIGIBLE:
         for i in range(n):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.optimizer.problem import Floats, Sample
+from mdstopo.optimizer.shifts import Shifts
 from mdstopo.status import RunStatus, Status
 
 Array = NDArray[Any]
@@ -105,13 +106,19 @@ def _reported(sample: Sample, name: str, before: list[Floats] | None) -> Floats:
 _COLUMN_TYPES: dict[str, type] = {"evaluations": np.int64, "accepted": np.bool_}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """A step by the designs (N,) that it led to and came from: of very many variables the difference is not formed and
     kept only because its sign will be asked for."""
 
     to: Floats
     origin: Floats
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it lies between the same arrays."""
+        return isinstance(other, Step) and self.to is other.to and self.origin is other.origin
+
+    __hash__ = None  # type: ignore[assignment]  # arrays have none
 
     def array(self) -> Floats:
         """The difference, (N,)."""
@@ -149,7 +156,7 @@ class State:
     trial: Floats
     predicted: float
     kkt: float
-    shift: Floats
+    shift: Shifts
     step: Step
     trust: float
     convex: float
@@ -192,8 +199,8 @@ class State:
             value = getattr(self, f.name)
             if isinstance(value, History):
                 out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
-            elif isinstance(value, Step):
-                out[f.name] = value.array()
+            elif isinstance(value, (Step, Shifts)):
+                out[f.name] = value.array().copy()
             elif isinstance(value, str):
                 out[f.name] = np.frombuffer(value.encode(), dtype=np.uint8).copy()
             else:
@@ -216,6 +223,8 @@ class State:
             if f.name in ("status", "reason"):
                 text = array.tobytes().decode()
                 values[f.name] = RunStatus(text) if f.name == "status" else text
+            elif f.name == "shift":
+                values[f.name] = Shifts(np.array(array))
             elif f.name == "step":
                 values[f.name] = Step(np.array(array), np.zeros(array.shape))
             else:

@@ -21,9 +21,18 @@ from mdstopo.native.threads import allowed
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
+from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
-from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_largest, wide_look, wide_shift, wide_sum
+from mdstopo.optimizer.wide_passes import (
+    PIECE,
+    wide_change,
+    wide_largest,
+    wide_look,
+    wide_shift,
+    wide_shift_few,
+    wide_sum,
+)
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 
 Indices = NDArray[np.intp]
@@ -101,20 +110,22 @@ class Kept(Generic[T]):
 class Room:
     """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
 
-    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,). made: trial and iterate of the step of which found
-    and counts tell who moves, None where they tell of none.
+    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,); signs (N/32,), for `wide_shift_few`. made: the step
+    of which found and counts tell who moves; signed: that of which signs tell. None where they tell of none.
     """
 
     def __init__(self) -> None:
         self._n = -1
-        self.made: tuple[Floats, Floats] | None = None
+        self.made: Step | None = None
+        self.signed: Step | None = None
 
-    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
-        """Room for n variables; what it holds is of no account."""
+    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats, Ints]:
+        """Room for n variables; what it holds is of no account but for what is said above."""
         if n != self._n:
-            self._n = n
-            place, found, counts = (np.empty(each, dtype=np.int64) for each in (n, n, (2, -(-n // PIECE))))
-            self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n)
+            self._n, self.made, self.signed = n, None, None
+            lengths = n, n, (2, -(-n // PIECE)), -(-n // 32)
+            place, found, counts, signs = (np.empty(each, dtype=np.int64) for each in lengths)
+            self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n), signs
         return self._arrays
 
 
@@ -166,9 +177,9 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
     left = float(measures.excess(alpha)[0])
     measures.room.made = None
-    trial, slots, place, found, counts, x = np.empty(n), *measures.room.of(n)
+    trial, (slots, place, found, counts, x, _) = np.empty(n), measures.room.of(n)
     multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
-        alpha, slope, cost, state.shift, lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
+        alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
         _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, counts, x,
     )  # fmt: skip
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
@@ -177,7 +188,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
         trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
     else:
         measures.change.tell((plain, scaled), trial, alpha)
-        measures.room.made = trial, alpha
+        measures.room.made = Step(trial, alpha)
     if not _decides(state, chosen, trial, lower, upper, power):
         return None
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
@@ -197,21 +208,30 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
     ):
         found = np.zeros(len(of))
         if len(of):
-            wide_rows(np.ascontiguousarray(some), state.alpha, trial, state.shift, lower, upper, power, found)
+            wide_rows(np.ascontiguousarray(some), state.alpha, trial, state.shift.array(), lower, upper, power, found)
         values.append(of + found)
     objective, cuts, limits = values
     return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())
 
 
-def next_wide_shift(shift: Floats, last: Step, step: Step, settings: Settings, room: Room) -> Floats:
-    """As `safeguards.next_shift`, in one pass; of a step that was made in the room it is known who moved."""
-    shifts = np.empty_like(shift)
+def next_wide_shift(shift: Shifts, last: Step, step: Step, settings: Settings, room: Room) -> Shifts:
+    """As `safeguards.next_shift`. Of a step that was made in the room, and of the one before, it is known who moved."""
     rule = np.array([settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")])
-    _, _, found, counts, _ = room.of(len(shift))
-    wide_shift(
-        shift, last.to, last.origin, step.to, step.origin, rule, _threads(len(shift), LIGHT), found, counts,
-        room.made is not None and room.made[0] is step.to and room.made[1] is step.origin, shifts,
-    )  # fmt: skip
+    within = (float(rule[2]), float(rule[3]))
+    made, n = room.made == step, len(step.to)
+    known = made and room.signed == last and shift.within == within
+    _, _, moves, counts, _, signs = room.of(n)
+    if known:
+        shifts, array, places, before, count = shift.following(int(counts[1].sum()))
+    else:
+        array, places, before = np.empty(n), np.empty(0, dtype=np.int64), np.empty(0)
+        shifts, count = Shifts(array, within), np.zeros(1, dtype=np.int64)
+        threads = _threads(n, LIGHT)
+        wide_shift(shift.array(), last.to, last.origin, step.to, step.origin, rule, threads, array)
+    room.signed = None
+    if made:
+        wide_shift_few(array, moves, counts, signs, known, rule, places, before, count)
+        room.signed = step
     return shifts
 
 

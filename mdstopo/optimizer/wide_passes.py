@@ -5,7 +5,7 @@ Of an array whose numbers are all alike the first `PIECE` may be given: what is 
 
 import numpy as np
 
-from mdstopo.jit import inline, kernel, member_kernel, vector_entry
+from mdstopo.jit import kernel, member_kernel, vector_entry
 from mdstopo.native.threads import shared, taken
 from mdstopo.native.vector import lanes, load, total, zero
 from mdstopo.optimizer.powers import largest
@@ -31,21 +31,20 @@ def part(x: Floats, n: int, start: int, stop: int) -> Floats:
 @vector_entry
 def wide_shift(
     shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, rule: Floats, threads: int,
-    found: Ints, counts: Ints, known: bool, shifts: Floats,
+    shifts: Floats,
 ) -> None:  # fmt: skip
     """The new `shifts` after the step from alpha to the trial, which followed the one from `before` to `last`.
 
-    rule: factors where the steps agree and oppose each other, smallest and largest shift. found, counts: if `known`,
-    which variables of each piece may have moved, as `wide_minimum` tells it; the others are not looked at.
+    rule: factors where the steps agree and oppose each other, smallest and largest shift.
     """
     counter = np.zeros(1, np.int64)
-    shared(_shifted, threads, (counter, shift, last, before, trial, alpha, rule, found, counts, known, shifts))
+    shared(_shifted, threads, (counter, shift, last, before, trial, alpha, rule, shifts))
 
 
 @member_kernel
 def _shifted(
     counter: Ints, shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, rule: Floats,
-    found: Ints, counts: Ints, known: bool, shifts: Floats,
+    shifts: Floats,
 ) -> None:  # fmt: skip
     grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
     piece = taken(counter)
@@ -53,23 +52,42 @@ def _shifted(
         start, stop = piece * PIECE, min((piece + 1) * PIECE, len(shift))
         was, far, to, origin = shift[start:stop], shifts[start:stop], last[start:stop], before[start:stop]
         y, x = trial[start:stop], alpha[start:stop]
-        if known:
-            for i in range(stop - start):
-                far[i] = min(max(was[i], least), most)
-            for k in range(start, start + counts[1, piece]):
-                i = found[k] - start
-                factor = _factor((to[i] - origin[i]) * (y[i] - x[i]), grow, shrink)
-                far[i] = min(max(was[i] * factor, least), most)
-        else:
-            for i in range(stop - start):
-                factor = _factor((to[i] - origin[i]) * (y[i] - x[i]), grow, shrink)
-                far[i] = min(max(was[i] * factor, least), most)
+        for i in range(stop - start):
+            agreement = (to[i] - origin[i]) * (y[i] - x[i])
+            factor = grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
+            far[i] = min(max(was[i] * factor, least), most)
         piece = taken(counter)
 
 
-@inline
-def _factor(agreement: float, grow: float, shrink: float) -> float:
-    return grow if agreement > 0.0 else (shrink if agreement < 0.0 else 1.0)
+@vector_entry
+def wide_shift_few(
+    shift: Floats, moves: Ints, counts: Ints, signs: Ints, known: bool, rule: Floats, places: Ints, before: Floats,
+    count: Ints,
+) -> None:  # fmt: skip
+    """As `wide_shift` in place, from who has moved alone, if `known`; and the signs of this step for the next.
+
+    moves, counts: who has moved and where to, as `wide_minimum` tells it. signs (N/32,): two bits a variable, as in
+    moves; if `known` those of the last step. places, before, count: as in `Shifts.following`.
+    """
+    grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
+    pieces_of = counts.shape[1]
+    for piece in range(pieces_of if known else 0):
+        for k in range(piece * PIECE, piece * PIECE + counts[1, piece]):
+            i, now = moves[k] >> 2, moves[k] & 3
+            last = (signs[i >> 5] >> (2 * (i & 31))) & 3
+            if now != 0 and last != 0:
+                was = shift[i]
+                found = min(max(was * (grow if now == last else shrink), least), most)
+                if found != was:
+                    n = count[0]
+                    places[n], before[n] = i, was
+                    count[0] = n + 1
+                    shift[i] = found
+    signs[:] = 0
+    for piece in range(pieces_of):
+        for k in range(piece * PIECE, piece * PIECE + counts[1, piece]):
+            i = moves[k] >> 2
+            signs[i >> 5] |= (moves[k] & 3) << (2 * (i & 31))
 
 
 @vector_entry

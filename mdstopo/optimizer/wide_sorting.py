@@ -210,7 +210,10 @@ def measure(
     threads: int, out: Floats, found: Ints, counts: Ints,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Of the variables that do not rest, which are all that can tell: max |x - clip(x - (slope + multiplier
-    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range."""
+    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range.
+
+    found: becomes four times who that is, and 1 for one that rises, 2 for one that falls.
+    """
     count = counts.shape[1]
     most = np.empty((count, 3))
     moving = 0
@@ -241,7 +244,9 @@ def _measure_pieces(
             i = found[k]
             x, low, high = alpha[i], one(lower, N, i), one(upper, N, i)
             moved = x - (slope[i] + multiplier * one(cost, N, i)) * unit
-            change = abs(out[i] - x)
+            step = out[i] - x
+            change = abs(step)
+            found[k] = 4 * i + (1 if step > 0.0 else (2 if step < 0.0 else 0))
             residual = max(residual, abs(x - max(low, min(high, moved))))
             plain = max(plain, change)
             scaled = max(scaled, change / (high - low if high > low else 1.0))

@@ -101,9 +101,10 @@ def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
     for other in others:
         assert other.kkt == one.kkt
         assert other.predicted == one.predicted
-        for name in ("trial", "alpha", "shift"):
+        for name in ("trial", "alpha"):
             assert np.array_equal(getattr(other, name), getattr(one, name))
-        assert np.array_equal(other.step.array(), one.step.array())
+        for name in ("step", "shift"):
+            assert np.array_equal(getattr(other, name).array(), getattr(one, name).array())
 
 
 def test_a_row_that_is_far_from_its_limit_has_no_price():
@@ -133,8 +134,8 @@ def test_shifts_and_steps_are_those_of_the_plain_rule():
     step = Step(state.trial, state.alpha)
     assert np.array_equal(step.array(), state.trial - state.alpha)
     shifts = wide.next_wide_shift(state.shift, state.step, step, chosen, wide.Room())
-    assert np.array_equal(shifts, next_shift(state.shift, state.step, step, chosen))
-    assert len(np.unique(shifts)) > 2
+    assert np.array_equal(shifts.array(), next_shift(state.shift.array(), state.step, step, chosen))
+    assert len(np.unique(shifts.array())) > 2
 
 
 @pytest.mark.parametrize("exponent", [-6.0, -2.0, -0.1, 0.5, 1.0])
