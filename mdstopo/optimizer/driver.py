@@ -39,7 +39,7 @@ from mdstopo.optimizer.safeguards import (
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import History, State, Step
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Measures, Space, is_wide, next_wide_shift, propose, ranges
+from mdstopo.optimizer.wide import WIDE, Measures, Space, is_wide, next_wide_shift, propose, ranges, shift_rule
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -67,6 +67,7 @@ class Gsao:
         self.range = ranges(self.lower, self.upper)
         self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
+        self._rule = shift_rule(settings)
         self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
 
     def start(self, initial: Floats | None = None) -> State:
@@ -127,7 +128,9 @@ class Gsao:
         if not state.running:
             raise ValueError(f"the run has ended: {state.reason}")
         began = self.clock()
-        state = replace(state, iteration=state.iteration + 1, evaluations=state.evaluations + 1)
+        state = state.copy()
+        state.iteration += 1
+        state.evaluations += 1
         tried, origin = state.trial, state.alpha
         sample = self.problem.evaluate(tried)
         self._measures.look(sample.gradients, tried)
@@ -144,7 +147,7 @@ class Gsao:
 
     def reopen(self, state: State) -> State:
         """The state under the present limits: a run that a moved limit or tolerance ended goes on."""
-        state = replace(state)
+        state = state.copy()
         state.status, state.reason = verdict(state, self._move(state), self.settings)
         return state
 
@@ -175,7 +178,7 @@ class Gsao:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
             last, state.step = state.step, Step(state.trial, state.alpha)
             if len(state.alpha) >= WIDE:
-                state.shift = next_wide_shift(state.shift, last, state.step, settings, self._measures.room)
+                state.shift = next_wide_shift(state.shift, last, state.step, self._rule, self._measures.room)
             else:
                 state.shift = Shifts(next_shift(state.shift.array(), last, state.step, settings))
             state.alpha = state.trial

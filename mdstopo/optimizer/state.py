@@ -6,6 +6,7 @@ construction: there is no other place in which the optimiser remembers anything.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -192,6 +193,10 @@ class State:
             Status.OK,
         )
 
+    def copy(self) -> "State":
+        """Another state with the same values; `dataclasses.replace` takes several times as long."""
+        return State(*_values(self))
+
     def to_arrays(self) -> dict[str, Array]:
         """The state as arrays by name (numbers as 0-d arrays, text as UTF-8 bytes, `history/<column>`)."""
         out: dict[str, Array] = {}
@@ -230,3 +235,6 @@ class State:
             else:
                 values[f.name] = array.item() if array.ndim == 0 else np.array(array)
         return cls(**values)  # type: ignore[arg-type]
+
+
+_values = attrgetter(*(f.name for f in fields(State)))

@@ -214,9 +214,13 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
     return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())
 
 
-def next_wide_shift(shift: Shifts, last: Step, step: Step, settings: Settings, room: Room) -> Shifts:
+def shift_rule(settings: Settings) -> Floats:
+    """How shifts follow steps: factors where these agree and oppose each other, smallest and largest shift."""
+    return np.array([settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")])
+
+
+def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: Floats, room: Room) -> Shifts:
     """As `safeguards.next_shift`. Of a step that was made in the room, and of the one before, it is known who moved."""
-    rule = np.array([settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")])
     within = (float(rule[2]), float(rule[3]))
     made, n = room.made == step, len(step.to)
     known = made and room.signed == last and shift.within == within

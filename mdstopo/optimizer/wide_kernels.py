@@ -30,7 +30,7 @@ from mdstopo.optimizer.wide_sorting import measure, one, sort_out
 
 #: variables of the sample from which the first bracket comes, and its half width in standard deviations
 SAMPLE = 4096
-SPREAD = 4.0
+SPREAD = 3.0
 #: brackets that are tried, the last of them without ends
 ATTEMPTS = 6
 #: what may be left of the row where it is solved, and after it is settled, relative to the size of its sums

@@ -46,7 +46,7 @@ def chosen(mark: Floats, n: int, found: Ints) -> int:
     """
     for k in range(n, whole_vectors(n)):
         mark[k] = 0.0
-    count: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
+    count: int = np.int64(0)  # type: ignore[assignment]  # as written a 0 is of another type
     for k in range(0, n, lanes()):
         bits = negative(load(mark, k))
         if bits:

@@ -133,7 +133,7 @@ def test_shifts_and_steps_are_those_of_the_plain_rule():
     state = states(Many(6, True), 5)[-1]
     step = Step(state.trial, state.alpha)
     assert np.array_equal(step.array(), state.trial - state.alpha)
-    shifts = wide.next_wide_shift(state.shift, state.step, step, chosen, wide.Room())
+    shifts = wide.next_wide_shift(state.shift, state.step, step, wide.shift_rule(chosen), wide.Room())
     assert np.array_equal(shifts.array(), next_shift(state.shift.array(), state.step, step, chosen))
     assert len(np.unique(shifts.array())) > 2
 
