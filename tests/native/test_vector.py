@@ -19,6 +19,7 @@ from mdstopo.native.vector import (
     largest,
     load,
     magnitude,
+    negative,
     store,
     total,
     zero,
@@ -57,6 +58,11 @@ def _mixed(x, y, out):
 
 
 @numba.njit
+def _signs(x):
+    return negative(load(x, 0))
+
+
+@numba.njit
 def _difference(x, y, weight, s):
     return largest_difference(x, y, weight, s)
 
@@ -91,6 +97,15 @@ def test_operators_are_those_of_arrays():
     np.testing.assert_allclose(out, expected, rtol=1e-14, atol=1e-14)
     assert sums == pytest.approx(out.sum(), rel=1e-13)
     assert most == np.abs(out).max()
+
+
+def test_bits_tell_which_lanes_are_below_zero():
+    width = _width()
+    for bits in range(1 << width):
+        x = np.where(bits >> np.arange(width) & 1, -1e-300, 0.0)
+        assert _signs(x) == bits == negative(x)
+    assert _signs(np.full(width, np.nan)) == _signs(np.full(width, -0.0)) == 0
+    assert _signs(np.full(width, -np.inf)) == (1 << width) - 1
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
