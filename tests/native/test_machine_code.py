@@ -105,6 +105,14 @@ def test_a_prepared_call_takes_other_numbers_and_sees_what_arrays_hold_now():
     assert (count, both) == (4, False)
 
 
+def test_arrays_that_are_read_only_or_empty_are_found_too():
+    arguments, others = list(_arguments()), _arguments()
+    arguments[1].setflags(write=False)
+    assert mixed(*arguments) == mixed(*others)
+    arguments[1], arguments[-1] = np.empty(0), np.empty(0)
+    assert mixed(*arguments)[0] == 0.0
+
+
 def test_arrays_that_machine_code_cannot_take_go_through_numba():
     every_other = np.arange(6.0)[::2]
     arguments = list(_arguments())
