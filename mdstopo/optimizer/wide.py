@@ -12,6 +12,7 @@ rows lie below it there and the limits hold.
 
 from collections.abc import Callable
 from math import gcd, inf, isfinite
+from mmap import mmap
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -47,6 +48,8 @@ SHARED = 200_000
 #: where a pass does little, so that making threads would cost as much
 LIGHT = 400_000
 _LEAST_SAMPLE = 256
+#: the part of the slots from which on their memory is not kept
+MUCH = 16
 #: and up to which Python is faster with numbers than NumPy
 FEW = 8
 
@@ -123,10 +126,25 @@ class Room:
         """Room for n variables; what it holds is of no account but for what is said above."""
         if n != self._n:
             self._n, self.made, self.signed = n, None, None
-            lengths = n, n, (2, -(-n // PIECE)), -(-n // 32)
-            place, found, counts, signs = (np.empty(each, dtype=np.int64) for each in lengths)
-            self._arrays = np.empty((SLOTS, n)), place, found, counts, np.empty(n), signs
-        return self._arrays
+            counts, signs = np.empty((2, -(-n // PIECE)), dtype=np.int64), np.empty(-(-n // 32), dtype=np.int64)
+            self._who = _thin(n), counts, signs
+            self._take()
+        (slots, place, x), (found, counts, signs) = self._slots, self._who
+        return slots, place, found, counts, x, signs
+
+    def used(self, count: int) -> None:
+        """So many slots were: where that is much memory it is let go of."""
+        if self._n >= LIGHT and count > self._n // MUCH:
+            self._take()
+
+    def _take(self) -> None:
+        n = self._n
+        self._slots = _thin(SLOTS * n).view(np.float64).reshape(SLOTS, n), _thin(n), _thin(n).view(np.float64)
+
+
+def _thin(n: int) -> Ints:
+    """Memory of which, where it is much, only the pages that are written to are taken, and those the small ones."""
+    return np.frombuffer(mmap(-1, 8 * n), dtype=np.int64) if n >= LIGHT else np.empty(n, dtype=np.int64)
 
 
 class Measures:
@@ -182,6 +200,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
         alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
         _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, counts, x,
     )  # fmt: skip
+    measures.room.used(count)
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
         return None
     if miss > ROUNDING * size or (linear.equal[0] and miss < -ROUNDING * size):

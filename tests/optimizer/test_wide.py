@@ -158,6 +158,23 @@ def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
             assert np.array_equal(getattr(other, name).array(), getattr(one, name).array())
 
 
+def test_memory_that_is_let_go_of_between_steps_changes_no_bit(monkeypatch):
+    kept = states(Many(3, True), 8)[-1]
+    monkeypatch.setattr(wide, "LIGHT", 1)
+    taken, plain = [], wide.Room._take
+    monkeypatch.setattr(wide.Room, "_take", lambda room: (taken.append(room), plain(room)))
+    other = states(Many(3, True), 8)[-1]
+    assert len(taken) > 2
+    room = wide.Room()
+    slots = room.of(N)[0]
+    room.used(N // 32)
+    assert room.of(N)[0] is slots
+    room.used(N // 8)
+    assert room.of(N)[0] is not slots
+    assert np.array_equal(other.trial, kept.trial)
+    assert np.array_equal(other.shift.array(), kept.shift.array())
+
+
 def test_a_row_that_is_far_from_its_limit_has_no_price():
     problem = Many(4, False)
     problem.linear = LinearRows(problem.linear.A, 100.0 * problem.linear.b, problem.linear.equal)
