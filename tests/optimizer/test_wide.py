@@ -1,5 +1,7 @@
 """The step of many variables against the interior point, and what it promises."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -83,8 +85,9 @@ def resting(seed, equal, n):
 
 def bisected(problem, state, chosen):
     """The step by bisection alone, of the multiplier and of each variable; and the KKT residual at the iterate."""
-    slope, cost, c, span = state.gradients[0], problem.linear.A[0], state.alpha, wide.ranges(problem.lower, problem.upper)
-    reach, power = state.shift.array() * span, chosen.number("power")
+    slope, cost, c = state.gradients[0], problem.linear.A[0], state.alpha
+    span, power = wide.ranges(problem.lower, problem.upper), chosen.number("power")
+    reach = state.shift.array() * span
     kappa = state.convex * np.abs(slope).max() / span
     most = np.minimum(np.minimum(chosen.number("move_limit"), state.trust * span), 0.9 * reach)
     low, high = np.maximum(problem.lower, c - most), np.minimum(problem.upper, c + most)
@@ -212,7 +215,7 @@ def test_shifts_follow_the_plain_rule_where_only_those_who_moved_are_looked_at(s
     monkeypatch.setattr(wide, "wide_shift_few", lambda *given: (known.append(given[4]), plain(*given)))
     options = {"shift_start": start, "shift_minimum": 0.05, "shift_maximum": 10.0}
     found = states(resting(11, True, N), 15, **options)
-    for before, after in zip(found[:-1], found[1:], strict=True):
+    for before, after in pairwise(found):
         expected = before.shift.array()
         if after.history.accepted[-1]:
             step = Step(before.trial, before.alpha)
@@ -244,7 +247,7 @@ def test_shifts_that_were_followed_by_others_stay_what_they_were():
 def test_a_run_goes_on_from_stored_arrays_to_the_bit():
     problem = resting(13, False, N)
     straight = states(problem, 14)
-    for state, expected in zip(straight[:-1], straight[1:], strict=True):
+    for state, expected in pairwise(straight):
         arrays = {name: np.array(array) for name, array in state.to_arrays().items()}
         resumed = Gsao(problem, settings(max_iterations=100)).step(State.from_arrays(arrays)).to_arrays()
         for name, array in expected.to_arrays().items():
