@@ -47,6 +47,7 @@ from mdstopo.integrators.steps import (
     keep_state,
     largest_turn,
     motion_weights,
+    solved_to,
 )
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import add_loads, forces
@@ -111,6 +112,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     tolerance = settings[0]
     newton_tolerance = settings[1]
     fixed_step = settings[2]
+    accuracy = solved_to(tolerance, fixed_step)
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     n_level = tables.shape[0]
@@ -248,7 +250,8 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                         scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
                     motion_weights(pair, rel[0], reach, scale, weight)
                 e = balance(
-                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, ref, a, q, v, work
+                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, accuracy, ref, a,
+                    q, v, work,
                 )
                 if e < 0.0:
                     break

@@ -38,12 +38,12 @@ DENSE = 24
 
 @kernel
 def balance(  # type: ignore[no-untyped-def]
-    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, ref, a, q, v, work
+    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, accuracy, ref, a, q, v, work
 ):
     """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
 
     In: forces f and tangents (`Room`) at ref (2, s, W); a as a first guess; weight (W,) of `motion_weights`; none (W,)
-    zeros. Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    zeros; accuracy: relative change of the states at which to stop, or rounding. Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
     """
     k = own.K
     c = own.C
@@ -75,7 +75,7 @@ def balance(  # type: ignore[no-untyped-def]
                 correction = largest_difference(q, q_ref, weight, s)
             if not change <= 1e8:
                 return -1.0
-            if change <= max(1e-3 * correction * correction, 1e-15) or (change >= last and change < 1e-13):
+            if change <= max(1e-3 * correction * correction, accuracy, 1e-15) or (change >= last and change < 1e-13):
                 break
             growing = growing + 1 if change >= last else 0
             if growing >= 3 or sweep == 80:

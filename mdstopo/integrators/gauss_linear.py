@@ -107,7 +107,8 @@ def carried(steps):  # type: ignore[no-untyped-def]
 
 @kernel
 def reverse_step(  # type: ignore[no-untyped-def]
-    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work
+    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
+    accuracy, work,
 ):
     """Duty 5 of the contract."""
     level = steps.index[w, 1]
@@ -170,7 +171,7 @@ def reverse_step(  # type: ignore[no-untyped-def]
             change, size = renew_rows(back_q, s, h * h, value, u, root, x)
         else:
             change, size = renew_rows(back_q, s, h * h, rhs, u, root, x)
-        if change <= 4e-16 * size or (change >= last and change <= 1e-13 * size):
+        if change <= max(accuracy, 4e-16) * size or (change >= last and change <= 1e-13 * size):
             break
         last = change
     for d in range(n):

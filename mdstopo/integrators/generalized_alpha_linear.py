@@ -89,7 +89,8 @@ def carried(steps):  # type: ignore[no-untyped-def]
 
 @kernel
 def reverse_step(  # type: ignore[no-untyped-def]
-    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning, work
+    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
+    accuracy, work,
 ):
     """Duty 5 of the contract."""
     n = lam_q.shape[0]

@@ -66,6 +66,12 @@ def work_named(counts: Sequence[int]) -> dict[str, int]:
 WORK_NAMES = tuple(work_named(range(WORK)))
 
 
+@kernel
+def solved_to(tolerance, fixed_step):  # type: ignore[no-untyped-def]
+    """To what a linear iteration is solved: to rounding where the step is fixed, else to a part of the tolerance."""
+    return 0.0 if fixed_step > 0.0 else 1e-3 * tolerance
+
+
 def status_of(code: int) -> Status:
     """The `Status` that a kernel's code stands for."""
     return _STATUS[code]

@@ -21,7 +21,7 @@ AT_START, AT_END, ELSEWHERE = range(3)
 
 
 @kernel
-def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, work):  # type: ignore[no-untyped-def]
+def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, accuracy, work):  # type: ignore[no-untyped-def]
     """Pull the cotangent mu_q (n,) of the position at fraction c of step w (c < 0: its end) back to the start.
 
     stage_q_bar (S, n): explicit cotangents of the stage positions, or no rows. Out: z (S, n) and used (S,), 1 for the
@@ -44,7 +44,7 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
         bar = stage_q_bar[o:end] if stage_q_bar.shape[0] > 0 else stage_q_bar
         reverse_step(
             pair, inv_mass, tables, steps, w, c, point, none, bar, lam_q, lam_v, lam_x, z[o:end], damped, turning,
-            work,
+            accuracy, work,
         )  # fmt: skip
         used[o:end] = 1
         point[:] = 0.0
@@ -54,12 +54,12 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
 
 @kernel
 def energy_rows(  # type: ignore[no-untyped-def]
-    model, motion, tables, strength, steps, count, damped, reduction, closeness, gradient, rows, padded, work
+    model, motion, tables, strength, steps, count, damped, reduction, closeness, gradient, accuracy, rows, padded, work
 ):
     """Value, time and gradient of the stored energy reduced over time.
 
     In: motion, strength: the members that the motion was computed with (`carrying`); reduction (MAX..FINAL), closeness
-    (how near to the highest a peak competes, relative), gradient (wanted or not).
+    (how near to the highest a peak competes, relative), gradient (wanted or not), accuracy of `reverse_step`.
     Out: rows (R, 4) time, value, step, fraction (time NaN for mean and integral); padded (R, M_padded) gradients with
     respect to alpha^mu. Returns how many rows there are.
     """
@@ -143,7 +143,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
             reached = max(stages, steps.index[w + 1, 0])
             z = np.empty((reached, n))
             used = np.zeros(reached, np.int64)
-            reverse_sweep(pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, work)
+            reverse_sweep(pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, accuracy, work)
             design_gradient(model, steps.stage, z, used, out, work)
         if integral:
             energy_gradient(model, steps.stage, weight, out)

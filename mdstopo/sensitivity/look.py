@@ -7,7 +7,7 @@ method; its tag.
 import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
-from mdstopo.integrators.steps import FORCES, SPRINGS, carve, copy_rows, deflection, step_at
+from mdstopo.integrators.steps import FORCES, SPRINGS, carve, copy_rows, deflection, solved_to, step_at
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
@@ -52,10 +52,11 @@ def look(  # type: ignore[no-untyped-def]
     n = model.q0.shape[0]
     steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
     find_meeting(model, strength, steps, count, meeting)
+    accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
-            model, motion, tables, own, steps, count, damped, reductions[j], settings[3], gradient, rows[j], padded,
-            work,
+            model, motion, tables, own, steps, count, damped, reductions[j], settings[3], gradient, accuracy,
+            rows[j], padded, work,
         )  # fmt: skip
         if gradient:
             for r in range(found[j]):
