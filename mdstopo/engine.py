@@ -421,11 +421,12 @@ def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked:
 
 def _peaks(result: Looked, j: int, gradients: FloatArray | None) -> tuple[Peak, ...]:
     """What was found of objective j; gradients (n_obj, R, N) of all rows, of which copies are kept."""
-    peaks = []
+    peaks: tuple[Peak, ...] = ()
     gradient = None
-    for r, row in enumerate(result.rows[j, : result.found[j]].tolist()):
+    rows = result.rows.item
+    for r in range(result.found.item(j)):
         if gradients is not None:
             gradient = gradients[j, r].copy()
-            gradient.setflags(write=False)
-        peaks.append(Peak(row[0], row[1], gradient))
-    return tuple(peaks)
+            gradient.setflags(False)
+        peaks += (Peak(rows(j, r, 0), rows(j, r, 1), gradient),)
+    return peaks

@@ -13,9 +13,10 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 3. `parent_of(steps, w)`: the step before step w, -1 where w begins at the start.
 4. `stage_weights(tables, steps, w, out)`: weights (s,) of the stages in the integral over step w.
 5. `reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped,
-   turning, accuracy, work)`: pulls cotangents back through step w, from its end (lam) and from its point (mu, zero where
-   c_point < 0), explicit ones of the stage positions added (no rows: none); leaves z (s, n), the virtual displacement
-   of each stage's force balance, to the relative accuracy or to rounding. lam_x (n_carried, n) belongs to whatever else the method carries from step to step.
+   turning, accuracy, work)`: pulls cotangents back through step w, from its end (lam) and from its point (mu, zero
+   where c_point < 0), explicit ones of the stage positions added (no rows: none); leaves z (s, n), the virtual
+   displacement of each stage's force balance. lam_x (n_carried, n) belongs to whatever else the method carries from
+   step to step. accuracy: relative, to which an iteration has to go; 0: to rounding.
 6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: pushes
    changes forward through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
 7. `carried(steps) -> int`: rows of lam_x and dx; none for one-step methods.
@@ -63,7 +64,7 @@ def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
-):
+):  # fmt: skip
     """Duty 5."""
     raise NotImplementedError
 
@@ -105,12 +106,13 @@ def _implementation(name: str, steps: Any) -> Implementation | None:
 
 @kernel
 def sample_stages(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
-    """Every stage."""
-    m = steps.index[count, 0]
+    """Every stage of a step."""
+    first = steps.index[0, 0]
+    m = steps.index[count, 0] - first
     for i in range(m):
-        t[i] = steps.scalar[i, 0]
-        g[i] = steps.scalar[i, 1]
-        d[i] = steps.scalar[i, 2]
+        t[i] = steps.scalar[first + i, 0]
+        g[i] = steps.scalar[first + i, 1]
+        d[i] = steps.scalar[first + i, 2]
     return m
 
 
@@ -133,7 +135,7 @@ def _stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
 def _reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
-):
+):  # fmt: skip
     return _implementation("reverse_step", steps)
 
 

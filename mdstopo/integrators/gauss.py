@@ -22,6 +22,7 @@ from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
     copy_row,
     integrate_to_nodes,
+    make_rows,
     row_width,
     take_rows,
 )
@@ -54,6 +55,7 @@ from mdstopo.mechanics.assembly import add_loads, forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, scale_members
+from mdstopo.mechanics.rough import may_be_rough, rough_forces
 from mdstopo.scene.packing import unpack
 
 GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
@@ -65,6 +67,9 @@ MOST = max(LEVELS)
 FIRST_LEVEL = 0
 #: radians of the fastest vibration that the first window may span, so that the sweeps contract
 LONGEST = 6.0
+#: the first pass is made in single precision from this Newton tolerance on, where the bodies move by that share of
+#: their size (over the share that `noise` is)
+ROUGH_TOLERANCE, ROUGH = 1e-7, 0.05 / 1e-15
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
 SLOW = 0.26
 MOST_CAUTIOUS = 100.0
@@ -93,9 +98,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
         np.empty((MOST, n_pair, 6, 6)),
         np.empty((MOST if damped else 1, n_pair, 6, 6)),
         np.zeros((MOST if turning else 1, n)),
-        np.zeros((2 if damped else 1, MOST, dense_rows(n), row_width(n))),
-        np.zeros((10, MOST, row_width(n))),
-        np.zeros((11, row_width(n))),
+        make_rows((2 if damped else 1) * MOST * dense_rows(n), n).reshape(
+            (2 if damped else 1, MOST, dense_rows(n), row_width(n))
+        ),
+        make_rows(np.int64(10 * MOST), n).reshape((10, MOST, row_width(n))),
+        make_rows(np.int64(11), n),
         np.zeros(n_pair),
         np.empty(n_pair),
         np.empty(n_pair),
@@ -162,6 +169,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         q_base[d] = q0[d]
         v_base[d] = v0[d]
         load_base[d] = 0.0
+    may_begin_roughly = fixed_step <= 0.0 and newton_tolerance >= ROUGH_TOLERANCE and may_be_rough(model)
     t = times[0]
     t_node[0] = t
     forces(model, strength, np.int64(0), np.int64(1), t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
@@ -185,9 +193,14 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     if fixed_step > 0.0:
         wanted = fixed_step
     keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)
-    steps.index[0, 0] = 0
+    # the start is a stage of no window: what was found there is not computed again
+    keep_stage(
+        np.int64(0), t, q0, v0, none, rel[0], sums[0], k[0], c[0], turn[0],
+        steps.scalar, steps.stage, steps.pull, steps.K, steps.C, steps.turn,
+    )  # fmt: skip
+    steps.index[0, 0] = 1
     count = 0
-    stages = 0
+    stages = 1
 
     for segment in range(times.shape[0] - 1):
         end = times[segment + 1]
@@ -223,8 +236,10 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
             # nothing has moved yet: what the start's forces alone would do is the scale of the prediction
             integrate_to_nodes(planes[2], s, s, h * h, q0, hv0, planes[0, 0], a, q)
             relative_pose(pair, q[s - 1], v0, rel[s - 1])
+            rough = may_begin_roughly
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
+                rough = rough and scale[p] > ROUGH * noise[p]
             motion_weights(pair, rel0, reach, scale, weight)
             accepted = False
             estimate = 0.0
@@ -235,7 +250,15 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                     # one pass over the members at all nodes
                     take_rows(q, s, ref[0])
                     take_rows(v, s, ref[1])
-                    forces(model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
+                    rough = (
+                        rough
+                        and newton == 1
+                        and rough_forces(model, strength, segment, s, t_node, ref[0], ref[1], rel, sums, f, k, c, turn)
+                    )
+                    if not rough:
+                        forces(
+                            model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn
+                        )
                     work[FORCES] += s
                     work[TANGENTS] += s
                     work[NEWTON] += 1
@@ -252,7 +275,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 e = balance(
                     pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, accuracy, ref, a,
                     q, v, work,
-                )
+                )  # fmt: skip
                 if e < 0.0:
                     break
                 if newton == 0:
@@ -267,7 +290,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 estimate *= caution(coef, weight, s)
                 if estimate <= tolerance or fixed_step > 0.0:
                     # the last clause: rounding is all that is left
-                    if e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11):
+                    if not rough and (e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11)):
                         accepted = True
                         break
                     previous = e

@@ -43,7 +43,8 @@ def balance(  # type: ignore[no-untyped-def]
     """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
 
     In: forces f and tangents (`Room`) at ref (2, s, W); a as a first guess; weight (W,) of `motion_weights`; none (W,)
-    zeros; accuracy: relative change of the states at which to stop, or rounding. Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    zeros; accuracy: relative change of the states at which to stop, or rounding. Returns the relative correction of
+    the states against ref, or -1 where the sweeps do not contract.
     """
     k = own.K
     c = own.C
@@ -82,11 +83,10 @@ def balance(  # type: ignore[no-untyped-def]
                 return -1.0
             last = change
         if dense:
-            take_rows(rest, s, a)
-            add_products(own.dense[0], dx, s, a)
+            add_products(own.dense[0], dx, s, rest, a)
             if damped:
                 subtract_rows(v, v_ref, s, dx)
-                add_products(own.dense[1], dx, s, a)
+                add_products(own.dense[1], dx, s, a, a)
             continue
         take_rows(f, s, rhs)
         subtract_products(pair, k, dx, rhs, s)
@@ -151,12 +151,13 @@ def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
             x[0, d] = np.sqrt(inv_mass[d]) * (1.0 + 0.1 * (d % 7))
         value = 0.0
         for _ in range(12):
+            last = value
             size = 0.0
             for d in range(n):
                 if inv_mass[d] > 0.0:
                     size += x[0, d] * x[0, d] / inv_mass[d]
             value = np.sqrt(size)
-            if value == 0.0:
+            if value == 0.0 or abs(value - last) <= 1e-3 * value:
                 break
             for d in range(n):
                 x[0, d] /= value
@@ -175,9 +176,9 @@ def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):
     if damped:
         y[:] = 0.0
     if dense.shape[2] > 0:
-        add_products(dense[0], x, s, u)
+        add_products(dense[0], x, s, u, u)
         if damped:
-            add_products(dense[1], x, s, y)
+            add_products(dense[1], x, s, y, y)
         return
     scale_rows(inverse, x, s, z)
     subtract_transposed(pair, k, z, u, s)

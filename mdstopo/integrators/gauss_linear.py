@@ -14,6 +14,7 @@ from mdstopo.integrators.rows import (
     copy_row,
     integrate_to_nodes,
     largest_difference,
+    make_rows,
     renew_rows,
     row_width,
     scale_rows,
@@ -109,7 +110,7 @@ def carried(steps):  # type: ignore[no-untyped-def]
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
-):
+):  # fmt: skip
     """Duty 5 of the contract."""
     level = steps.index[w, 1]
     s = COUNTS[level]
@@ -125,7 +126,7 @@ def reverse_step(  # type: ignore[no-untyped-def]
     spread = stage_q_bar.shape[0] > 0
     work[REVERSE] += 1
     width = row_width(n)
-    rows = np.zeros((6, s, width))
+    rows = make_rows(6 * s, n).reshape((6, s, width))
     rhs = rows[0]
     x = rows[1]
     u = rows[2]
@@ -157,7 +158,8 @@ def reverse_step(  # type: ignore[no-untyped-def]
                 for i in range(s):
                     rhs[j, d] += h * h * second[i, j] * stage_q_bar[i, d]
     take_rows(rhs, s, x)
-    dense = np.zeros((2 if damped else 1, s, dense_rows(n), width))
+    kinds = 2 if damped else 1
+    dense = make_rows(kinds * s * dense_rows(n), n).reshape((kinds, s, dense_rows(n), width))
     if dense.shape[2] > 0:
         fill_dense(pair, k, turn, turning, inverse, s, np.bool_(True), dense[0])
         if damped:
@@ -199,7 +201,7 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
     c = steps.C[o : o + s] if damped else steps.C
     turn = steps.turn[o : o + s] if turning else steps.turn
     width = row_width(n)
-    rows = np.zeros((6, s, width))
+    rows = make_rows(6 * s, n).reshape((6, s, width))
     da = rows[0]
     dq_row = rows[1]
     dv_row = rows[2]

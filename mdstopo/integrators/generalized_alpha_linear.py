@@ -91,7 +91,7 @@ def carried(steps):  # type: ignore[no-untyped-def]
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
-):
+):  # fmt: skip
     """Duty 5 of the contract."""
     n = lam_q.shape[0]
     o = steps.index[w, 0]

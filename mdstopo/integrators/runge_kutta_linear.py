@@ -117,7 +117,7 @@ def carried(steps):  # type: ignore[no-untyped-def]
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
-):
+):  # fmt: skip
     """Duty 5 of the contract; a point inside a step is a partial step's end, so c_point is never used."""
     n = lam_q.shape[0]
     o = steps.index[w, 0]

@@ -1,8 +1,9 @@
 """What every integrator leaves behind, and the numbers by which it reports how it ended.
 
 A run is m steps. Step k goes from the state k to the state k + 1 and owns the stages index[k, FIRST] up to
-index[k + 1, FIRST]: states at which the force balance was imposed, with the tangents there. Everything that comes after
-(responses, reverse sweep, design gradient) works on these: states, never members.
+index[k + 1, FIRST]: states at which the force balance was imposed, with the tangents there. A stage before
+index[0, FIRST] belongs to no step: it is the start. Everything that comes after (responses, reverse sweep, design
+gradient) works on these: states, never members.
 
 ========  ======================  ==================================================================
 t         (m + 1,)                times of the states

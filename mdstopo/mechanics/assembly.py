@@ -231,11 +231,22 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
     Constant: model, strength. In: segment, m, t (m,), q, v (m, n). Out: rel (m, n_pair, POSE), sums (m, n_pair, SUMS),
     f (m, n); with `tangent` also k_out (m, n_pair, 6, 6), c_out (the same, if damped), turn (m, n, if loads turn).
     """
-    pair = model.pair
+    place_bodies(model.pair, q, v, m, rel)
+    member_sums(springs_of(model), strength, rel, m, tangent, sums)
+    sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn)
+
+
+@kernel
+def place_bodies(pair, q, v, m, rel):  # type: ignore[no-untyped-def]
+    """rel (m, n_pair, POSE) at m states."""
     for j in range(m):
         relative_pose(pair, q[j], v[j], rel[j])
-    springs = springs_of(model)
-    member_sums(springs, strength, rel, m, tangent, sums)
+
+
+@kernel
+def sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
+    """What `forces` gives, of the members' sums at the poses rel."""
+    pair = model.pair
     turning = model.load_body.shape[0] > 0
     for j in range(m):
         out = f[j]

@@ -42,7 +42,7 @@ def add_tangent(found, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _tile(rows, width):  # type: ignore[no-untyped-def]
+def tile_of(rows, width):  # type: ignore[no-untyped-def]
     """Rows and columns of a tile."""
     tall = rows if rows * width <= PLACES else min(rows, ROWS)
     return tall, min(width, PLACES // tall // lanes() * lanes())
@@ -55,7 +55,7 @@ def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, co
     width = block[k, 6]
     counted = block[k, 4] >= 0
     rows = (stop - start) // width
-    tall, wide = _tile(rows, width)
+    tall, wide = tile_of(rows, width)
     room = np.empty((tall, 2))
     for row in range(0, rows, tall):
         lo = start + row * width
@@ -85,7 +85,7 @@ def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, co
 def design_grid(start, stop, width, member, pose, u, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) at the poses pose (m, POSE) to out (M_padded,) for the rows from start to stop."""
     rows = (stop - start) // width
-    tall, wide = _tile(rows, width)
+    tall, wide = tile_of(rows, width)
     room = np.empty((tall, pose.shape[0], 4))
     turned = np.empty((pose.shape[0], 2, lanes()))
     for row in range(0, rows, tall):

@@ -22,56 +22,64 @@ def _features() -> str:
 
 _AVX512 = "+avx512f" in _features().split(",")
 _LANES = vector.WIDE if _AVX512 else vector.NARROW
-_VECTOR = ir.VectorType(ir.DoubleType(), _LANES)
 #: products are fused with sums, as in `jit.member_kernel`; sums are added in the order that is written
 _FUSED = ("contract", "nsz")
 
 
 class VectorType(types.Type):
-    """`_LANES` doubles."""
+    """So many numbers of a kind: `number` as Numba knows them, `code` the vector as LLVM does."""
 
-    def __init__(self) -> None:
-        super().__init__(name=f"vector{_LANES}")
+    def __init__(self, number: Any, scalar: Any, count: int) -> None:
+        super().__init__(name=f"vector{count}x{number}")
+        self.number = number
+        self.count = count
+        self.code = ir.VectorType(scalar, count)
 
 
-VECTOR = VectorType()
+VECTOR = VectorType(types.float64, ir.DoubleType(), _LANES)
+ROUGH = VectorType(types.float32, ir.FloatType(), 2 * _LANES)
+_KINDS = {kind.number: kind for kind in (VECTOR, ROUGH)}
 
 
 @register_model(VectorType)
 class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
-        super().__init__(manager, kind, _VECTOR)
+        super().__init__(manager, kind, kind.code)
 
 
 #: code of a call: the builder, the types of the arguments, the arguments
 Lower = Callable[[Any, Any, Any], Any]
+#: type of what a call gives, or nothing where it cannot be: of the types of the arguments
+Result = Callable[..., Any]
 
 
-def _implement(function: Callable[..., Any], given: tuple[Any, ...], result: Any, lower: Lower) -> None:
-    """Tell Numba what `function` gives for arguments of these types, and by what code."""
+def _implement(function: Callable[..., Any], given: tuple[type, ...], result: Result, lower: Lower) -> None:
+    """Tell Numba what `function` gives for arguments of types of these classes, and by what code."""
 
     class Typed(AbstractTemplate):
         key = function
 
         def generic(self, asked: Any, _named: Any) -> Any:
-            fits = len(asked) == len(given) and all(_fits(*pair) for pair in zip(asked, given, strict=True))
-            return signature(result, *asked) if fits else None
+            if len(asked) != len(given) or not all(map(_fits, asked, given)):
+                return None
+            found = result(*asked)
+            return None if found is None else signature(found, *asked)
 
     def lowered(context: Any, build: Any, kinds: Any, arguments: Any) -> Any:
         values = [_data(context, build, *pair) for pair in zip(kinds.args, arguments, strict=True)]
         value = lower(build, kinds.args, values)
-        return context.get_dummy_value() if result is types.none else value
+        return context.get_dummy_value() if kinds.return_type is types.none else value
 
     infer_global(function)(Typed)
     lower_builtin(function, *given)(lowered)
 
 
-def _fits(asked: Any, given: Any) -> bool:
+def _fits(asked: Any, given: type) -> bool:
     if given is types.Array:
         return bool(
-            isinstance(asked, types.Array) and asked.ndim == 1 and asked.layout == "C" and asked.dtype == types.float64
+            isinstance(asked, types.Array) and asked.ndim == 1 and asked.layout == "C" and asked.dtype in _KINDS
         )
-    return isinstance(asked, given) if isinstance(given, type) else asked == given
+    return isinstance(asked, given)
 
 
 def _data(context: Any, build: Any, kind: Any, given: Any) -> Any:
@@ -79,47 +87,66 @@ def _data(context: Any, build: Any, kind: Any, given: Any) -> Any:
     return context.make_array(kind)(context, build, given).data if isinstance(kind, types.Array) else given
 
 
-def _constant(value: float) -> Any:
-    return ir.Constant(_VECTOR, [value] * _LANES)
+def _of(array: Any, *_: Any) -> Any:
+    """The vectors of an array."""
+    return _KINDS[array.dtype]
 
 
-def _same(build: Any, number: Any) -> Any:
+def _common(*asked: Any) -> Any:
+    """What vectors of one kind and numbers give."""
+    kinds = {each for each in asked if isinstance(each, VectorType)}
+    return kinds.pop() if len(kinds) == 1 else None
+
+
+def _constant(kind: VectorType, value: float) -> Any:
+    return ir.Constant(kind.code, [value] * kind.count)
+
+
+def _same(build: Any, kind: VectorType, number: Any) -> Any:
     """A vector of one number."""
-    places = ir.VectorType(ir.IntType(32), _LANES)
-    nothing = ir.Constant(_VECTOR, ir.Undefined)
+    if number.type != kind.code.element:
+        number = (build.fptrunc if kind is ROUGH else build.fpext)(number, kind.code.element)
+    places = ir.VectorType(ir.IntType(32), kind.count)
+    nothing = ir.Constant(kind.code, ir.Undefined)
     first = build.insert_element(nothing, number, ir.Constant(ir.IntType(32), 0))
-    return build.shuffle_vector(first, nothing, ir.Constant(places, [0] * _LANES))
+    return build.shuffle_vector(first, nothing, ir.Constant(places, [0] * kind.count))
 
 
 def _arithmetic(instruction: str) -> Lower:
     def lower(build: Any, kinds: Any, arguments: Any) -> Any:
-        both = [given if kind == VECTOR else _same(build, given) for kind, given in zip(kinds, arguments, strict=True)]
+        own = _common(*kinds)
+        both = [
+            given if isinstance(kind, VectorType) else _same(build, own, given)
+            for kind, given in zip(kinds, arguments, strict=True)
+        ]
         return getattr(build, instruction)(*both, flags=_FUSED)
 
     return lower
 
 
-def _at(build: Any, data: Any, i: Any) -> Any:
-    return build.bitcast(build.gep(data, [i]), _VECTOR.as_pointer())
+def _at(build: Any, kind: VectorType, data: Any, i: Any) -> Any:
+    return build.bitcast(build.gep(data, [i]), kind.code.as_pointer())
 
 
-def _load(build: Any, _kinds: Any, arguments: Any) -> Any:
-    loaded = build.load(_at(build, *arguments))
-    loaded.align = 8
+def _load(build: Any, kinds: Any, arguments: Any) -> Any:
+    kind = _of(*kinds)
+    loaded = build.load(_at(build, kind, *arguments))
+    loaded.align = kind.number.bitwidth // 8
     return loaded
 
 
-def _store(build: Any, _kinds: Any, arguments: Any) -> None:
+def _store(build: Any, kinds: Any, arguments: Any) -> None:
+    kind = _of(*kinds)
     data, i, value = arguments
-    build.store(value, _at(build, data, i)).align = 8
+    build.store(value, _at(build, kind, data, i)).align = kind.number.bitwidth // 8
 
 
 def _folded(join: Callable[[Any, Any, Any], Any]) -> Lower:
     """One number of all: halves are joined until one is left."""
 
-    def lower(build: Any, _kinds: Any, arguments: Any) -> Any:
+    def lower(build: Any, kinds: Any, arguments: Any) -> Any:
         (whole,) = arguments
-        wide = _LANES
+        wide = kinds[0].count
         while wide > 1:
             places = ir.VectorType(ir.IntType(32), wide // 2)
             low, high = (
@@ -127,7 +154,8 @@ def _folded(join: Callable[[Any, Any, Any], Any]) -> Lower:
                 for k in (0, wide // 2)
             )
             whole, wide = join(build, low, high), wide // 2
-        return build.extract_element(whole, ir.Constant(ir.IntType(32), 0))
+        found = build.extract_element(whole, ir.Constant(ir.IntType(32), 0))
+        return build.fpext(found, ir.DoubleType()) if kinds[0] is ROUGH else found
 
     return lower
 
@@ -140,36 +168,48 @@ def _larger_of(build: Any, one: Any, other: Any) -> Any:
     return build.select(build.fcmp_ordered(">", one, other), one, other)
 
 
-def _unary(build: Any, name: str, x: Any) -> Any:
-    kind = ir.FunctionType(_VECTOR, [_VECTOR])
-    return build.call(cgutils.get_or_insert_function(build.module, kind, f"llvm.{name}.v{_LANES}f64"), [x])
+def _unary(build: Any, kind: VectorType, name: str, x: Any) -> Any:
+    form = ir.FunctionType(kind.code, [kind.code])
+    letters = f"v{kind.count}f{kind.number.bitwidth}"
+    return build.call(cgutils.get_or_insert_function(build.module, form, f"llvm.{name}.{letters}"), [x])
 
 
-def _negative(build: Any, _kinds: Any, arguments: Any) -> Any:
-    bits = build.bitcast(build.fcmp_ordered("<", arguments[0], _constant(0.0)), ir.IntType(_LANES))
+def _negative(build: Any, kinds: Any, arguments: Any) -> Any:
+    kind = kinds[0]
+    bits = build.bitcast(build.fcmp_ordered("<", arguments[0], _constant(kind, 0.0)), ir.IntType(kind.count))
     return build.zext(bits, ir.IntType(64))
 
 
-def _inverse_root(build: Any, _kinds: Any, arguments: Any) -> Any:
+def _inverse_root(build: Any, kinds: Any, arguments: Any) -> Any:
+    kind = kinds[0]
     x, floor = arguments
     root = _refined if _AVX512 else _divided
-    return build.select(build.fcmp_ordered(">", x, _same(build, floor)), root(build, x), _constant(0.0))
+    return build.select(
+        build.fcmp_ordered(">", x, _same(build, kind, floor)), root(build, kind, x), _constant(kind, 0.0)
+    )
 
 
-def _divided(build: Any, x: Any) -> Any:
-    return build.fdiv(_constant(1.0), _unary(build, "sqrt", x))
+def _divided(build: Any, kind: VectorType, x: Any) -> Any:
+    return build.fdiv(_constant(kind, 1.0), _unary(build, kind, "sqrt", x))
 
 
-def _refined(build: Any, x: Any) -> Any:
-    """From a seed y of 14 bits: with e = 1 - x y^2, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + O(2^-54))."""
-    kind = ir.FunctionType(_VECTOR, [_VECTOR, _VECTOR, ir.IntType(8)])
-    start = cgutils.get_or_insert_function(build.module, kind, "llvm.x86.avx512.rsqrt14.pd.512")
-    y = build.call(start, [x, _constant(0.0), ir.Constant(ir.IntType(8), -1)])
+def _refined(build: Any, kind: VectorType, x: Any) -> Any:
+    """From a seed y of 14 bits: with e = 1 - x y^2, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + O(2^-54)).
+
+    The first of these terms is enough for single precision.
+    """
+    rough = kind is ROUGH
+    form = ir.FunctionType(kind.code, [kind.code, kind.code, ir.IntType(kind.count)])
+    name = f"llvm.x86.avx512.rsqrt14.p{'s' if rough else 'd'}.512"
+    start = cgutils.get_or_insert_function(build.module, form, name)
+    y = build.call(start, [x, _constant(kind, 0.0), ir.Constant(ir.IntType(kind.count), -1)])
     # other flags would allow e to be taken apart
     fused = ("contract",)
-    e = build.fsub(_constant(1.0), build.fmul(x, build.fmul(y, y), flags=fused), flags=fused)
-    series = build.fadd(_constant(0.375), build.fmul(_constant(0.3125), e, flags=fused), flags=fused)
-    series = build.fadd(_constant(0.5), build.fmul(series, e, flags=fused), flags=fused)
+    e = build.fsub(_constant(kind, 1.0), build.fmul(x, build.fmul(y, y), flags=fused), flags=fused)
+    series = _constant(kind, 0.5)
+    if not rough:
+        series = build.fadd(_constant(kind, 0.375), build.fmul(_constant(kind, 0.3125), e, flags=fused), flags=fused)
+        series = build.fadd(_constant(kind, 0.5), build.fmul(series, e, flags=fused), flags=fused)
     return build.fadd(y, build.fmul(build.fmul(y, e), series, flags=fused), flags=fused)
 
 
@@ -179,16 +219,29 @@ for _signs, _instruction in (
     ((operator.mul, operator.imul), "fmul"),
 ):
     for _sign in _signs:
-        for _pair in ((VECTOR, VECTOR), (VECTOR, types.float64), (types.float64, VECTOR)):
-            _implement(_sign, _pair, VECTOR, _arithmetic(_instruction))
+        for _pair in ((VectorType, VectorType), (VectorType, types.Float), (types.Float, VectorType)):
+            _implement(_sign, _pair, _common, _arithmetic(_instruction))
 
-_implement(vector.lanes, (), types.int64, lambda _build, _kinds, _none: ir.Constant(ir.IntType(64), _LANES))
-_implement(vector.zero, (), VECTOR, lambda _build, _kinds, _none: _constant(0.0))
-_implement(vector.load, (types.Array, types.Integer), VECTOR, _load)
-_implement(vector.store, (types.Array, types.Integer, VECTOR), types.none, _store)
-_implement(vector.total, (VECTOR,), types.float64, _folded(_sum_of))
-_implement(vector.largest, (VECTOR,), types.float64, _folded(_larger_of))
-_implement(vector.larger, (VECTOR, VECTOR), VECTOR, lambda build, _kinds, both: _larger_of(build, *both))
-_implement(vector.magnitude, (VECTOR,), VECTOR, lambda build, _kinds, given: _unary(build, "fabs", given[0]))
-_implement(vector.inverse_root, (VECTOR, types.float64), VECTOR, _inverse_root)
-_implement(vector.negative, (VECTOR,), types.int64, _negative)
+
+def _count(build: Any, kinds: Any, _arguments: Any) -> Any:
+    return ir.Constant(ir.IntType(64), _of(*kinds).count)
+
+
+def _stored(array: Any, _i: Any, value: Any) -> Any:
+    return types.none if value is _of(array) else None
+
+
+_implement(vector.lanes, (), lambda: types.int64, lambda _build, _kinds, _none: ir.Constant(ir.IntType(64), _LANES))
+_implement(vector.lanes_of, (types.Array,), lambda _array: types.int64, _count)
+_implement(vector.zero, (), lambda: VECTOR, lambda _build, _kinds, _none: _constant(VECTOR, 0.0))
+_implement(vector.zero_of, (types.Array,), _of, lambda _build, kinds, _given: _constant(_of(*kinds), 0.0))
+_implement(vector.load, (types.Array, types.Integer), _of, _load)
+_implement(vector.store, (types.Array, types.Integer, VectorType), _stored, _store)
+_implement(vector.total, (VectorType,), lambda _whole: types.float64, _folded(_sum_of))
+_implement(vector.largest, (VectorType,), lambda _whole: types.float64, _folded(_larger_of))
+_implement(vector.larger, (VectorType, VectorType), _common, lambda build, _kinds, both: _larger_of(build, *both))
+_implement(
+    vector.magnitude, (VectorType,), _common, lambda build, kinds, given: _unary(build, kinds[0], "fabs", given[0])
+)
+_implement(vector.inverse_root, (VectorType, types.Float), lambda kind, _floor: kind, _inverse_root)
+_implement(vector.negative, (VectorType,), lambda _vector: types.int64, _negative)

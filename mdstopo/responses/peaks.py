@@ -131,23 +131,27 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     for i in range(1, samples - 1):
         g[i] *= sign
         d[i] *= sign
-    # both ends in one pass: of very many members the pass costs what reading them does
+    # both ends in one pass: of very many members the pass costs what reading them does. The start may be a stage
+    begun = np.int64(1 if steps.scalar[0, 0] == steps.t[0] else 0)
     ends = np.empty((2, n_pair, POSE))
     end_sums = np.empty((2, n_pair, SUMS))
-    for end in range(2):
+    for end in range(begun, 2):
         state = steps.state[end * count]
         relative_pose(model.pair, state[0], state[1], ends[end])
-    member_sums(springs, strength, ends, np.int64(2), np.bool_(False), end_sums)
+    member_sums(springs, strength, ends[begun:], 2 - begun, np.bool_(False), end_sums[begun:])
+    work[0] += 2 - begun
     for end in range(2):
-        i = end * (samples - 1)
-        value, rate = energy_of(ends[end], end_sums[end])
+        value = steps.scalar[0, 1]
+        rate = steps.scalar[0, 2]
+        if end >= begun:
+            value, rate = energy_of(ends[end], end_sums[end])
         for p in range(n_pair):
             for j in range(3):
-                pull[end, p, j] = end_sums[end, p, 4 + j]
+                pull[end, p, j] = end_sums[end, p, 4 + j] if end >= begun else steps.pull[0, p, j]
+        i = end * (samples - 1)
         t[i] = steps.t[end * count]
         g[i] = sign * value
         d[i] = sign * rate
-    work[0] += 2
     guessed = np.empty(samples, np.bool_)
     for i in range(samples):
         guessed[i] = np.isnan(d[i])

@@ -143,7 +143,9 @@ def energy_rows(  # type: ignore[no-untyped-def]
             reached = max(stages, steps.index[w + 1, 0])
             z = np.empty((reached, n))
             used = np.zeros(reached, np.int64)
-            reverse_sweep(pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, accuracy, work)
+            reverse_sweep(
+                pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, accuracy, work
+            )
             design_gradient(model, steps.stage, z, used, out, work)
         if integral:
             energy_gradient(model, steps.stage, weight, out)

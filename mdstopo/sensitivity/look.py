@@ -85,7 +85,7 @@ def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-unt
     for p in range(n_pair):
         spare[p] = model.shortest[p]
     relative_pose(pair, model.q0, model.v0, before)
-    for i in range(stages + 1):
+    for i in range(steps.index[0, 0], stages + 1):
         state = steps.state[count] if i == stages else steps.stage[i]
         relative_pose(pair, state[0], state[1], rel)
         for p in range(n_pair):

@@ -15,7 +15,7 @@ import numpy as np
 
 from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
+from mdstopo.native.vector import inverse_root, lanes, lanes_of, load, store, total, zero, zero_of
 
 
 @kernel
@@ -74,30 +74,30 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
     """
     rows = room.shape[0]
     _begin_rows(px, py, width, dx, dy, room)
-    sum_x = zero()
-    sum_y = zero()
-    sum_t = zero()
-    energy = zero()
-    sum_w = zero()
-    sum_wx = zero()
-    sum_wy = zero()
-    kxx = zero()
-    kxy = zero()
-    kyy = zero()
-    kxt = zero()
-    kyt = zero()
-    ktt = zero()
-    for i in range(first, last, lanes()):
+    sum_x = zero_of(l0)
+    sum_y = zero_of(l0)
+    sum_t = zero_of(l0)
+    energy = zero_of(l0)
+    sum_w = zero_of(l0)
+    sum_wx = zero_of(l0)
+    sum_wy = zero_of(l0)
+    kxx = zero_of(l0)
+    kxy = zero_of(l0)
+    kyy = zero_of(l0)
+    kxt = zero_of(l0)
+    kyt = zero_of(l0)
+    ktt = zero_of(l0)
+    for i in range(first, last, lanes_of(l0)):
         u = load(qx, i)
         v = load(qy, i)
         ax = c * u - s * v
         ay = s * u + c * v
-        own_w = zero()
-        own_x = zero()
-        own_y = zero()
-        gxx = zero()
-        gxy = zero()
-        gyy = zero()
+        own_w = zero_of(l0)
+        own_x = zero_of(l0)
+        own_y = zero_of(l0)
+        gxx = zero_of(l0)
+        gxy = zero_of(l0)
+        gyy = zero_of(l0)
         at = i
         rx, ry, r2, y = _seen(ax, ay, room, np.int64(0))
         for j in range(rows):
@@ -148,6 +148,15 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
 
 
 @kernel
+def _seen_at(turned, room, j, m):  # type: ignore[no-untyped-def]
+    """r, L^2 and 1/L of the members of row j at pose m."""
+    rx = load(turned[m, 0], 0) + room[j, m, 0]
+    ry = load(turned[m, 1], 0) + room[j, m, 1]
+    r2 = rx * rx + ry * ry
+    return rx, ry, r2, inverse_root(r2, ZERO_LENGTH_SQUARED)
+
+
+@kernel
 def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, room, turned, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) of each spring at pose (m, >= 4) j to out; u (m, 3), room (rows, m, 4).
 
@@ -155,6 +164,8 @@ def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, room, turned
     """
     rows = room.shape[0]
     many = pose.shape[0]
+    if many == 0:
+        return
     for j in range(rows):
         for m in range(many):
             ex = pose[m, 0] - px[j * width]
@@ -171,14 +182,16 @@ def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, room, turned
             store(turned[m, 0], 0, pose[m, 2] * v - pose[m, 3] * w)
             store(turned[m, 1], 0, pose[m, 3] * v + pose[m, 2] * w)
         at = i
+        rx, ry, r2, z = _seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
             work = zero()
-            for m in range(many):
-                rx = load(turned[m, 0], 0) + room[j, m, 0]
-                ry = load(turned[m, 1], 0) + room[j, m, 1]
-                r2 = rx * rx + ry * ry
-                z = inverse_root(r2, ZERO_LENGTH_SQUARED)
-                work += (r2 * z - free) * z * (rx * room[j, m, 2] + ry * room[j, m, 3])
+            for m in range(1, many):
+                following = _seen_at(turned, room, j, m)
+                work += (r2 * z - free) * z * (rx * room[j, m - 1, 2] + ry * room[j, m - 1, 3])
+                rx, ry, r2, z = following
+            following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
+            work += (r2 * z - free) * z * (rx * room[j, many - 1, 2] + ry * room[j, many - 1, 3])
+            rx, ry, r2, z = following
             store(out, at, load(out, at) + load(k, at) * work)
             at += width
