@@ -57,13 +57,13 @@ class Estimator:
         while tolerance > TIGHTEST:
             tolerance = max(FINER * tolerance, TIGHTEST)
             finer = self._at(tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
-            if finer.work != found.work:
+            if not _same_steps(finer, found):
                 return finer
         # nothing finer can be had: a coarser one is farther off than what was found, once its steps are others
         while True:
             tolerance *= 10.0
             coarser = self._at(tolerance).evaluate(alpha, bool(found.gradients), sensitivity)
-            if coarser.work != found.work or tolerance >= COARSEST:
+            if not _same_steps(coarser, found) or tolerance >= COARSEST:
                 return coarser
 
     def _at(self, tolerance: float) -> "Evaluator":
@@ -80,6 +80,11 @@ class Estimator:
         for load_case in halved.scenes:
             halved.driver(load_case).settings[2] = 0.5 * coarse.driver(load_case).settings[2]
         return halved
+
+
+def _same_steps(one: Evaluation, other: Evaluation) -> bool:
+    """Whether two evaluations differ at most in how far linear iterations were taken."""
+    return all(one.work[name] == other.work[name] for name in one.work if name != "body_sweeps")
 
 
 def _difference(found: Evaluation, finer: Evaluation, name: str, factor: float) -> ErrorEstimate:

@@ -15,6 +15,7 @@ from mdstopo.native.vector import (
     WIDE,
     inverse_root,
     lanes,
+    lanes_of,
     larger,
     largest,
     load,
@@ -23,6 +24,7 @@ from mdstopo.native.vector import (
     store,
     total,
     zero,
+    zero_of,
 )
 
 FLOOR = 1e-30
@@ -60,6 +62,19 @@ def _mixed(x, y, out):
 @numba.njit
 def _signs(x):
     return negative(load(x, 0))
+
+
+@numba.njit
+def _in_kind(x, y, out):
+    sums = zero_of(x)
+    most = zero_of(x)
+    for i in range(0, len(x), lanes_of(x)):
+        a = load(x, i)
+        b = a * 2.0 - load(y, i) * inverse_root(a * a, FLOOR)
+        store(out, i, b)
+        sums += b
+        most = larger(magnitude(b), most)
+    return lanes_of(x), total(sums), largest(most)
 
 
 @numba.njit
@@ -108,6 +123,20 @@ def test_bits_tell_which_lanes_are_below_zero():
     assert _signs(np.full(width, -np.inf)) == (1 << width) - 1
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_vectors_are_of_their_array_s_precision(kind):
+    rng = np.random.default_rng(6)
+    x, y = rng.normal(size=(2, 64)).astype(kind)
+    out = np.empty(64, kind)
+    width, sums, most = _in_kind(x, y, out)
+    assert width * out.itemsize == _width() * 8
+    rounding = 4.0 * float(np.finfo(kind).eps)
+    exact = 2.0 * x.astype(np.longdouble) - y.astype(np.longdouble) / np.abs(x.astype(np.longdouble))
+    assert (np.abs(out - exact) < rounding * (2.0 * np.abs(x) + np.abs(y / x))).all()
+    assert sums == pytest.approx(out.sum(dtype=np.float64), abs=rounding * float(np.abs(out).sum()))
+    assert most == np.abs(out).max()
+
+
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_a_number_lost_anywhere_is_seen(bad):
     n = 6
@@ -134,6 +163,7 @@ def test_processors_without_the_widest_vectors_get_the_same_numbers():
         "own.test_inverse_roots_are_right_to_rounding_over_the_whole_range()\n"
         "own.test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number()\n"
         "own.test_operators_are_those_of_arrays()\n"
+        "own.test_vectors_are_of_their_array_s_precision(np.float32)\n"
         "own.test_a_number_lost_anywhere_is_seen(np.nan)\n"
     )
     environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
