@@ -139,7 +139,7 @@ def _timed(made: Sequence[_Made], design: int, rounds: int, seconds: float) -> l
             answer = each.process.ask(do="time", which=each.which, design=design, seconds=seconds)
             if "failed" not in answer:
                 own[0].append(median(answer["times"]))
-                own[1].append(median(answer["processor"]))
+                own[1].append(answer["processor"])
     return [
         Measured(
             each.entry, *each.answer["errors"][design], *own, each.process.loading, each.answer["seconds"],

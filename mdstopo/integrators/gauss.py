@@ -273,8 +273,8 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                         scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
                     motion_weights(pair, rel[0], reach, scale, weight)
                 e = balance(
-                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, accuracy, ref, a,
-                    q, v, work,
+                    pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning,
+                    newton == 0, weight, accuracy, ref, a, q, v, work,
                 )  # fmt: skip
                 if e < 0.0:
                     break

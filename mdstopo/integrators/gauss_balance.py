@@ -26,6 +26,7 @@ from mdstopo.mechanics.assembly import (
     subtract_products,
     subtract_transposed,
 )
+from mdstopo.native.vector import lanes, store, zero
 
 #: what the windows of one simulation work in: at nodes (first index), of pairs, of the state at the start; rows (10,
 #: nodes, W) and vectors (11, W) as in `rows`: those that `balance` works in are rows 2 to 4, `gauss` names the others.
@@ -38,11 +39,13 @@ DENSE = 24
 
 @kernel
 def balance(  # type: ignore[no-untyped-def]
-    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, weight, accuracy, ref, a, q, v, work
-):
+    pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, alike, weight, accuracy, ref, a,
+    q, v, work,
+):  # fmt: skip
     """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
 
-    In: forces f and tangents (`Room`) at ref (2, s, W); a as a first guess; weight (W,) of `motion_weights`; none (W,)
+    In: forces f and tangents (`Room`) at ref (2, s, W), tangents alike at all nodes or not; a as a first guess; weight
+    (W,) of `motion_weights`; none (W,)
     zeros; accuracy: relative change of the states at which to stop, or rounding. Returns the relative correction of
     the states against ref, or -1 where the sweeps do not contract.
     """
@@ -55,9 +58,13 @@ def balance(  # type: ignore[no-untyped-def]
     dense = own.dense.shape[2] > 0
     if dense:
         scale_rows(inv_mass, f, s, rest)
-        fill_dense(pair, k, turn, turning, inv_mass, s, np.bool_(False), own.dense[0])
+        different = np.int64(1) if alike else s
+        fill_dense(pair, k, turn, turning, inv_mass, different, np.bool_(False), own.dense[0])
         if damped:
-            fill_dense(pair, c, turn, np.bool_(False), inv_mass, s, np.bool_(False), own.dense[1])
+            fill_dense(pair, c, turn, np.bool_(False), inv_mass, different, np.bool_(False), own.dense[1])
+        for kind in range(own.dense.shape[0]):
+            for i in range(different, s):
+                take_rows(own.dense[kind, 0], np.int64(own.dense.shape[2]), own.dense[kind, i])
     q_ref = ref[0]
     v_ref = ref[1]
     nodes = planes[0, 0]
@@ -111,14 +118,14 @@ def dense_rows(n):  # type: ignore[no-untyped-def]
 def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ignore[no-untyped-def]
     """out (s, n, W) = M^-1 (load tangent - K), K (s, n_pair, 6, 6), by columns; transposed: by rows.
 
-    Zeros at and beyond n in each row are kept. The few numbers of a few bodies are multiplied faster in whole vectors
+    Zeros at and beyond n in each row. The few numbers of a few bodies are multiplied faster in whole vectors
     than pair by pair.
     """
     for i in range(s):
         m = out[i]
         for d in range(m.shape[0]):
-            for e in range(m.shape[0]):
-                m[d, e] = 0.0
+            for e in range(0, m.shape[1], lanes()):
+                store(m[d], e, zero())
         for p in range(pair.shape[0]):
             a = 3 * pair[p, 0]
             b = 3 * pair[p, 1]

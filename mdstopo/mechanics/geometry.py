@@ -49,6 +49,14 @@ def fill_pose(pair, p, q, v, ca, sa, c, s, rel):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def copy_poses(source, target):  # type: ignore[no-untyped-def]
+    """target = source, (n_pair, POSE)."""
+    for p in range(source.shape[0]):
+        for j in range(POSE):
+            target[p, j] = source[p, j]
+
+
+@kernel
 def pair_displacement(pair, rel, p, dq, out):  # type: ignore[no-untyped-def]
     """out (3,) = T dq for pair p: the change of its relative pose under a change dq (n,) of all coordinates."""
     a = 3 * pair[p, 0]

@@ -9,7 +9,7 @@ share them (`native.threads`) and no bit depends on how many do.
 import numpy as np
 
 from mdstopo.jit import kernel
-from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.geometry import POSE, copy_poses, pair_displacement, relative_pose
 from mdstopo.mechanics.grids import add_forces, add_tangent, design_grid, sum_grid
 from mdstopo.mechanics.laws.spring import (
     elastic_design,
@@ -205,12 +205,12 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
 
 
 @kernel
-def design_gradient(model, stage, z, used, out, work):  # type: ignore[no-untyped-def]
+def design_gradient(model, stage, pose, z, used, out, work):  # type: ignore[no-untyped-def]
     """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength): one pass, no histories.
 
-    In: stage (S, 3, n) with q, v, and their virtual displacements z (S, n), the adjoint of the force balance, of the
-    stages that are used (S,). The member's generalised force is -T^T b f, so each adds -f_i (b_i . T z_s). Fixed
-    members are passed over. work: counts the stages.
+    In: stage (S, 3, n) with q, v; pose (any, n_pair, POSE): relative poses of the first of them; z (S, n): virtual
+    displacements, the adjoint of the force balance; used (S,): which stages. The member's generalised force is
+    -T^T b f, so each adds -f_i (b_i . T z_s). Fixed members are passed over. work: counts the stages.
     """
     pair = model.pair
     n_pair = pair.shape[0]
@@ -223,7 +223,10 @@ def design_gradient(model, stage, z, used, out, work):  # type: ignore[no-untype
     j = 0
     for i in range(used.shape[0]):
         if used[i]:
-            relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
+            if i < pose.shape[0]:
+                copy_poses(pose[i], rel[j])
+            else:
+                relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
             for p in range(n_pair):
                 pair_displacement(pair, rel[j], p, z[i], u[j, p])
                 for axis in range(3):

@@ -54,11 +54,26 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
 
 @kernel
 def energy_rows(  # type: ignore[no-untyped-def]
-    model, motion, tables, strength, steps, count, damped, reduction, closeness, gradient, accuracy, rows, padded, work
+    model,
+    motion,
+    tables,
+    strength,
+    steps,
+    count,
+    pose,
+    damped,
+    reduction,
+    closeness,
+    gradient,
+    accuracy,
+    rows,
+    padded,
+    work,
 ):
     """Value, time and gradient of the stored energy reduced over time.
 
-    In: motion, strength: the members that the motion was computed with (`carrying`); reduction (MAX..FINAL), closeness
+    In: motion, strength: the members that the motion was computed with (`carrying`); pose (S, n_pair, POSE): relative
+    poses of the stages; reduction (MAX..FINAL), closeness
     (how near to the highest a peak competes, relative), gradient (wanted or not), accuracy of `reverse_step`.
     Out: rows (R, 4) time, value, step, fraction (time NaN for mean and integral); padded (R, M_padded) gradients with
     respect to alpha^mu. Returns how many rows there are.
@@ -89,8 +104,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
         for i in range(stages):
             weight[i] *= scale
             value += weight[i] * steps.scalar[i, 1]
-            relative_pose(pair, steps.stage[i, 0], steps.stage[i, 1], rel[0])
-            energy_slope(pair, rel[0], steps.pull[i], weight[i], bar[i])
+            energy_slope(pair, pose[i], steps.pull[i], weight[i], bar[i])
         rows[0, 0] = np.nan
         rows[0, 1] = value
         rows[0, 2] = count - 1
@@ -146,7 +160,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
             reverse_sweep(
                 pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, accuracy, work
             )
-            design_gradient(model, steps.stage, z, used, out, work)
+            design_gradient(model, steps.stage, pose, z, used, out, work)
         if integral:
             energy_gradient(model, steps.stage, weight, out)
         else:

@@ -63,7 +63,8 @@ def _gradient(ints, floats, alpha, weights, states, z, padded, out):  # type: ig
     used = np.ones(z.shape[0], np.int64)
     work = np.zeros(8, np.int64)
     padded[:] = 0.0
-    design_gradient(model, states, z, used, padded, work)
+    poses = np.empty((0, model.pair.shape[0], POSE))
+    design_gradient(model, states, poses, z, used, padded, work)
     energy_gradient(model, states, weights, padded)
     unscale_gradient(model, alpha, padded, out)
 

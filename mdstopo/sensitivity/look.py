@@ -11,7 +11,7 @@ from mdstopo.integrators.steps import FORCES, SPRINGS, carve, copy_rows, deflect
 from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
-from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
+from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_poses, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
 from mdstopo.scene.packing import unpack
@@ -51,11 +51,14 @@ def look(  # type: ignore[no-untyped-def]
     turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
-    find_meeting(model, strength, steps, count, meeting)
+    pose = np.empty((steps.index[count, 0], model.pair.shape[0], POSE))
+    for i in range(pose.shape[0]):
+        relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], pose[i])
+    find_meeting(model, strength, steps, count, pose, meeting)
     accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
-            model, motion, tables, own, steps, count, damped, reductions[j], settings[3], gradient, accuracy,
+            model, motion, tables, own, steps, count, pose, damped, reductions[j], settings[3], gradient, accuracy,
             rows[j], padded, work,
         )  # fmt: skip
         if gradient:
@@ -65,13 +68,13 @@ def look(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-untyped-def]
+def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[no-untyped-def]
     """meeting (2,): padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
-    one stretch between stages. `model` is the whole one, whose padding repeats its members: other padding would have a
-    length of its own.
+    one stretch between stages. pose (S, n_pair, POSE): of the stages. `model` is the whole one, whose padding repeats
+    its members: other padding would have a length of its own.
     """
     meeting[0] = -1
     pair = model.pair
@@ -86,8 +89,10 @@ def find_meeting(model, strength, steps, count, meeting):  # type: ignore[no-unt
         spare[p] = model.shortest[p]
     relative_pose(pair, model.q0, model.v0, before)
     for i in range(steps.index[0, 0], stages + 1):
-        state = steps.state[count] if i == stages else steps.stage[i]
-        relative_pose(pair, state[0], state[1], rel)
+        if i == stages:
+            relative_pose(pair, steps.state[count, 0], steps.state[count, 1], rel)
+        else:
+            copy_poses(pose[i], rel)
         for p in range(n_pair):
             moved = deflection(rel, before, model.reach, p)
             spare[p] -= moved
