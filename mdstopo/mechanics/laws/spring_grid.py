@@ -15,7 +15,7 @@ import numpy as np
 
 from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.native.vector import inverse_root, lanes, lanes_of, load, store, total, zero, zero_of
+from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
 
 
 @kernel
@@ -28,7 +28,7 @@ def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
+def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
     """e of each row."""
     for j in range(room.shape[0]):
         room[j, 0] = dx - px[j * width]
@@ -38,7 +38,7 @@ def _begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
 @kernel
 def grid_force(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
     """Return Q (3 numbers) and E."""
-    _begin_rows(px, py, width, dx, dy, room)
+    begin_rows(px, py, width, dx, dy, room)
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
@@ -73,31 +73,31 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
     The lengths of the next row are found while this one is summed, as in `spring.elastic_tangent`.
     """
     rows = room.shape[0]
-    _begin_rows(px, py, width, dx, dy, room)
-    sum_x = zero_of(l0)
-    sum_y = zero_of(l0)
-    sum_t = zero_of(l0)
-    energy = zero_of(l0)
-    sum_w = zero_of(l0)
-    sum_wx = zero_of(l0)
-    sum_wy = zero_of(l0)
-    kxx = zero_of(l0)
-    kxy = zero_of(l0)
-    kyy = zero_of(l0)
-    kxt = zero_of(l0)
-    kyt = zero_of(l0)
-    ktt = zero_of(l0)
-    for i in range(first, last, lanes_of(l0)):
+    begin_rows(px, py, width, dx, dy, room)
+    sum_x = zero()
+    sum_y = zero()
+    sum_t = zero()
+    energy = zero()
+    sum_w = zero()
+    sum_wx = zero()
+    sum_wy = zero()
+    kxx = zero()
+    kxy = zero()
+    kyy = zero()
+    kxt = zero()
+    kyt = zero()
+    ktt = zero()
+    for i in range(first, last, lanes()):
         u = load(qx, i)
         v = load(qy, i)
         ax = c * u - s * v
         ay = s * u + c * v
-        own_w = zero_of(l0)
-        own_x = zero_of(l0)
-        own_y = zero_of(l0)
-        gxx = zero_of(l0)
-        gxy = zero_of(l0)
-        gyy = zero_of(l0)
+        own_w = zero()
+        own_x = zero()
+        own_y = zero()
+        gxx = zero()
+        gxy = zero()
+        gyy = zero()
         at = i
         rx, ry, r2, y = _seen(ax, ay, room, np.int64(0))
         for j in range(rows):
