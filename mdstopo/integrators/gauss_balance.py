@@ -44,10 +44,9 @@ def balance(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
 
-    In: forces f and tangents (`Room`) at ref (2, s, W), tangents alike at all nodes or not; a as a first guess; weight
-    (W,) of `motion_weights`; none (W,)
-    zeros; accuracy: relative change of the states at which to stop, or rounding. Returns the relative correction of
-    the states against ref, or -1 where the sweeps do not contract.
+    In: forces f and tangents (`Room`) at ref (2, s, W), the tangents alike at all nodes or not; a as a first guess;
+    weight (W,) of `motion_weights`; none (W,) zeros; accuracy: relative change of the states at which to stop. Returns
+    the relative correction of the states against ref, or -1 where the sweeps do not contract.
     """
     k = own.K
     c = own.C
@@ -70,6 +69,8 @@ def balance(  # type: ignore[no-untyped-def]
     nodes = planes[0, 0]
     first = planes[1]
     second = planes[2]
+    # what the linearisation is off by grows with the square of what it corrects; a prediction is off by more
+    share = 1e-2 if alike else 1e-3
     correction = 0.0
     last = np.inf
     growing = 0
@@ -83,7 +84,7 @@ def balance(  # type: ignore[no-untyped-def]
                 correction = largest_difference(q, q_ref, weight, s)
             if not change <= 1e8:
                 return -1.0
-            if change <= max(1e-3 * correction * correction, accuracy, 1e-15) or (change >= last and change < 1e-13):
+            if change <= max(share * correction * correction, accuracy, 1e-15) or (change >= last and change < 1e-13):
                 break
             growing = growing + 1 if change >= last else 0
             if growing >= 3 or sweep == 80:
