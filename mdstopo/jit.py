@@ -32,6 +32,11 @@ def kernel(function: F) -> F:
     return cast(F, Kernel(function, frozenset()))
 
 
+def part(function: F) -> F:
+    """Compile a `kernel` into all that call it: a small one, to which passing arrays takes as long as it runs."""
+    return cast(F, Kernel(function, frozenset(), part=True))
+
+
 def member_kernel(function: F) -> F:
     """Compile a loop over members: sums vectorised, NaN and infinities honoured."""
     return cast(F, Kernel(function, _VECTOR))

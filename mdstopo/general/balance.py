@@ -28,7 +28,7 @@ from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.table import (
@@ -95,7 +95,7 @@ def make_desk(model):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@part
 def gather(model, j, x, out):  # type: ignore[no-untyped-def]
     """out (6,) = the entries of x (n,) of the two bodies of joint j."""
     a = 3 * model.joint[j, 1]
@@ -105,7 +105,7 @@ def gather(model, j, x, out):  # type: ignore[no-untyped-def]
         out[3 + i] = x[b + i]
 
 
-@kernel
+@part
 def gather_turned(model, j, q, turned, w):  # type: ignore[no-untyped-def]
     """w (PLACES,) of joint j from q (n,) and the turns of `forces.turn_bodies`."""
     gather(model, j, q, w)
@@ -116,7 +116,7 @@ def gather_turned(model, j, q, turned, w):  # type: ignore[no-untyped-def]
         w[8 + i] = turned[two, i]
 
 
-@kernel
+@part
 def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
     """out (3,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
     for r in range(3):

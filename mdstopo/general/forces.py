@@ -13,12 +13,12 @@ from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.general.switches import DAMPED
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangents
 from mdstopo.mechanics.geometry import add_pair_force, fill_pose
 
 
-@kernel
+@part
 def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
     """turned (n_body, 2) = cos and sin of every body's angle: pairs and joints share them."""
     for b in range(turned.shape[0]):
@@ -26,7 +26,7 @@ def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
         turned[b, 1] = math.sin(q[3 * b + 2])
 
 
-@kernel
+@part
 def turned_pose(pair, turned, q, v, rel):  # type: ignore[no-untyped-def]
     """`mechanics.geometry.relative_pose` of bodies that are turned by `turn_bodies`."""
     for p in range(pair.shape[0]):

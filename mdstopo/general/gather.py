@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import block_design
+from mdstopo.general.members import block_design, whole_vectors
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
@@ -70,7 +70,8 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type
         if code == SPRING and weight == 0.0 and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
             width = model.member.shape[1]
             rows = model.member.reshape(5 * width)
-            elastic_designs(rows, width, lo, model.block[k, 2], model.law[k, 0], rel, u, p, out)
+            stop = lo + whole_vectors(model.block[k, 5])
+            elastic_designs(rows, width, lo, stop, model.law[k, 0], rel, u, p, out)
             continue
         for j in range(count):
             if code != INERTER:

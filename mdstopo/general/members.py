@@ -13,12 +13,13 @@ Blocks of springs, which neither switch nor remember, take the vectors of `mecha
 import math
 
 from mdstopo.general.model import INERTER
-from mdstopo.jit import inline, kernel
+from mdstopo.jit import inline, kernel, part
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.grids import add_forces, add_tangent
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
 from mdstopo.mechanics.laws.table import CRUSH, SPRING, law, law_first_set, law_start
+from mdstopo.native.vector import lanes
 
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
 SCALE, MODE, SET = range(3)
@@ -54,6 +55,12 @@ def stretch_of(member, i, r):  # type: ignore[no-untyped-def]
     return length - member[4, i], bx * r[4] + by * r[5] + bt * r[6]
 
 
+@part
+def whole_vectors(count):  # type: ignore[no-untyped-def]
+    """So many members with as much of the padding behind them as fills the last vector."""
+    return (count + lanes() - 1) // lanes() * lanes()
+
+
 @kernel
 def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no-untyped-def]
     """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C."""
@@ -62,7 +69,8 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
     member = model.member
     counted = model.block[k, 4] >= 0
     if code == SPRING:
-        add_springs(member, strength, model.block[k, 1], model.block[k, 2], p, r, counted, tangent, o)
+        start = model.block[k, 1]
+        add_springs(member, strength, start, start + whole_vectors(model.block[k, 5]), p, r, counted, tangent, o)
         return
     curves = model.curves
     tau = t - model.times[segment]
@@ -119,37 +127,26 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
         o[21] += fr * bt * bt
 
 
-@kernel
+@part
 def add_springs(member, strength, start, stop, p, r, counted, tangent, o):  # type: ignore[no-untyped-def]
     """`add_block` of springs, which are places start to stop of member (5, M_padded) and strength, padding included."""
-    if p[1] == 0.0 and p[2] == 0.0:
-        add_elastic(member, strength, start, stop, p[0], r, counted, tangent, o)
-        return
     width = member.shape[1]
-    rows = member.reshape(5 * width)
+    rows = member.reshape(member.size)
     scale = strength.reshape(strength.size)
-    alike_sums(rows, width, scale, start, stop, p, r, counted, o)
-    if tangent:
-        alike_tangent(rows, width, scale, start, stop, p, r, o)
-        if p[1] != 0.0:
-            alike_damping(rows, width, scale, start, stop, p, r, o)
-
-
-@kernel
-def add_elastic(member, strength, start, stop, k, r, counted, tangent, o):  # type: ignore[no-untyped-def]
-    """`add_springs` without damping and preload, of stiffness k."""
-    px = member[0, start:stop]
-    py = member[1, start:stop]
-    qx = member[2, start:stop]
-    qy = member[3, start:stop]
-    l0 = member[4, start:stop]
-    scale = strength[0, start:stop]
-    if tangent:
-        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(px, py, qx, qy, l0, scale, r[0], r[1], r[2], r[3])
+    k = p[0]
+    if p[1] != 0.0 or p[2] != 0.0:
+        alike_sums(rows, width, scale, start, stop, p, r, counted, o)
+        if tangent:
+            alike_tangent(rows, width, scale, start, stop, p, r, o)
+            if p[1] != 0.0:
+                alike_damping(rows, width, scale, start, stop, p, r, o)
+    elif tangent:
+        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r)
+        add_forces((k * x, k * y, k * t, k * e), counted, o)
         add_tangent((k * kxx, k * kxy, k * kyy, k * kxt, k * kyt, k * ktt), o)
     else:
-        x, y, t, e = elastic_force(px, py, qx, qy, l0, scale, r[0], r[1], r[2], r[3])
-    add_forces((k * x, k * y, k * t, k * e), counted, o)
+        x, y, t, e = elastic_force(rows, width, scale, start, stop, r)
+        add_forces((k * x, k * y, k * t, k * e), counted, o)
 
 
 @kernel
@@ -224,7 +221,8 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
     lo = model.block[k, 1]
     if code == SPRING:
         width = member.shape[1]
-        alike_design(member.reshape(5 * width), width, lo, model.block[k, 2], p, r, u, weight, out)
+        stop = lo + whole_vectors(model.block[k, 5])
+        alike_design(member.reshape(5 * width), width, lo, stop, p, r, u, weight, out)
         return
     curves = model.curves
     tau = t - model.times[segment]
@@ -270,7 +268,7 @@ def meeting(model, segment, t, strength, before, after):  # type: ignore[no-unty
         w = after[model.block[k, 0]]
         m = model.member
         lo = model.block[k, 1]
-        if far(m.reshape(m.size), m.shape[1], lo, model.block[k, 2], r, w):
+        if far(m.reshape(m.size), m.shape[1], lo, lo + whole_vectors(model.block[k, 5]), r, w):
             continue
         value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
         for i in range(lo, lo + model.block[k, 5]):

@@ -8,7 +8,7 @@ compatibility matrix (Eq. 32) is B = -b T, and dDelta/dq = -B (Eq. 36). Nothing 
 
 import math
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A
 DX, DY, COS, SIN, VX, VY, VT, COS_A, SIN_A, OMEGA_A = range(10)
@@ -24,7 +24,7 @@ def relative_pose(pair, q, v, rel):  # type: ignore[no-untyped-def]
         fill_pose(pair, p, q, v, math.cos(turn), math.sin(turn), math.cos(theta), math.sin(theta), rel)
 
 
-@kernel
+@part
 def fill_pose(pair, p, q, v, ca, sa, c, s, rel):  # type: ignore[no-untyped-def]
     """Fill rel[p] from one state and the cos and sin of psi_A and of theta."""
     a = 3 * pair[p, 0]
@@ -56,7 +56,7 @@ def copy_poses(source, target):  # type: ignore[no-untyped-def]
             target[p, j] = source[p, j]
 
 
-@kernel
+@part
 def pair_displacement(pair, rel, p, dq, out):  # type: ignore[no-untyped-def]
     """out (3,) = T dq for pair p: the change of its relative pose under a change dq (n,) of all coordinates."""
     a = 3 * pair[p, 0]
@@ -71,7 +71,7 @@ def pair_displacement(pair, rel, p, dq, out):  # type: ignore[no-untyped-def]
     out[2] = dq[b + 2] - turn
 
 
-@kernel
+@part
 def add_pair_force(pair, rel, p, qx, qy, qt, out):  # type: ignore[no-untyped-def]
     """out (n,) += T^T (qx, qy, qt): a force on the relative pose as forces and moments on both bodies."""
     a = 3 * pair[p, 0]

@@ -6,7 +6,7 @@ pass over them. Sums are added tile by tile, in order.
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
 from mdstopo.native.vector import lanes
 from mdstopo.scene.model import ROWS, TILE
@@ -15,7 +15,7 @@ from mdstopo.scene.model import ROWS, TILE
 PLACES = 4 * TILE
 
 
-@kernel
+@part
 def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
     """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is energy that is looked at."""
     for i in range(3):
@@ -26,7 +26,7 @@ def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
             out[4 + i] -= found[i]
 
 
-@kernel
+@part
 def add_tangent(found, out):  # type: ignore[no-untyped-def]
     """Add the upper triangle xx, xy, yy, xt, yt, tt of K to out (SUMS,)."""
     kxx, kxy, kyy, kxt, kyt, ktt = found

@@ -150,6 +150,9 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
     p = block[k, 0]
     viscous = block[k, 3] == 1
     counted = block[k, 4] >= 0  # energy is that of design members
+    width = member.shape[1]
+    rows = member.reshape(member.size)
+    scale = strength.reshape(strength.size)
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)
         px = member[0, lo:hi]
@@ -163,11 +166,11 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
             o = sums[j, column]
             if not viscous:
                 if tangent:
-                    found = elastic_tangent(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3])
+                    found = elastic_tangent(rows, width, scale, lo, hi, r)
                     add_forces(found[:4], counted, o)
                     add_tangent(found[4:], o)
                 else:
-                    add_forces(elastic_force(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3]), counted, o)
+                    add_forces(elastic_force(rows, width, scale, lo, hi, r), counted, o)
                 continue
             cs = strength[1, lo:hi]
             ps = strength[2, lo:hi]

@@ -74,15 +74,17 @@ def _is_our_process() -> bool:
 class Kernel:
     """A compiled function that other compiled functions call.
 
-    fastmath: the flags of its floating point. `py_func` is the function as written, to be run in Python.
+    fastmath: the flags of its floating point; part: whether it becomes part of whatever calls it. `py_func` is the
+    function as written, to be run in Python.
     """
 
     _inner = True
 
-    def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
+    def __init__(self, function: Callable[..., Any], fastmath: frozenset[str], part: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
         self._fastmath = fastmath
+        self._part = part
         self._dispatcher: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
@@ -119,5 +121,6 @@ class Kernel:
     def _made(self, **options: Any) -> Any:
         """Numba's object for the function."""
         fastmath = set(self._fastmath) or False
+        options["forceinline"] = self._part
         made = numba().njit(error_model="numpy", fastmath=fastmath, no_cfunc_wrapper=True, **options)
         return made(self.py_func)

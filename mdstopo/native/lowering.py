@@ -11,6 +11,7 @@ A variable that is assigned once, before all its uses, is a value and needs no p
 array that has just been put together is known.
 
 Numbers that index an array in C order become an address from the array's fields, not from a copy of them in memory.
+So does another shape of one that a function got.
 """
 
 from typing import Any
@@ -84,12 +85,35 @@ class Lower(NumbaLower):
             kind = self.typeof(expr.value.name)
             if isinstance(kind, types.StructRef):
                 return self._field(kind, self.loadvar(expr.value.name), expr.attr, resty)
+        if self.context is self._plain and expr.op == "call":
+            return self._reshaped(resty, expr)
         return super().lower_expr(resty, expr)
 
     def _field(self, kind: Any, given: Any, name: str, wanted: Any) -> Any:
         """A field of a structure that lives as long as the call, not counted."""
         fields = _Structure(self._counting, self.builder, kind).get_data_struct(given)
         return self.context.cast(self.builder, getattr(fields, name), kind.field_dict[name], wanted)
+
+    def _reshaped(self, kind: Any, call: Any) -> Any:
+        """An array in C order, in another shape, of which no length is -1; the numbers must be as many."""
+        build = self.builder
+        given = self.loadvar(call.func.name)
+        shape = [size for each in call.args for size in self._index(each.name, _lengths(self.typeof(each.name)))]
+        count = Constant(cgutils.intp_t, 1)
+        strides: list[Any] = []
+        for length in reversed(shape):
+            strides.insert(0, build.mul(count, build.extract_value(given, _SIZE)))
+            count = build.mul(count, length)
+        other = build.icmp_signed("!=", count, build.extract_value(given, _COUNT))
+        with build.if_then(other, likely=False):
+            self.call_conv.return_user_exc(build, ValueError, ("total size of new array must be unchanged",))
+        made = self.context.get_constant_undef(kind)
+        for k in (_HOLDER, _PARENT, _COUNT, _SIZE, _DATA):
+            made = build.insert_value(made, build.extract_value(given, k), k)
+        for k, pair in enumerate(zip(shape, strides, strict=True)):
+            for place, value in zip((_SHAPE, _STRIDES), pair, strict=True):
+                made = build.insert_value(made, value, [place, k])
+        return made
 
     def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
         array, wanted = signature.args
@@ -161,6 +185,11 @@ class Lower(NumbaLower):
             made = build.insert_value(made, length, [_SHAPE, k])
             made = build.insert_value(made, build.extract_value(given, [_STRIDES, first + k]), [_STRIDES, k])
         return made
+
+
+def _lengths(given: Any) -> Any:
+    """The type of a shape, or of one of its lengths, as lengths are kept."""
+    return types.UniTuple(types.intp, len(given)) if isinstance(given, types.BaseTuple) else types.intp
 
 
 def _kinds(index: Any) -> tuple[Any, ...]:
@@ -241,6 +270,11 @@ def borrowed(blocks: Any, typemap: Any) -> set[str]:
         names -= others
 
 
+def _reshapes(kind: Any) -> bool:
+    """Whether a type is that of the method `reshape` of an array."""
+    return isinstance(kind, types.BoundFunction) and bool(kind.typing_key == "array.reshape")
+
+
 def _borrows(value: Any, names: set[str], typemap: Any) -> bool:
     if isinstance(value, (ir.Arg, ir.Const, ir.Global, ir.FreeVar)):
         return True
@@ -250,6 +284,8 @@ def _borrows(value: Any, names: set[str], typemap: Any) -> bool:
         return False
     if value.op == "build_tuple":
         return all(item.name in names for item in value.items)
+    if value.op == "call":
+        return value.func.name in names and _reshapes(typemap[value.func.name])
     if value.op not in ("getattr", "getitem", "static_getitem", "exhaust_iter") or value.value.name not in names:
         return False
     whole = typemap[value.value.name]
@@ -257,6 +293,8 @@ def _borrows(value: Any, names: set[str], typemap: Any) -> bool:
         return bool(value.op == "getattr")
     if isinstance(whole, types.BaseTuple):
         return True
+    if value.op == "getattr":
+        return isinstance(whole, types.Array) and whole.layout == "C" and bool(value.attr == "reshape")
     index = {"getitem": "index", "static_getitem": "index_var"}.get(value.op)
     if index is None or not isinstance(whole, types.Array) or getattr(value, index) is None:
         return False

@@ -13,16 +13,12 @@ COUNT = 48
 
 @numba.njit
 def _force(member, pose):
-    return spring.elastic_force(
-        member[0], member[1], member[2], member[3], member[4], member[5], pose[0], pose[1], pose[2], pose[3]
-    )
+    return spring.elastic_force(member.reshape(member.size), member.shape[1], member[5], 0, COUNT, pose)
 
 
 @numba.njit
 def _tangent(member, pose):
-    return spring.elastic_tangent(
-        member[0], member[1], member[2], member[3], member[4], member[5], pose[0], pose[1], pose[2], pose[3]
-    )
+    return spring.elastic_tangent(member.reshape(member.size), member.shape[1], member[5], 0, COUNT, pose)
 
 
 @numba.njit

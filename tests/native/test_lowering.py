@@ -97,6 +97,35 @@ def test_numbers_index_as_in_python():
         np.testing.assert_array_equal(compiled, written)
 
 
+@entry
+def reshaped(given, n, out):
+    """Other shapes of what the caller has, of parts of it, and of an array of its own."""
+    row = given.reshape(given.size)
+    row[1] = -5.0
+    sheet = given[1].reshape((n, 2))
+    sheet[n - 1, 0] += 0.5
+    own = np.arange(6.0).reshape((3, 2))
+    again = own.reshape(2, 3)
+    out[0] = row[-1] + sheet[0, 1] + sheet[:, 0].sum() + again[1, 0]
+    out[1:3] = again.reshape(6)[4:]
+    return sheet.shape[0] * row.size
+
+
+def test_another_shape_is_a_view_of_the_same_numbers():
+    results = []
+    for call in (reshaped, reshaped.py_func):
+        given, out = np.arange(24.0).reshape(2, 4, 3), np.zeros(3)
+        results.append((call(given, 6, out), given, out))
+    for compiled, written in zip(*results, strict=True):
+        np.testing.assert_array_equal(compiled, written)
+
+
+@pytest.mark.parametrize("n", [5, 7, 0, -6])
+def test_a_shape_of_another_size_is_refused(n):
+    with pytest.raises(ValueError, match="size"):
+        reshaped(np.arange(24.0).reshape(2, 4, 3), n, np.zeros(3))
+
+
 def chosen(x):
     """Which kernel it is depends on the type."""
     raise NotImplementedError

@@ -5,7 +5,7 @@ Parameters: s_A (2), s_B (2). Used by the fixed joint too, which adds a row of i
 
 import math
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 
 #: places of w: x, y, psi of both bodies, then cos and sin of both angles, which many joints share
 PLACES = 10
@@ -20,7 +20,7 @@ def turn(w):  # type: ignore[no-untyped-def]
     w[9] = math.sin(w[5])
 
 
-@kernel
+@part
 def arms(par, w):  # type: ignore[no-untyped-def]
     """px, py, cx, cy: the points relative to their centres of mass, global axes."""
     ca = w[6]
@@ -35,7 +35,7 @@ def arms(par, w):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
+@part
 def revolute_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     """Phi (2) and its slopes."""
     px, py, cx, cy = arms(par, w)
@@ -52,7 +52,7 @@ def revolute_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     jac[1, 5] = cx
 
 
-@kernel
+@part
 def revolute_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
     """Centripetal parts of the second derivative."""
     px, py, cx, cy = arms(par, w)
@@ -60,7 +60,7 @@ def revolute_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
     gamma[1] = wd[2] * wd[2] * py - wd[5] * wd[5] * cy
 
 
-@kernel
+@part
 def revolute_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
     """d(Phi_q v)/dq: only the arms turn."""
     px, py, cx, cy = arms(par, w)
@@ -73,7 +73,7 @@ def revolute_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
     out[1, 5] = -wd[5] * cy
 
 
-@kernel
+@part
 def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
     """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
     px, py, cx, cy = arms(par, w)
@@ -93,7 +93,7 @@ def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[n
     by_v[1, 5] = -2.0 * wb * cy
 
 
-@kernel
+@part
 def revolute_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
     """k += d(Phi_q^T lam)/dq."""
     px, py, cx, cy = arms(par, w)

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from mdstopo.case.model import DistanceJoint, Joint, PrismaticJoint
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.joints.distance import (
     distance_acceleration_slopes,
     distance_gamma,
@@ -64,7 +64,7 @@ def describe(joint: Joint) -> str:
     return f"joint {name}({joint.type}, between {joint.bodies[0]} and {joint.bodies[1]})"
 
 
-@kernel
+@part
 def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
     """phi (3,) and jac (3, 6) = Phi_q; rows that the joint has not are left as they are."""
     if code == REVOLUTE:
@@ -77,7 +77,7 @@ def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
         distance_rows(par, w, phi, jac)
 
 
-@kernel
+@part
 def joint_gamma(code, par, w, wd, gamma):  # type: ignore[no-untyped-def]
     """gamma (3,) of Phi_q a + gamma = 0."""
     if code == REVOLUTE:
@@ -90,7 +90,7 @@ def joint_gamma(code, par, w, wd, gamma):  # type: ignore[no-untyped-def]
         distance_gamma(par, w, wd, gamma)
 
 
-@kernel
+@part
 def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
     """out (3, 6) = d(Phi_q v)/dq."""
     if code == REVOLUTE:
@@ -103,7 +103,7 @@ def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
         distance_velocity_slope(par, w, wd, out)
 
 
-@kernel
+@part
 def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
     """by_q, by_v (3, 6): slopes of Phi_q a + gamma at fixed a."""
     if code == REVOLUTE:
@@ -116,7 +116,7 @@ def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignor
         distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
 
 
-@kernel
+@part
 def joint_stiffness(code, par, w, lam, k):  # type: ignore[no-untyped-def]
     """k (6, 6) += d(Phi_q^T lam)/dq."""
     if code in (REVOLUTE, FIXED):

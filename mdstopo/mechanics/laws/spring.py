@@ -21,7 +21,7 @@ import math
 
 import numpy as np
 
-from mdstopo.jit import inline, kernel, member_kernel
+from mdstopo.jit import inline, kernel, member_kernel, part
 from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 ELASTIC = 0
@@ -36,24 +36,24 @@ def _inverse_length(r2):  # type: ignore[no-untyped-def]
     return 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
 
 
-@kernel
-def elastic_force(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyped-def]
-    """Return Q (3 numbers) and E of a tile of undamped springs."""
+@part
+def elastic_force(member, width, scale, start, stop, r):  # type: ignore[no-untyped-def]
+    """Return Q (3 numbers) and E of the undamped springs from start to stop at the relative pose r (4 or more,).
+
+    member (5 width or more,): the rows P, Q and free length behind each other, width of each; scale (stop or more,): k.
+    """
+    dx = r[0]
+    dy = r[1]
+    c = r[2]
+    s = r[3]
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
     energy = zero()
-    for i in range(0, k.shape[0], lanes()):
-        u = load(qx, i)
-        v = load(qy, i)
-        ax = c * u - s * v
-        ay = s * u + c * v
-        rx = ax - (load(px, i) - dx)
-        ry = ay - (load(py, i) - dy)
-        r2 = rx * rx + ry * ry
-        y = inverse_root(r2, ZERO_LENGTH_SQUARED)
-        stretch = r2 * y - load(l0, i)
-        w = load(k, i) * stretch
+    for i in range(start, stop, lanes()):
+        ax, ay, rx, ry, r2, y = _seen(member, width, i, dx, dy, c, s)
+        stretch = r2 * y - load(member, 4 * width + i)
+        w = load(scale, i) * stretch
         energy += w * stretch
         w *= y
         sum_x += w * rx
@@ -62,25 +62,30 @@ def elastic_force(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyp
     return -total(sum_x), -total(sum_y), -total(sum_t), 0.5 * total(energy)
 
 
-@kernel
-def _seen(px, py, qx, qy, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
-    """R q, r and 1/L of the members from i on."""
-    u = load(qx, i)
-    v = load(qy, i)
+@part
+def _seen(member, width, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """R q, r, |r|^2 and 1/L of the members from i on."""
+    u = load(member, 2 * width + i)
+    v = load(member, 3 * width + i)
     ax = c * u - s * v
     ay = s * u + c * v
-    rx = ax - (load(px, i) - dx)
-    ry = ay - (load(py, i) - dy)
-    return ax, ay, rx, ry, inverse_root(rx * rx + ry * ry, ZERO_LENGTH_SQUARED)
+    rx = ax - (load(member, i) - dx)
+    ry = ay - (load(member, width + i) - dy)
+    r2 = rx * rx + ry * ry
+    return ax, ay, rx, ry, r2, inverse_root(r2, ZERO_LENGTH_SQUARED)
 
 
-@kernel
-def elastic_tangent(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-untyped-def]
-    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K of a tile of undamped springs.
+@part
+def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-untyped-def]
+    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K; arguments as of `elastic_force`.
 
     The lengths of the next members are found while these are summed: one chain of operations from coordinates to sums
     would be longer than a processor looks ahead.
     """
+    dx = r[0]
+    dy = r[1]
+    c = r[2]
+    s = r[3]
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
@@ -94,12 +99,12 @@ def elastic_tangent(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-unt
     kxt = zero()
     kyt = zero()
     ktt = zero()
-    last = k.shape[0] - lanes()
-    ax, ay, rx, ry, y = _seen(px, py, qx, qy, np.int64(0), dx, dy, c, s)
-    for i in range(0, k.shape[0], lanes()):
-        following = _seen(px, py, qx, qy, min(i + lanes(), last), dx, dy, c, s)
-        stiffness = load(k, i)
-        stretch = (rx * rx + ry * ry) * y - load(l0, i)
+    last = stop - lanes()
+    ax, ay, rx, ry, r2, y = _seen(member, width, start, dx, dy, c, s)
+    for i in range(start, stop, lanes()):
+        following = _seen(member, width, min(i + lanes(), last), dx, dy, c, s)
+        stiffness = load(scale, i)
+        stretch = r2 * y - load(member, 4 * width + i)
         w = stiffness * stretch
         energy += w * stretch
         w *= y
@@ -119,7 +124,7 @@ def elastic_tangent(px, py, qx, qy, l0, k, dx, dy, c, s):  # type: ignore[no-unt
         sum_wx += w * ax
         sum_wy += w * ay
         ktt += g * (t * t) - w * (ax * (rx - ax) + ay * (ry - ay))
-        ax, ay, rx, ry, y = following
+        ax, ay, rx, ry, r2, y = following
     w = total(sum_w)
     return (
         -total(sum_x),
