@@ -24,7 +24,7 @@ from mdstopo.general.forces import (
     drive_state,
     general_forces,
 )
-from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints
+from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
@@ -42,11 +42,12 @@ from mdstopo.mechanics.passes import SUMS
 #: what one balance needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope of turning loads,
 #: inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the
 #: scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix the inverse masses,
-#: Phi_q M^-1, the factors and the diagonal; one joint's own coordinates, their derivatives and multipliers; the known
-#: accelerations of what is driven; which pairs carry more than joints, and the switches (`switches`)
+#: by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own coordinates, their
+#: derivatives and multipliers; the known accelerations of what is driven; which pairs carry more than joints, and the
+#: switches (`switches`)
 DESK = (
     "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
-    "x", "scale", "inverse", "pull", "gram", "diagonal", "own", "known", "carries", "switches",
+    "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "known", "carries", "switches",
 )  # fmt: skip
 
 
@@ -85,6 +86,7 @@ def make_desk(model):  # type: ignore[no-untyped-def]
         np.zeros(total),
         np.ones(total),
         inverse_masses(model),
+        spread_masses(model),
         np.zeros((n_joint, 3, 6)),
         np.zeros(model.size[3]),
         np.ones((2, model.size[0])),
@@ -166,7 +168,7 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type:
     desk.switches[OF_JOINTS] = 1 if alone else 0
     if alone:
         thorough = desk.switches[THOROUGH] != 0
-        return factor_joints(model, desk.inverse, desk.jac, desk.pull, desk.gram, desk.diagonal, thorough, desk.x)
+        return factor_joints(model, desk.spread, desk.jac, desk.pull, desk.gram, desk.diagonal, thorough, desk.x)
     band = desk.band
     half = model.size[1]
     n = model.mass.shape[0]

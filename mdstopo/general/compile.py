@@ -106,8 +106,8 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
         load_force=load_force, bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
         joint_par=joint_par, row=layout.row, place=layout.place,
-        size=np.array([*layout.size, int(damped), layout.entries], dtype=np.int64), line=layout.line,
-        envelope=layout.envelope, product=layout.product,
+        size=np.array([*layout.size, int(damped), len(layout.steady)], dtype=np.int64), line=layout.line,
+        envelope=layout.envelope, product=layout.product, steady=layout.steady,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
         varied=varied(case, members["block"]),
     )  # fmt: skip

@@ -14,6 +14,7 @@ from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.general.switches import DAMPED
 from mdstopo.jit import kernel, part
+from mdstopo.mechanics.angles import cos_sin
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangents
 from mdstopo.mechanics.geometry import add_pair_force, fill_pose
 
@@ -22,8 +23,7 @@ from mdstopo.mechanics.geometry import add_pair_force, fill_pose
 def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
     """turned (n_body, 2) = cos and sin of every body's angle: pairs and joints share them."""
     for b in range(turned.shape[0]):
-        turned[b, 0] = math.cos(q[3 * b + 2])
-        turned[b, 1] = math.sin(q[3 * b + 2])
+        turned[b, 0], turned[b, 1] = cos_sin(q[3 * b + 2])
 
 
 @part

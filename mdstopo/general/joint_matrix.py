@@ -17,7 +17,7 @@ part in it (`weakest`).
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 
 #: a pivot, or an eigenvalue, of a scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12
@@ -40,8 +40,20 @@ def inverse_masses(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factor_joints(model, inverse, jac, pull, gram, diagonal, thorough, x):  # type: ignore[no-untyped-def]
-    """Factors of the joints' matrix at slopes jac (n_joint, 3, 6); inverse: as of `inverse_masses`.
+def spread_masses(model):  # type: ignore[no-untyped-def]
+    """(n_joint, 3, 6): `inverse_masses` of the coordinates that slopes of the joints are by."""
+    inverse = inverse_masses(model)
+    spread = np.empty((model.joint.shape[0], 3, 6))
+    for j in range(spread.shape[0]):
+        for r in range(3):
+            for i in range(6):
+                spread[j, r, i] = inverse[3 * model.joint[j, 1 + i // 3] + i % 3]
+    return spread
+
+
+@kernel
+def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):  # type: ignore[no-untyped-def]
+    """Factors of the joints' matrix at slopes jac (n_joint, 3, 6); spread: as of `spread_masses`.
 
     Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (size[3],), L by rows from their first entries on, the diagonal unused;
     diagonal (2, n_row), that of the matrix and the inverse of D. thorough: whether `weakest` is asked, too. x: scratch
@@ -52,22 +64,13 @@ def factor_joints(model, inverse, jac, pull, gram, diagonal, thorough, x):  # ty
     envelope = model.envelope
     slope = jac.reshape(jac.size)
     weighed = pull.reshape(pull.size)
-    for r in range(line.shape[0]):
-        at = line[r, 0]
-        for side in range(2):
-            d = line[r, 1 + side]
-            for i in range(3):
-                e = at + 3 * side + i
-                weighed[index(e)] = slope[index(e)] * inverse[index(d + i)]
-    gram[:] = 0.0
+    whole = spread.reshape(spread.size)
+    for e in range(slope.shape[0]):
+        weighed[e] = slope[e] * whole[e]
+    for e in range(gram.shape[0]):
+        gram[e] = model.steady[e]
     for m in range(product.shape[0]):
-        a = product[m, 1]
-        b = product[m, 2]
-        gram[index(product[m, 0])] += (
-            slope[index(a)] * weighed[index(b)]
-            + slope[index(a + 1)] * weighed[index(b + 1)]
-            + slope[index(a + 2)] * weighed[index(b + 2)]
-        )
+        gram[index(product[m, 0])] += slope[index(product[m, 1])] * weighed[index(product[m, 2])]
     at = decompose(envelope, gram, diagonal)
     if at < 0 and thorough:
         at = weakest(envelope, gram, diagonal, x)
@@ -82,26 +85,89 @@ def factor_joints(model, inverse, jac, pull, gram, diagonal, thorough, x):  # ty
 @kernel
 def decompose(envelope, gram, diagonal):  # type: ignore[no-untyped-def]
     """Factor a matrix in place, as `factor_joints` describes; -1, or a singular row."""
+    i = 0
+    while i < envelope.shape[0]:
+        together = in_pairs(envelope, i)
+        at = _decompose_two(envelope, gram, diagonal, i) if together else _decompose_one(envelope, gram, diagonal, i)
+        if at >= 0:
+            return at
+        i += 2 if together else 1
+    return -1
+
+
+@part
+def in_pairs(envelope, i):  # type: ignore[no-untyped-def]
+    """Whether row i and the next one begin at the same place, as those of a joint do: then both are taken at once, and
+    one waits less for the other.
+    """
+    return i + 1 < envelope.shape[0] and envelope[i + 1, 0] == envelope[i, 0]
+
+
+@part
+def _decompose_one(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
     inverse = diagonal[1]
-    for i in range(envelope.shape[0]):
-        first = envelope[i, 0]
-        own = envelope[i, 1]
-        for j in range(first + 1, i):  # L D
-            other = envelope[index(j), 1]
-            value = gram[index(own + j)]
-            for k in range(max(first, envelope[index(j), 0]), j):
-                value -= gram[index(own + k)] * gram[index(other + k)]
-            gram[index(own + j)] = value
-        whole = gram[index(own + i)]
-        value = whole
-        for k in range(first, i):
-            scaled = gram[index(own + k)] * inverse[index(k)]
-            value -= gram[index(own + k)] * scaled
-            gram[index(own + k)] = scaled
-        diagonal[0, i] = whole
-        if value <= SINGULAR * whole:  # not where it is NaN: that is no fault of the joints
-            return i
-        inverse[i] = 1.0 / value
+    first = envelope[i, 0]
+    own = envelope[i, 1]
+    for j in range(first + 1, i):  # L D
+        other = envelope[index(j), 1]
+        value = gram[index(own + j)]
+        for k in range(max(first, envelope[index(j), 0]), j):
+            value -= gram[index(own + k)] * gram[index(other + k)]
+        gram[index(own + j)] = value
+    whole = gram[index(own + i)]
+    value = whole
+    for k in range(first, i):
+        scaled = gram[index(own + k)] * inverse[index(k)]
+        value -= gram[index(own + k)] * scaled
+        gram[index(own + k)] = scaled
+    diagonal[0, i] = whole
+    if value <= SINGULAR * whole:  # not where it is NaN: that is no fault of the joints
+        return i
+    inverse[i] = 1.0 / value
+    return -1
+
+
+@part
+def _decompose_two(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
+    """`_decompose_one` of rows i and i + 1."""
+    inverse = diagonal[1]
+    first = envelope[i, 0]
+    own = envelope[i, 1]
+    following = envelope[i + 1, 1]
+    for j in range(first + 1, i):
+        other = envelope[index(j), 1]
+        value = gram[index(own + j)]
+        second = gram[index(following + j)]
+        for k in range(max(first, envelope[index(j), 0]), j):
+            factor = gram[index(other + k)]
+            value -= gram[index(own + k)] * factor
+            second -= gram[index(following + k)] * factor
+        gram[index(own + j)] = value
+        gram[index(following + j)] = second
+    whole = gram[index(own + i)]
+    whole_second = gram[index(following + i + 1)]
+    value = whole
+    both = gram[index(following + i)]
+    second = whole_second
+    for k in range(first, i):
+        scaled = gram[index(own + k)] * inverse[index(k)]
+        scaled_second = gram[index(following + k)] * inverse[index(k)]
+        value -= gram[index(own + k)] * scaled
+        both -= gram[index(following + k)] * scaled
+        second -= gram[index(following + k)] * scaled_second
+        gram[index(own + k)] = scaled
+        gram[index(following + k)] = scaled_second
+    diagonal[0, i] = whole
+    diagonal[0, i + 1] = whole_second
+    if value <= SINGULAR * whole:
+        return i
+    inverse[i] = 1.0 / value
+    scaled = both * inverse[i]
+    gram[index(following + i)] = scaled
+    second -= both * scaled
+    if second <= SINGULAR * whole_second:
+        return i + 1
+    inverse[i + 1] = 1.0 / second
     return -1
 
 
@@ -146,19 +212,7 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):  # type: igno
             first += weighed[index(e + i)] * a[index(line[r, 1] + i)]
             second += weighed[index(e + 3 + i)] * a[index(line[r, 2] + i)]
         x[index(line[r, 3])] = first + second - lam[r]
-    for i in range(count):
-        own = envelope[i, 1]
-        value = x[i]
-        for k in range(envelope[i, 0], i):
-            value -= gram[index(own + k)] * x[index(k)]
-        x[i] = value
-    for i in range(count):
-        x[i] *= diagonal[1, i]
-    for i in range(count - 1, -1, -1):
-        own = envelope[i, 1]
-        value = x[index(i)]
-        for k in range(envelope[i, 0], i):
-            x[index(k)] -= gram[index(own + k)] * value
+    substitute(envelope, gram, diagonal, x)
     for d in range(a.shape[0]):
         a[d] *= inverse[d]
     for r in range(count):
@@ -168,3 +222,38 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):  # type: igno
         for i in range(3):
             a[index(line[r, 1] + i)] -= weighed[index(e + i)] * value
             a[index(line[r, 2] + i)] -= weighed[index(e + 3 + i)] * value
+
+
+@kernel
+def substitute(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+    """Solve with the factors of `decompose` for the right side x (n_row,), in place."""
+    count = envelope.shape[0]
+    i = 0
+    while i < count:
+        together = in_pairs(envelope, i)
+        own = envelope[i, 1]
+        following = envelope[i + 1, 1] if together else own
+        value = x[i]
+        second = x[i + 1] if together else 0.0
+        for k in range(envelope[i, 0], i):
+            value -= gram[index(own + k)] * x[index(k)]
+            second -= gram[index(following + k)] * x[index(k)]
+        x[i] = value
+        if together:
+            x[i + 1] = second - gram[index(following + i)] * value
+        i += 2 if together else 1
+    for i in range(count):
+        x[i] *= diagonal[1, i]
+    i = count
+    while i > 0:
+        together = i > 1 and in_pairs(envelope, i - 2)
+        following = envelope[i - 1, 1]
+        second = x[i - 1]
+        i -= 2 if together else 1
+        own = envelope[i, 1]
+        value = 0.0
+        if together:
+            value = x[i] - gram[index(following + i)] * second
+            x[i] = value
+        for k in range(envelope[i, 0], i):
+            x[index(k)] -= gram[index(own + k)] * value + gram[index(following + k)] * second

@@ -5,12 +5,14 @@ watches that it stays fulfilled. Unknowns are ordered so that bodies that are ti
 Cuthill-McKee where there are many); so are the rows alone, for the matrix that is left of them without the bodies.
 """
 
+from collections.abc import Iterator
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from mdstopo.case.model import Case
+from mdstopo.mechanics.joints.table import STEADY
 from mdstopo.scene.model import FloatArray, IndexArray
 
 #: part of a row that must be its own, relative to the row, or others imply it
@@ -20,7 +22,7 @@ FEW = 30
 
 
 class Layout(NamedTuple):
-    """row, place, size[0:2], line, envelope, product, size[3] of `GeneralModel`.
+    """row, place, size[0:2], line, envelope, product, steady of `GeneralModel`.
 
     redundant: names of joints with rows left out.
     """
@@ -31,7 +33,7 @@ class Layout(NamedTuple):
     line: IndexArray
     envelope: IndexArray
     product: IndexArray
-    entries: int
+    steady: FloatArray
     redundant: tuple[str, ...]
 
 
@@ -74,8 +76,22 @@ def arrange(
     line = np.zeros((len(columns), 4), dtype=np.int64)
     for j, r in np.argwhere(row >= 0).tolist():
         line[row[j, r]] = 18 * j + 6 * r, 3 * joint[j, 1], 3 * joint[j, 2], order[row[j, r]]
-    products = _products(row, meet, order, envelope)
-    return Layout(row, place, (len(columns), half), line, envelope, products, entries, tuple(dict.fromkeys(redundant)))
+    products, steady = [], np.zeros(entries)
+    if len(joint):
+        inverse = np.where(free == 1, 1.0 / mass, 0.0)
+        for entry, a, b, axis in _products(row, meet, order, envelope):
+            one, two = (divmod(each // 6, 3) for each in (a, b))
+            fixed = [axis in STEADY[int(joint[j, 0])][r] for j, r in (one, two)]
+            slopes = [float(jac.flat[each + axis]) for each in (a, b)]
+            if all(fixed):
+                body = int(joint[one[0], 1 + a % 6 // 3])
+                steady[entry] += slopes[0] * slopes[1] * inverse[3 * body + axis]
+            elif not any(known and slope == 0.0 for known, slope in zip(fixed, slopes, strict=True)):
+                products.append((entry, a + axis, b + axis))
+    return Layout(
+        row, place, (len(columns), half), line, envelope, np.array(products, dtype=np.int64).reshape(-1, 3), steady,
+        tuple(dict.fromkeys(redundant)),
+    )  # fmt: skip
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, q0: FloatArray) -> FloatArray:
@@ -118,15 +134,19 @@ def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
     return np.array(found, dtype=np.int64).reshape(-1, 4)
 
 
-def _products(row: IndexArray, meet: IndexArray, order: IndexArray, envelope: IndexArray) -> IndexArray:
-    """`GeneralModel.product`."""
-    found = []
+def _products(
+    row: IndexArray, meet: IndexArray, order: IndexArray, envelope: IndexArray
+) -> Iterator[tuple[int, int, int, int]]:
+    """An entry of the joints' own matrix, where the slopes of two rows by the coordinates of one body begin, and which
+    of the coordinates is meant, of every product that belongs there.
+    """
     for j, side, k, other in meet.tolist():
         for r, s in product(range(3), range(3)):
             if row[j, r] >= 0 and row[k, s] >= 0 and (j != k or s <= r):
                 low, high = sorted((int(order[row[j, r]]), int(order[row[k, s]])))
-                found.append((envelope[high, 1] + low, 18 * j + 6 * r + 3 * side, 18 * k + 6 * s + 3 * other))
-    return np.array(found, dtype=np.int64).reshape(-1, 3)
+                for axis in range(3):
+                    entry = int(envelope[high, 1]) + low
+                    yield entry, 18 * j + 6 * r + 3 * side, 18 * k + 6 * s + 3 * other, axis
 
 
 def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, IndexArray, int]:

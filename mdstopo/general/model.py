@@ -57,8 +57,9 @@ class GeneralModel(NamedTuple):
                                     matrix (`joint_matrix`)
     envelope      (n_row, 2)        of each place there the first place that its row reaches, and where the row would
                                     begin among the entries of all rows if it reached the place 0
-    product       (n_product, 3)    what that matrix is made of: an entry, and where the slopes (3,) of two rows by the
-                                    coordinates of one body begin whose product belongs there
+    product       (n_product, 3)    what that matrix is made of: an entry, and two slopes by the same coordinate whose
+                                    product, over its mass, belongs there
+    steady        (size[3],)        what else it is made of: products of slopes that never change
     response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point, its place at the start
     contact_pair  (n_contact,)      the pair of edge and point; `contact` (n_contact, 11): see `mechanics.contact`
     varied        (n_varied, 4)     parameters that vary: block, place (`mechanics.laws.table`), which value, and
@@ -97,6 +98,7 @@ class GeneralModel(NamedTuple):
     line: IndexArray
     envelope: IndexArray
     product: IndexArray
+    steady: FloatArray
     response: IndexArray
     response_par: FloatArray
     contact_pair: IndexArray
@@ -210,11 +212,13 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     f += 4 * n_seg * n_driven
     joint_par = floats[f : f + 12 * n_joint].reshape((n_joint, 12))
     f += 12 * n_joint
+    steady = floats[f : f + size[3]]
+    f += size[3]
     response_par = floats[f : f + 4 * n_resp].reshape((n_resp, 4))
     f += 4 * n_resp
     contact = floats[f : f + 11 * n_contact].reshape((n_contact, 11))
     return ModelView(
         free, mass, q0, v0, pair, reach, block, law, active, level, power, member, curves, times, force, load_body,
         load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row, place, size,
-        line, envelope, product, response, response_par, contact_pair, contact, varied,
+        line, envelope, product, steady, response, response_par, contact_pair, contact, varied,
     )  # fmt: skip

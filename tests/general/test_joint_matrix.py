@@ -8,7 +8,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.general.balance import factor_matrix, joint_state, make_desk, solve_unknowns
 from mdstopo.general.compile import compile_general
 from mdstopo.general.forces import turn_bodies
-from mdstopo.general.joint_matrix import decompose, weakest
+from mdstopo.general.joint_matrix import decompose, substitute, weakest
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.switches import OF_JOINTS
 
@@ -146,6 +146,30 @@ def test_a_small_eigenvalue_is_found_whatever_row_it_belongs_to(seed, least, reg
     diagonal = np.zeros((2, n))
     found = _singular(envelope, gram, diagonal)
     assert (found < 0) == regular
+
+
+@numba.njit
+def _factored(envelope, gram, diagonal, x):
+    at = decompose(envelope, gram, diagonal)
+    substitute(envelope, gram, diagonal, x)
+    return at
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_rows_that_begin_together_and_rows_alone_give_the_same_solution(seed):
+    rng = np.random.default_rng(seed)
+    first = np.minimum(np.repeat(rng.integers(0, 9, 5).cumsum() // 3, rng.integers(1, 4, 5)), 14)
+    n = len(first)
+    first = np.minimum(first, np.arange(n))
+    lower = np.tril(rng.normal(size=(n, n))) * (np.arange(n) >= first[:, None]) + 3.0 * np.eye(n)
+    dense = lower @ lower.T
+    ends = np.cumsum(np.arange(n) - first + 1)
+    envelope = np.stack([first, ends - np.arange(n) - 1], axis=1)
+    gram = np.concatenate([dense[i, f : i + 1] for i, f in enumerate(first)])
+    x = rng.normal(size=n)
+    expected = np.linalg.solve(dense, x)
+    assert _factored(envelope, gram, np.zeros((2, n)), x) == -1
+    assert x == pytest.approx(expected, abs=1e-11 * np.abs(expected).max())
 
 
 def test_it_costs_a_closed_loop_what_its_length_costs():

@@ -45,6 +45,8 @@ REVOLUTE, PRISMATIC, FIXED, DISTANCE = range(4)
 CODES = {"revolute": REVOLUTE, "prismatic": PRISMATIC, "fixed": FIXED, "distance": DISTANCE}
 ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
 WIDTH = 12
+#: slopes of Phi, by row, that are the same wherever the bodies are: columns of either body
+STEADY = {REVOLUTE: ((0, 1), (0, 1)), PRISMATIC: ((), ()), FIXED: ((0, 1), (0, 1), (0, 1, 2)), DISTANCE: ((),)}
 
 
 def parameters(joint: Joint, angle_first: float, angle_second: float) -> list[float]:
