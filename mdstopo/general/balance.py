@@ -26,12 +26,14 @@ from mdstopo.general.forces import (
 )
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
 from mdstopo.general.structures import bundle
-from mdstopo.general.switches import DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
+from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import POSE
-from mdstopo.mechanics.joints.revolute import PLACES
+from mdstopo.mechanics.joints.revolute import PLACES, revolute_pull
 from mdstopo.mechanics.joints.table import (
+    FIXED,
+    REVOLUTE,
     joint_acceleration_slopes,
     joint_gamma,
     joint_rows,
@@ -277,8 +279,8 @@ def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
 def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: ignore[no-untyped-def]
     """Accelerations a (n,) and multipliers lam (n_row,) at one state, whose driven part is put in place first.
 
-    With `tangent`, desk.k, .c, .turn, .by_q, .by_v hold the tangents of the whole balance. Returns the place of the
-    unknown at which the joints are singular, or -1.
+    With `tangent`, desk.k, .c, .turn, .by_q, .by_v hold the tangents of the whole balance (with the switch APART those
+    of members and loads alone). Returns the place of the unknown at which the joints are singular, or -1.
     """
     n = q.shape[0]
     drive_state(model, segment, t, q, v)
@@ -316,7 +318,8 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
     for i in range(model.driven.shape[0]):
         a[model.driven[i]] = known[model.driven[i]]
     if tangent:
-        joint_slopes(model, q, v, a, lam, desk)
+        if desk.switches[APART] == 0:
+            joint_slopes(model, q, v, a, lam, desk)
         if desk.switches[DIAGONAL] == 0:
             add_inerter_tangents(model, segment, strength, q, v, a, desk.k, desk.c)
     return -1
@@ -330,8 +333,7 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
     pull_matrices(pair, k, z, bar_q)
     if desk.switches[DAMPED] != 0:
         pull_matrices(pair, c, z, bar_v)
-    for d in range(z.shape[0]):
-        bar_q[d - d % 3 + 2] += turn[d] * z[d]
+    pull_turns(turn, z, bar_q)
     by_q = desk.by_q
     by_v = desk.by_v
     row = model.row
@@ -352,18 +354,83 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
 def pull_matrices(pair, k, z, bar):  # type: ignore[no-untyped-def]
     """bar (n,) -= K^T z, K by pairs (n_pair, 6, 6)."""
     for p in range(pair.shape[0]):
-        one = 3 * pair[p, 0]
-        two = 3 * pair[p, 1]
-        z0 = z[one]
-        z1 = z[one + 1]
-        z2 = z[one + 2]
-        z3 = z[two]
-        z4 = z[two + 1]
-        z5 = z[two + 2]
-        m = k[p]
-        for j in range(6):
-            d = one + j if j < 3 else two + j - 3
-            bar[d] -= (m[0, j] * z0 + m[1, j] * z1 + m[2, j] * z2) + (m[3, j] * z3 + m[4, j] * z4 + m[5, j] * z5)
+        _pull_matrix(pair, p, k[p], z, bar)
+
+
+@part
+def _pull_matrix(pair, p, m, z, bar):  # type: ignore[no-untyped-def]
+    one = 3 * pair[p, 0]
+    two = 3 * pair[p, 1]
+    z0 = z[one]
+    z1 = z[one + 1]
+    z2 = z[one + 2]
+    z3 = z[two]
+    z4 = z[two + 1]
+    z5 = z[two + 2]
+    for j in range(6):
+        d = one + j if j < 3 else two + j - 3
+        bar[d] -= (m[0, j] * z0 + m[1, j] * z1 + m[2, j] * z2) + (m[3, j] * z3 + m[4, j] * z4 + m[5, j] * z5)
+
+
+@kernel
+def pull_turns(turn, z, bar):  # type: ignore[no-untyped-def]
+    """bar (n,) += (slope of the turning loads)^T z."""
+    for d in range(z.shape[0]):
+        bar[d - d % 3 + 2] += turn[d] * z[d]
+
+
+@kernel
+def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):  # type: ignore[no-untyped-def]
+    """`pull_back` without the joints: k and c (n_pair, 6, 6) of pairs that carry more than these."""
+    damped = desk.switches[DAMPED] != 0
+    for p in range(model.pair.shape[0]):
+        if desk.carries[p] != 0:
+            _pull_matrix(model.pair, p, k[p], z, bar_q)
+            if damped:
+                _pull_matrix(model.pair, p, c[p], z, bar_v)
+    pull_turns(turn, z, bar_q)
+
+
+@kernel
+def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+    """`pull_back` of the joints alone, at a state with a (n,), lam (n_row,) of bodies that are turned on the desk."""
+    w = desk.own[0]
+    wd = desk.own[1]
+    wdd = desk.own[2]
+    mine = desk.own[3]
+    row = model.row
+    for j in range(model.joint.shape[0]):
+        code = model.joint[j, 0]
+        par = model.joint_par[j]
+        one = 3 * model.joint[j, 1]
+        two = 3 * model.joint[j, 2]
+        gather_turned(model, j, q, desk.turned, w)
+        gather(model, j, v, wd)
+        gather(model, j, a, wdd)
+        gather_multipliers(model, j, lam, mine)
+        if code in (REVOLUTE, FIXED):  # what the angle's row has is constant
+            y0 = y[row[j, 0]] if row[j, 0] >= 0 else 0.0
+            y1 = y[row[j, 1]] if row[j, 1] >= 0 else 0.0
+            first, second, rate_first, rate_second = revolute_pull(
+                par, w, wd, wdd, mine, y0, y1, z[one + 2], z[two + 2]
+            )
+            bar_q[one + 2] -= first
+            bar_q[two + 2] -= second
+            bar_v[one + 2] -= rate_first
+            bar_v[two + 2] -= rate_second
+            continue
+        stiffness = desk.k[model.joint[j, 3]]
+        stiffness[:] = 0.0
+        joint_acceleration_slopes(code, par, w, wd, wdd, desk.by_q[j], desk.by_v[j])
+        joint_stiffness(code, par, w, mine, stiffness)
+        _pull_matrix(model.pair, model.joint[j, 3], stiffness, z, bar_q)
+        for r in range(3):
+            if row[j, r] >= 0:
+                value = y[row[j, r]]
+                for i in range(6):
+                    d = one + i if i < 3 else two + i - 3
+                    bar_q[d] -= desk.by_q[j, r, i] * value
+                    bar_v[d] -= desk.by_v[j, r, i] * value
 
 
 @kernel

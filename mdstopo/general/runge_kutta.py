@@ -16,8 +16,8 @@ from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
-from mdstopo.general.switches import THOROUGH
-from mdstopo.general.track import carve_track, copy_vector, keep_stage, keep_state
+from mdstopo.general.switches import APART, THOROUGH
+from mdstopo.general.track import carve_track, copy_vector, has_factors, keep_stage, keep_state
 from mdstopo.integrators.runge_kutta import MOST, _error
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 from mdstopo.integrators.steps import (
@@ -68,6 +68,7 @@ def advance(  # type: ignore[no-untyped-def]
     n = q0.shape[0]
     vectors = table[2]
     desk.switches[THOROUGH] = 0  # the end shows what a stage would
+    desk.switches[APART] = 1 if has_factors(track) else 0
     for i in range(s):
         for d in range(n):
             q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
@@ -86,10 +87,12 @@ def advance(  # type: ignore[no-untyped-def]
         work[FORCES] += 1
         if singular >= 0:
             desk.switches[THOROUGH] = 1
+            desk.switches[APART] = 0
             return singular
         if o >= 0:
             keep_stage(track, o + i, time, q[i], v[i], a[i], lam, desk, tangent)
     desk.switches[THOROUGH] = 1
+    desk.switches[APART] = 0
     if tangent:
         work[TANGENTS] += s
     for d in range(n):

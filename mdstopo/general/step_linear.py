@@ -2,10 +2,20 @@
 
 import numpy as np
 
-from mdstopo.general.balance import factor_matrix, joint_slopes, joint_state, pull_back, push_forward, solve_unknowns
+from mdstopo.general.balance import (
+    factor_matrix,
+    joint_slopes,
+    joint_state,
+    pull_back,
+    pull_carried,
+    pull_joints,
+    push_forward,
+    solve_unknowns,
+)
 from mdstopo.general.forces import turn_bodies
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.projection import project_back, project_forward
+from mdstopo.general.switches import DAMPED
 from mdstopo.general.track import has_factors, mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE, copy_rows
@@ -17,15 +27,26 @@ SETTLED = 1e-12
 
 @kernel
 def lay_out(model, track, o, desk):  # type: ignore[no-untyped-def]
-    """Put the joints of stage o on the desk, with their slopes; the members' tangents stay in the track."""
+    """Put the joints of stage o on the desk, with their slopes. Returns K and C of the stage."""
     q = track.stage[o, 0]
     v = track.stage[o, 1]
+    k = track.K[o]
+    c = track.C[o]
     if has_factors(track):
         copy_rows(track.turned[o], desk.turned)
+        desk.k[:] = 0.0
+        for p in range(k.shape[0]):
+            if desk.carries[p] != 0:
+                copy_rows(k[p], desk.k[p])
+                if desk.switches[DAMPED] != 0:
+                    copy_rows(c[p], desk.c[p])
+        k = desk.k
+        c = desk.c
     else:
         turn_bodies(q, desk.turned)
         joint_state(model, q, v, desk)
     joint_slopes(model, q, v, track.stage[o, 2], track.lam[o], desk)
+    return k, c
 
 
 @kernel
@@ -46,9 +67,16 @@ def stage_back(model, track, o, w_q, w_v, desk, z, y, bar_q, bar_v):  # type: ig
     """From what pulls on a stage's accelerations and multipliers, z (n,) and y (n_row,), to the virtual displacement of
     its balance, in place; and what that pulls on the stage's state, added to bar_q, bar_v (n,).
     """
-    lay_out(model, track, o, desk)
+    if has_factors(track):
+        stage = track.stage[o]
+        copy_rows(track.turned[o], desk.turned)
+        solve_stage(model, track, o, w_q, w_v, np.bool_(True), desk, z, y)
+        pull_carried(model, desk, track.K[o], track.C[o], track.turn[o], z, bar_q, bar_v)
+        pull_joints(model, desk, stage[0], stage[1], stage[2], track.lam[o], z, y, bar_q, bar_v)
+        return
+    k, c = lay_out(model, track, o, desk)
     solve_stage(model, track, o, w_q, w_v, np.bool_(True), desk, z, y)
-    pull_back(model, desk, track.K[o], track.C[o], track.turn[o], z, y, bar_q, bar_v)
+    pull_back(model, desk, k, c, track.turn[o], z, y, bar_q, bar_v)
 
 
 @kernel
@@ -74,16 +102,21 @@ def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, d
     for back in range(s):
         j = s - 1 - back
         y[:] = 0.0
+        by_end = h * h * table[2, 1, j]
+        by_end_rate = h * table[2, 2, j]
         for d in range(n):
-            value = h * h * table[2, 1, j] * lam_q[d] + h * table[2, 2, j] * lam_v[d]
-            for i in range(j + 1, s):
-                value += h * h * table[0, i, j] * u[i, d] + h * table[1, i, j] * g[i, d]
-            if spread:
-                value += bars[j, 2, d]
+            z[j, d] = by_end * lam_q[d] + by_end_rate * lam_v[d]
+        for i in range(j + 1, s):
+            by_stage = h * h * table[0, i, j]
+            by_rate = h * table[1, i, j]
+            if by_stage != 0.0 or by_rate != 0.0:
+                for d in range(n):
+                    z[j, d] += by_stage * u[i, d] + by_rate * g[i, d]
+        if spread:
+            for d in range(n):
+                z[j, d] += bars[j, 2, d]
                 u[j, d] = bars[j, 0, d]
                 g[j, d] = bars[j, 1, d]
-            z[j, d] = value
-        if spread:
             for r in range(y.shape[0]):
                 y[r] = rows_bar[j, r]
         stage_back(model, track, o + j, 0.0, 0.0, desk, z[j], y, u[j], g[j])
@@ -91,13 +124,12 @@ def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, d
             u[j, model.driven[i]] = 0.0
             g[j, model.driven[i]] = 0.0
     for d in range(n):
-        position = lam_q[d]
-        speed = lam_v[d] + h * lam_q[d]
-        for i in range(s):
-            position += u[i, d]
-            speed += h * table[2, 0, i] * u[i, d] + g[i, d]
-        lam_q[d] = position
-        lam_v[d] = speed
+        lam_v[d] += h * lam_q[d]
+    for i in range(s):
+        ahead = h * table[2, 0, i]
+        for d in range(n):
+            lam_q[d] += u[i, d]
+            lam_v[d] += ahead * u[i, d] + g[i, d]
     for i in range(model.driven.shape[0]):
         lam_q[model.driven[i]] = 0.0
         lam_v[model.driven[i]] = 0.0
@@ -149,8 +181,8 @@ def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row): 
     sweeps > 0: what the stage's own acceleration changes in its state goes through W alone by so many fixed-point
     sweeps at most (the iterative method), until they change by less than SETTLED; returns whether they did.
     """
-    lay_out(model, track, o, desk)
-    push_forward(model, desk, track.K[o], track.C[o], track.turn[o], dq, dv, force, row)
+    k, c = lay_out(model, track, o, desk)
+    push_forward(model, desk, k, c, track.turn[o], dq, dv, force, row)
     if sweeps > 0 and (w_q != 0.0 or w_v != 0.0):
         return _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row)
     solve_stage(model, track, o, w_q, w_v, np.bool_(False), desk, force, row)

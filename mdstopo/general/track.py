@@ -12,7 +12,8 @@ index     (m + 1, 4) integers   first stage; step before; segment; how many even
 when      (S,)                  times of the stages
 stage     (S, 3, n)             q, v, a
 lam       (S, n_row)            multipliers of the joints
-K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters
+K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters; where
+                                factors are kept those of pairs that carry more than joints, without the joints' part
 turn      (S, n)                slope of the turning loads
 turned    (S, n_body, 2)        cos and sin of the bodies' angles; pull (S, n_joint, 3, 6), gram (S, size[3]), diagonal
                                 (S, 2, n_row): the factors of the joints' matrix (`joint_matrix`); one row of each where
@@ -127,13 +128,16 @@ def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-unt
     if not tangent:
         return
     copy_vector(desk.turn, track.turn[o])
-    size = desk.k.size
-    copy_vector(desk.k.reshape(size), track.K[o].reshape(size))
-    if desk.switches[DAMPED] != 0:  # else nobody reads it
-        copy_vector(desk.c.reshape(size), track.C[o].reshape(size))
+    damped = desk.switches[DAMPED] != 0  # else nobody reads C
+    apart = has_factors(track)
+    for p in range(desk.k.shape[0]):
+        if desk.carries[p] != 0 or not apart:
+            _copy(desk.k[p], track.K[o, p])
+            if damped:
+                _copy(desk.c[p], track.C[o, p])
     if track.mass.shape[0] > 1:
-        copy_vector(desk.mass.reshape(size), track.mass[o].reshape(size))
-    if has_factors(track):
+        _copy(desk.mass, track.mass[o])
+    if apart:
         _copy(desk.turned, track.turned[o])
         _copy(desk.pull, track.pull[o])
         copy_vector(desk.gram, track.gram[o])

@@ -80,7 +80,7 @@ def model_of(text):
 
 def solved(model, q, a, lam, transposed=False):
     """The place at which the balance is singular, Phi_q (n_row, n) and which factors were made; a, lam in place."""
-    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(4, np.int64)
+    jac, factors = np.zeros((len(model.joint), 3, 6)), np.zeros(5, np.int64)
     singular = _solve(*pack_general(model), q, transposed, a, lam, jac, factors)
     dense = np.zeros((len(lam), len(a)))
     for j, (_, one, two, *_) in enumerate(model.joint.tolist()):

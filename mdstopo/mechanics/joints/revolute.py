@@ -94,6 +94,26 @@ def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[n
 
 
 @part
+def revolute_pull(par, w, wd, wdd, lam, y0, y1, z_first, z_second):  # type: ignore[no-untyped-def]
+    """What `revolute_acceleration_slopes` and `revolute_stiffness` give with y (2) and a virtual displacement z.
+
+    (d(Phi_q a + gamma)/dq)^T y + (d(Phi_q^T lam)/dq)^T z and (d(gamma)/dv)^T y, of which only those by the angles are
+    not zero: those of the first body, of the second, then by their rates. z_first, z_second: z of the angles.
+    """
+    px, py, cx, cy = arms(par, w)
+    wa = wd[2]
+    wb = wd[5]
+    along_p = y0 * px + y1 * py
+    along_c = y0 * cx + y1 * cy
+    return (
+        wdd[2] * along_p + wa * wa * (y1 * px - y0 * py) + (lam[0] * px + lam[1] * py) * z_first,
+        wb * wb * (y0 * cy - y1 * cx) - wdd[5] * along_c - (lam[0] * cx + lam[1] * cy) * z_second,
+        2.0 * wa * along_p,
+        -2.0 * wb * along_c,
+    )
+
+
+@part
 def revolute_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
     """k += d(Phi_q^T lam)/dq."""
     px, py, cx, cy = arms(par, w)
