@@ -12,11 +12,12 @@ import numpy as np
 from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
-from mdstopo.general.switches import DAMPED
+from mdstopo.general.switches import APART, DAMPED
 from mdstopo.jit import kernel, part
 from mdstopo.mechanics.angles import cos_sin
-from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangents
+from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangent
 from mdstopo.mechanics.geometry import add_pair_force, fill_pose
+from mdstopo.mechanics.passes import FIRST_TANGENT, SUMS
 
 
 @part
@@ -27,16 +28,15 @@ def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
 
 
 @part
-def turned_pose(pair, turned, q, v, rel):  # type: ignore[no-untyped-def]
-    """`mechanics.geometry.relative_pose` of bodies that are turned by `turn_bodies`."""
-    for p in range(pair.shape[0]):
-        one = pair[p, 0]
-        two = pair[p, 1]
-        ca = turned[one, 0]
-        sa = turned[one, 1]
-        cb = turned[two, 0]
-        sb = turned[two, 1]
-        fill_pose(pair, p, q, v, ca, sa, ca * cb + sa * sb, ca * sb - sa * cb, rel)
+def turned_pose(pair, p, turned, q, v, rel):  # type: ignore[no-untyped-def]
+    """`mechanics.geometry.relative_pose` of pair p, of bodies that are turned by `turn_bodies`."""
+    one = pair[p, 0]
+    two = pair[p, 1]
+    ca = turned[one, 0]
+    sa = turned[one, 1]
+    cb = turned[two, 0]
+    sb = turned[two, 1]
+    fill_pose(pair, p, q, v, ca, sa, ca * cb + sa * sb, ca * sb - sa * cb, rel)
 
 
 @kernel
@@ -295,8 +295,8 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):  # ty
 
 @kernel
 def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: ignore[no-untyped-def]
-    """F (n,) without inerters at one state, and on demand tangents: f, k, c and turn of the desk; with turned, rel and
-    sums.
+    """F (n,) without inerters at one state, and on demand tangents: f, k, c and turn of the desk; with turned; rel
+    and sums of the pairs that carry more than joints.
     """
     pair = model.pair
     rel = desk.rel
@@ -304,7 +304,11 @@ def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: i
     f = desk.f
     carries = desk.carries
     turn_bodies(q, desk.turned)
-    turned_pose(pair, desk.turned, q, v, rel)
+    for p in range(pair.shape[0]):
+        if carries[p] != 0:
+            turned_pose(pair, p, desk.turned, q, v, rel)
+            for i in range(SUMS if tangent else FIRST_TANGENT):
+                sums[p, i] = 0.0
     general_sums(model, segment, t, strength, rel, tangent, sums)
     add_bushings(model, rel, q, tangent, sums)
     f[:] = 0.0
@@ -317,10 +321,9 @@ def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: i
         k = desk.k
         c = desk.c
         for p in range(pair.shape[0]):
-            e = p + 1
             if carries[p] != 0:
-                pair_tangents(pair[p:e], rel[p:e], q, sums[p:e], damped, k[p:e], c[p:e])
-            else:
+                pair_tangent(pair, p, rel, q, sums, damped, k, c)
+            elif desk.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0
         load_tangent(model, segment, t, q, desk.turn)

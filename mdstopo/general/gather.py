@@ -7,6 +7,7 @@ from mdstopo.general.members import block_design, whole_vectors
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
+from mdstopo.general.switches import carriers
 from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.jit import kernel
@@ -57,10 +58,12 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type
     rel = np.empty((count, n_pair, POSE))
     u = np.empty((count, n_pair, 3))
     row = np.empty(6)
+    carries = carriers(model)
     for j in range(count):
-        turned_pose(model.pair, turned[j], stage[j, 0], stage[j, 1], rel[j])
         for p in range(n_pair):
-            _virtual(model.pair, rel[j], p, z[j], u[j, p])
+            if carries[p] != 0:
+                turned_pose(model.pair, p, turned[j], stage[j, 0], stage[j, 1], rel[j])
+                _virtual(model.pair, rel[j], p, z[j], u[j, p])
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
         if model.block[k, 4] < 0 or model.active[segment, k] == 0:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
-from mdstopo.general.forces import drive_state
+from mdstopo.general.forces import drive_state, turned_pose
 from mdstopo.general.projection import project
 from mdstopo.general.track import copy_vector, keep_stage
 from mdstopo.integrators.gauss_balance import fastest_rate
@@ -151,6 +151,7 @@ def advance(  # type: ignore[no-untyped-def]
         solve_unknowns(model, desk, delta, row)
         rounding = 1e-8
         for p in range(model.pair.shape[0]):
+            turned_pose(model.pair, p, desk.turned, q, v, desk.rel)
             reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
             scale[p] = max(reached, 1e3 * extent[1, p])
             rounding = max(rounding, 100.0 * extent[1, p] / scale[p])

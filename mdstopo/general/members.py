@@ -63,15 +63,14 @@ def whole_vectors(count):  # type: ignore[no-untyped-def]
 
 @kernel
 def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no-untyped-def]
-    """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C."""
+    """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C.
+
+    Springs are summed by `add_springs`.
+    """
     p = model.law[k]
     code = model.block[k, 3]
     member = model.member
     counted = model.block[k, 4] >= 0
-    if code == SPRING:
-        start = model.block[k, 1]
-        add_springs(member, strength, start, start + whole_vectors(model.block[k, 5]), p, r, counted, tangent, o)
-        return
     curves = model.curves
     tau = t - model.times[segment]
     value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
@@ -128,12 +127,17 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
 
 
 @part
-def add_springs(member, strength, start, stop, p, r, counted, tangent, o):  # type: ignore[no-untyped-def]
-    """`add_block` of springs, which are places start to stop of member (5, M_padded) and strength, padding included."""
+def add_springs(model, k, strength, r, tangent, o):  # type: ignore[no-untyped-def]
+    """`add_block` of a block of springs."""
+    member = model.member
+    p = model.law[k]
+    start = model.block[k, 1]
+    stop = start + whole_vectors(model.block[k, 5])
+    counted = model.block[k, 4] >= 0
     width = member.shape[1]
     rows = member.reshape(member.size)
     scale = strength.reshape(strength.size)
-    k = p[0]
+    c = p[0]
     if p[1] != 0.0 or p[2] != 0.0:
         alike_sums(rows, width, scale, start, stop, p, r, counted, o)
         if tangent:
@@ -142,21 +146,23 @@ def add_springs(member, strength, start, stop, p, r, counted, tangent, o):  # ty
                 alike_damping(rows, width, scale, start, stop, p, r, o)
     elif tangent:
         x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r)
-        add_forces((k * x, k * y, k * t, k * e), counted, o)
-        add_tangent((k * kxx, k * kxy, k * kyy, k * kxt, k * kyt, k * ktt), o)
+        add_forces((c * x, c * y, c * t, c * e), counted, o)
+        add_tangent((c * kxx, c * kxy, c * kyy, c * kxt, c * kyt, c * ktt), o)
     else:
         x, y, t, e = elastic_force(rows, width, scale, start, stop, r)
-        add_forces((k * x, k * y, k * t, k * e), counted, o)
+        add_forces((c * x, c * y, c * t, c * e), counted, o)
 
 
 @kernel
 def general_sums(model, segment, t, strength, rel, tangent, sums):  # type: ignore[no-untyped-def]
-    """sums (n_pair, SUMS) = those of all acting blocks at relative poses rel (n_pair, POSE)."""
-    sums[:] = 0.0
+    """sums (n_pair, SUMS) += those of all acting blocks at relative poses rel (n_pair, POSE)."""
     for k in range(model.block.shape[0]):
         if model.active[segment, k] != 0 and model.block[k, 3] != INERTER:
             p = model.block[k, 0]
-            add_block(model, k, segment, t, strength, rel[p], tangent, sums[p])
+            if model.block[k, 3] == SPRING:
+                add_springs(model, k, strength, rel[p], tangent, sums[p])
+            else:
+                add_block(model, k, segment, t, strength, rel[p], tangent, sums[p])
 
 
 @kernel

@@ -62,71 +62,77 @@ def pair_tangents(pair, rel, q, sums, damped, k_out, c_out):  # type: ignore[no-
     w = -J D, R dxi_d = dD + w dpsi_A, and R d(xi'_d) = -omega_A J dD - J R xi'_d dpsi_A.
     """
     for p in range(rel.shape[0]):
-        o = sums[p]
-        ca = rel[p, 7]
-        sa = rel[p, 8]
-        wx = q[3 * pair[p, 1] + 1] - q[3 * pair[p, 0] + 1]
-        wy = q[3 * pair[p, 0]] - q[3 * pair[p, 1]]
-        # K_xi turned into global axes: rows and columns x, y, theta
-        rx = ca * o[7] - sa * o[10]
-        ry = ca * o[8] - sa * o[11]
-        sx = sa * o[7] + ca * o[10]
-        sy = sa * o[8] + ca * o[11]
-        kxx = ca * rx - sa * ry
-        kxy = sa * rx + ca * ry
-        kyx = ca * sx - sa * sy
-        kyy = sa * sx + ca * sy
-        kxt = ca * o[9] - sa * o[12]
-        kyt = sa * o[9] + ca * o[12]
-        ktx = ca * o[13] - sa * o[14]
-        kty = sa * o[13] + ca * o[14]
-        ktt = o[15]
-        # columns of psi_A: rows x, y, theta
-        ax = kxx * wx + kxy * wy - kxt
-        ay = kyx * wx + kyy * wy - kyt
-        at = ktx * wx + kty * wy - ktt
-        if damped:
-            omega = rel[p, 9]
-            rx = ca * o[16] - sa * o[17]
-            ry = ca * o[17] - sa * o[18]
-            sx = sa * o[16] + ca * o[17]
-            sy = sa * o[17] + ca * o[18]
-            cxx = ca * rx - sa * ry
-            cxy = sa * rx + ca * ry
-            cyy = sa * sx + ca * sy
-            cxt = ca * o[19] - sa * o[20]
-            cyt = sa * o[19] + ca * o[20]
-            ctt = o[21]
-            # -J R xi'_d
-            gx = sa * rel[p, 4] + ca * rel[p, 5]
-            gy = sa * rel[p, 5] - ca * rel[p, 4]
-            ax += cxx * gx + cxy * gy
-            ay += cxy * gx + cyy * gy
-            at += cxt * gx + cyt * gy
-            kxx -= omega * cxy
-            kxy += omega * cxx
-            kyx -= omega * cyy
-            kyy += omega * cxy
-            ktx -= omega * cyt
-            kty += omega * cxt
-            _spread(
-                cxx, cxy, cxy, cyy, cxx * wx + cxy * wy - cxt, cxy * wx + cyy * wy - cyt, cxt, cyt,
-                cxt, cyt, cxt * wx + cyt * wy - ctt, ctt, wx, wy, c_out[p],
-            )  # fmt: skip
-        m = k_out[p]
-        _spread(kxx, kxy, kyx, kyy, ax, ay, kxt, kyt, ktx, kty, at, ktt, wx, wy, m)
-        # the change of the force's direction and arm at fixed Q: - d(T^T Q)/dq
-        fx = ca * o[0] - sa * o[1]
-        fy = sa * o[0] + ca * o[1]
-        m[0, 2] -= fy
-        m[1, 2] += fx
-        m[3, 2] += fy
-        m[4, 2] -= fx
-        m[2, 0] -= fy
-        m[2, 1] += fx
-        m[2, 3] += fy
-        m[2, 4] -= fx
-        m[2, 2] += o[0] * rel[p, 0] + o[1] * rel[p, 1]
+        pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out)
+
+
+@kernel
+def pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
+    """`pair_tangents` of pair p alone."""
+    o = sums[p]
+    ca = rel[p, 7]
+    sa = rel[p, 8]
+    wx = q[3 * pair[p, 1] + 1] - q[3 * pair[p, 0] + 1]
+    wy = q[3 * pair[p, 0]] - q[3 * pair[p, 1]]
+    # K_xi turned into global axes: rows and columns x, y, theta
+    rx = ca * o[7] - sa * o[10]
+    ry = ca * o[8] - sa * o[11]
+    sx = sa * o[7] + ca * o[10]
+    sy = sa * o[8] + ca * o[11]
+    kxx = ca * rx - sa * ry
+    kxy = sa * rx + ca * ry
+    kyx = ca * sx - sa * sy
+    kyy = sa * sx + ca * sy
+    kxt = ca * o[9] - sa * o[12]
+    kyt = sa * o[9] + ca * o[12]
+    ktx = ca * o[13] - sa * o[14]
+    kty = sa * o[13] + ca * o[14]
+    ktt = o[15]
+    # columns of psi_A: rows x, y, theta
+    ax = kxx * wx + kxy * wy - kxt
+    ay = kyx * wx + kyy * wy - kyt
+    at = ktx * wx + kty * wy - ktt
+    if damped:
+        omega = rel[p, 9]
+        rx = ca * o[16] - sa * o[17]
+        ry = ca * o[17] - sa * o[18]
+        sx = sa * o[16] + ca * o[17]
+        sy = sa * o[17] + ca * o[18]
+        cxx = ca * rx - sa * ry
+        cxy = sa * rx + ca * ry
+        cyy = sa * sx + ca * sy
+        cxt = ca * o[19] - sa * o[20]
+        cyt = sa * o[19] + ca * o[20]
+        ctt = o[21]
+        # -J R xi'_d
+        gx = sa * rel[p, 4] + ca * rel[p, 5]
+        gy = sa * rel[p, 5] - ca * rel[p, 4]
+        ax += cxx * gx + cxy * gy
+        ay += cxy * gx + cyy * gy
+        at += cxt * gx + cyt * gy
+        kxx -= omega * cxy
+        kxy += omega * cxx
+        kyx -= omega * cyy
+        kyy += omega * cxy
+        ktx -= omega * cyt
+        kty += omega * cxt
+        _spread(
+            cxx, cxy, cxy, cyy, cxx * wx + cxy * wy - cxt, cxy * wx + cyy * wy - cyt, cxt, cyt,
+            cxt, cyt, cxt * wx + cyt * wy - ctt, ctt, wx, wy, c_out[p],
+        )  # fmt: skip
+    m = k_out[p]
+    _spread(kxx, kxy, kyx, kyy, ax, ay, kxt, kyt, ktx, kty, at, ktt, wx, wy, m)
+    # the change of the force's direction and arm at fixed Q: - d(T^T Q)/dq
+    fx = ca * o[0] - sa * o[1]
+    fy = sa * o[0] + ca * o[1]
+    m[0, 2] -= fy
+    m[1, 2] += fx
+    m[3, 2] += fy
+    m[4, 2] -= fx
+    m[2, 0] -= fy
+    m[2, 1] += fx
+    m[2, 3] += fy
+    m[2, 4] -= fx
+    m[2, 2] += o[0] * rel[p, 0] + o[1] * rel[p, 1]
 
 
 @inline

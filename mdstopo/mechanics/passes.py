@@ -25,6 +25,8 @@ from mdstopo.scene.model import TILE, Springs
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
 SUMS = 22
+#: the first of K and C, which are made on demand
+FIRST_TANGENT = 7
 #: members times poses from which on threads are worth making: some 0.8 ms of work
 WORTH = 400_000
 
