@@ -7,12 +7,13 @@ from benchmarks.peers.problem import GROUND, Floats, Problem
 from benchmarks.peers.table import Objective
 
 
-def make(problem: Problem, tolerance: float = 1e-8, integrator: str = "auto") -> Objective:
-    """As the table says. Raises RuntimeError where an evaluation fails."""
+def make(problem: Problem, tolerance: float = 1e-8, integrator: str = "auto", step: float | None = None) -> Objective:
+    """As the table says; with a step, s, no tolerance counts. Raises RuntimeError where an evaluation fails."""
     from mdstopo.case.reader import read_case
     from mdstopo.evaluators import evaluator_of
 
-    case = read_case(json.dumps(case_of(problem) | {"solver": {"integrator": integrator, "tolerance": tolerance}}))
+    accuracy = {"tolerance": tolerance} if step is None else {"step": step}
+    case = read_case(json.dumps(case_of(problem) | {"solver": {"integrator": integrator} | accuracy}))
     evaluator = evaluator_of(case)
 
     def objective(alpha: Floats, gradient: bool) -> tuple[float, Floats | None]:
