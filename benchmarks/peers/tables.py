@@ -69,16 +69,22 @@ def standings(
 
 
 def against_each(title: str, found: Sequence[Measured], bar: float) -> Table:
-    """For each setting of a peer our fastest that errs no more."""
+    """For each setting of a peer our fastest that errs no more, with error control where the peer has it."""
     rows = []
     for each in found:
         if each.entry.peer != OURS:
-            own = fastest(found, each.error, [OURS])
+            alike = [
+                other for other in found if "step" not in other.entry.setting or "tolerance" not in each.entry.setting
+            ]
+            own = fastest(alike, each.error, [OURS])
             cells = each.entry.peer, each.entry.label, f"{each.error:.1e}", significant(1e3 * each.seconds)
             error = "" if own is None else f"{own.error:.1e}"
             rows.append([*cells, *_cells(own), error, *_ratios(own, each, bar)])
     columns = ("peer", "setting", "error", "ms", "mdstopo", "ms", "error", *_ratio_columns(bar))
-    note = "Ours is the fastest setting with no larger an error. The second ratio is that of processor times."
+    note = (
+        "Ours is the fastest setting with no larger an error; one with fixed steps beside such of the peer only. The "
+        "second ratio is that of processor times."
+    )
     return Table(title, columns, rows, (note,))
 
 

@@ -83,7 +83,7 @@ def make_desk(model):  # type: ignore[no-untyped-def]
         np.zeros((n_joint, 3)),
         np.zeros((n_joint, 3, 6)),
         np.zeros((n_joint, 3, 6)),
-        np.zeros((total, 3 * model.size[1] + 1)),
+        np.empty((total, 3 * model.size[1] + 1)),
         np.zeros(total, np.int64),
         np.zeros(total),
         np.ones(total),

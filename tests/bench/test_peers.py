@@ -152,6 +152,18 @@ def test_the_standings_name_the_fastest_and_whether_the_bar_is_met():
     assert len(tables.every_setting("t", found).rows) == len(found)
 
 
+def test_fixed_steps_stand_beside_fixed_steps_only():
+    found = [
+        measured(OURS, 1e-7, 0.002, tolerance=1e-5),
+        measured(OURS, 1e-7, 0.001, step=0.1),
+        measured("jax", 1e-6, 0.010, steps=4),
+        measured("casadi", 1e-6, 0.010, tolerance=1e-6),
+    ]
+    shown = tables.against_each("t", found, bar=0.15)
+    assert [row[4] for row in shown.rows] == ["step 0.1", "tolerance 1e-05"]
+    assert [row[9] for row in shown.rows] == ["yes", "NO"]
+
+
 def test_a_picture_has_a_line_for_each_program(tmp_path):
     pytest.importorskip("matplotlib")
     from benchmarks.peers.picture import draw
