@@ -82,8 +82,8 @@ def against_each(title: str, found: Sequence[Measured], bar: float) -> Table:
             rows.append([*cells, *_cells(own), error, *_ratios(own, each, bar)])
     columns = ("peer", "setting", "error", "ms", "mdstopo", "ms", "error", *_ratio_columns(bar))
     note = (
-        "Ours is the fastest setting with no larger an error; one with fixed steps beside such of the peer only. The "
-        "second ratio is that of processor times."
+        "Ours is the fastest with no larger an error, with fixed steps beside such alone. The second ratio is of "
+        "processor times."
     )
     return Table(title, columns, rows, (note,))
 
