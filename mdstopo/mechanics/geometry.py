@@ -6,9 +6,8 @@ T = dxi/dq (3 x 6, columns x_A y_A psi_A x_B y_B psi_B). With one member's row b
 compatibility matrix (Eq. 32) is B = -b T, and dDelta/dq = -B (Eq. 36). Nothing here depends on members.
 """
 
-import math
-
 from mdstopo.jit import kernel, part
+from mdstopo.mechanics.angles import cos_sin
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A
 DX, DY, COS, SIN, VX, VY, VT, COS_A, SIN_A, OMEGA_A = range(10)
@@ -21,7 +20,9 @@ def relative_pose(pair, q, v, rel):  # type: ignore[no-untyped-def]
     for p in range(pair.shape[0]):
         turn = q[3 * pair[p, 0] + 2]
         theta = q[3 * pair[p, 1] + 2] - turn
-        fill_pose(pair, p, q, v, math.cos(turn), math.sin(turn), math.cos(theta), math.sin(theta), rel)
+        ca, sa = cos_sin(turn)
+        c, s = cos_sin(theta)
+        fill_pose(pair, p, q, v, ca, sa, c, s, rel)
 
 
 @part
