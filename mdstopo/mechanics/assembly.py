@@ -5,7 +5,7 @@ One pass returns a few numbers a pair of bodies and pose (`SUMS`); everything he
 
 import math
 
-from mdstopo.jit import inline, kernel
+from mdstopo.jit import inline, kernel, part
 from mdstopo.mechanics.geometry import add_pair_force, relative_pose
 from mdstopo.mechanics.passes import member_sums, springs_of
 
@@ -242,14 +242,14 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
     sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn)
 
 
-@kernel
+@part
 def place_bodies(pair, q, v, m, rel):  # type: ignore[no-untyped-def]
     """rel (m, n_pair, POSE) at m states."""
     for j in range(m):
         relative_pose(pair, q[j], v[j], rel[j])
 
 
-@kernel
+@part
 def sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
     """What `forces` gives, of the members' sums at the poses rel."""
     pair = model.pair
