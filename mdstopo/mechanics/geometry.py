@@ -14,7 +14,7 @@ DX, DY, COS, SIN, VX, VY, VT, COS_A, SIN_A, OMEGA_A = range(10)
 POSE = 10
 
 
-@kernel
+@part
 def relative_pose(pair, q, v, rel):  # type: ignore[no-untyped-def]
     """Fill rel (n_pair, POSE) from one state q, v (n,)."""
     for p in range(pair.shape[0]):
