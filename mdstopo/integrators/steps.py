@@ -24,7 +24,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)
@@ -164,7 +164,7 @@ def step_at(times, count, t):  # type: ignore[no-untyped-def]
     return low
 
 
-@kernel
+@part
 def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_out, c_out, turn_out):  # type: ignore[no-untyped-def]
     """Store what the force balance of stage o saw: its state, sums and tangents."""
     energy = 0.0

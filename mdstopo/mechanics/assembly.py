@@ -10,7 +10,7 @@ from mdstopo.mechanics.geometry import add_pair_force, relative_pose
 from mdstopo.mechanics.passes import member_sums, springs_of
 
 
-@kernel
+@part
 def add_loads(model, segment, t, q, f):  # type: ignore[no-untyped-def]
     """f (n or more,) += the applied loads of a segment at time t in state q."""
     tau = t - model.times[segment]
@@ -230,7 +230,7 @@ def add_turning_transposed(turn, x, out, count):  # type: ignore[no-untyped-def]
                 out[i, b + 2] += turn[i, d] * x[i, d]
 
 
-@kernel
+@part
 def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
     """Generalised forces, and on demand tangents, at m states in one pass over the members.
 

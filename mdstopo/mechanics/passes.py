@@ -8,7 +8,7 @@ share them (`native.threads`) and no bit depends on how many do.
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import POSE, copy_poses, pair_displacement, relative_pose
 from mdstopo.mechanics.grids import add_forces, add_tangent, design_grid, sum_grid
 from mdstopo.mechanics.laws.spring import (
@@ -31,7 +31,7 @@ FIRST_TANGENT = 7
 WORTH = 400_000
 
 
-@kernel
+@part
 def springs_of(model):  # type: ignore[no-untyped-def]
     """What `member_sums` needs of a model."""
     return Springs(model.block, model.member, model.chunk, model.threads)

@@ -6,7 +6,7 @@ so it serves where bodies move by much more than that. Grids of undamped springs
 
 import numpy as np
 
-from mdstopo.jit import kernel, member_kernel
+from mdstopo.jit import kernel, member_kernel, part
 from mdstopo.mechanics.assembly import place_bodies, sum_bodies
 from mdstopo.mechanics.grids import add_tangent, tile_of
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
@@ -170,7 +170,7 @@ def _sum_roughly(k, wide, block, member, stiffness, rel, m, sums, room, own):  #
                 add_tangent(tangent, o)
 
 
-@kernel
+@part
 def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
     """As `assembly.forces` with tangents, where `may_be_rough`; whether the forces are numbers."""
     place_bodies(model.pair, q, v, m, rel)
