@@ -50,7 +50,7 @@ from mdstopo.integrators.steps import (
     motion_weights,
     solved_to,
 )
-from mdstopo.jit import entry, kernel
+from mdstopo.jit import entry, kernel, part
 from mdstopo.mechanics.assembly import add_loads, forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
@@ -113,7 +113,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     return _windows(model, tables, strength, settings, limits[0], damped, turning, steps, own, work)
 
 
-@kernel
+@part
 def _windows(model, tables, strength, settings, most, damped, turning, steps, own, work):  # type: ignore[no-untyped-def]
     """Window after window from the start to the end; returns as `simulate` does."""
     tolerance = settings[0]

@@ -19,7 +19,7 @@ from mdstopo.integrators.rows import (
     take_rows,
 )
 from mdstopo.integrators.steps import SWEEPS
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,
@@ -37,7 +37,7 @@ Room = namedtuple("Room", "t rel sums K C turn dense rows vectors motion noise s
 DENSE = 24
 
 
-@kernel
+@part
 def balance(  # type: ignore[no-untyped-def]
     pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, alike, weight, accuracy, ref, a,
     q, v, work,
@@ -115,7 +115,7 @@ def dense_rows(n):  # type: ignore[no-untyped-def]
     return n if n <= DENSE else 0
 
 
-@kernel
+@part
 def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ignore[no-untyped-def]
     """out (s, n, W) = M^-1 (load tangent - K), K (s, n_pair, 6, 6), by columns; transposed: by rows.
 
@@ -147,14 +147,14 @@ def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ig
                     m[e, d] += inverse[d] * turn[i, d]
 
 
-@kernel
+@part
 def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
     """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration."""
     n = inv_mass.shape[0]
     x = np.empty((1, n))
     y = np.empty((1, n))
     rate = 0.0
-    for part in range(2 if damped else 1):
+    for kind in range(2 if damped else 1):
         for d in range(n):
             x[0, d] = np.sqrt(inv_mass[d]) * (1.0 + 0.1 * (d % 7))
         value = 0.0
@@ -170,14 +170,14 @@ def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
             for d in range(n):
                 x[0, d] /= value
                 y[0, d] = 0.0
-            subtract_products(pair, k if part == 0 else c, x, y, np.int64(1))
+            subtract_products(pair, k if kind == 0 else c, x, y, np.int64(1))
             for d in range(n):
                 x[0, d] = inv_mass[d] * y[0, d]
-        rate = np.sqrt(value) if part == 0 else max(rate, 1.5 * value)
+        rate = np.sqrt(value) if kind == 0 else max(rate, 1.5 * value)
     return rate
 
 
-@kernel
+@part
 def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):  # type: ignore[no-untyped-def]
     """u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x; z is room."""
     u[:] = 0.0

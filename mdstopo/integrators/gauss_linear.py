@@ -21,7 +21,7 @@ from mdstopo.integrators.rows import (
     take_rows,
 )
 from mdstopo.integrators.steps import REVERSE, SWEEPS
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     subtract_products,
@@ -106,7 +106,7 @@ def carried(steps):  # type: ignore[no-untyped-def]
     return 0
 
 
-@kernel
+@part
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,

@@ -12,7 +12,7 @@ from mdstopo.integrators.banded import half_width, solve
 from mdstopo.integrators.contract import implement
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, effective_matrix, weights_of
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,
@@ -87,7 +87,7 @@ def carried(steps):  # type: ignore[no-untyped-def]
     return 2
 
 
-@kernel
+@part
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,

@@ -6,7 +6,7 @@ from mdstopo.integrators.contract import implement
 from mdstopo.integrators.runge_kutta import MOST, TAG, RungeKuttaSteps, advance
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,
@@ -113,7 +113,7 @@ def carried(steps):  # type: ignore[no-untyped-def]
     return 0
 
 
-@kernel
+@part
 def reverse_step(  # type: ignore[no-untyped-def]
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,

@@ -90,7 +90,7 @@ TIME, ENERGY, ENERGY_RATE = range(3)
 Q, V, OWN = range(3)
 
 
-@kernel
+@part
 def carve(floats, ints, n, n_pair, steps, stages, damped, turning):  # type: ignore[no-untyped-def]
     """The arrays of `FIELDS` with room for so many steps and stages, as views of flat arrays (see `room_for`)."""
     index = ints[: 3 * (steps + 1)].reshape((steps + 1, 3))
@@ -124,7 +124,7 @@ def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning
 # of compilation. Hence these.
 
 
-@kernel
+@part
 def copy_rows(source, target):  # type: ignore[no-untyped-def]
     """target = source, two-dimensional."""
     for i in range(source.shape[0]):
@@ -132,7 +132,7 @@ def copy_rows(source, target):  # type: ignore[no-untyped-def]
             target[i, j] = source[i, j]
 
 
-@kernel
+@part
 def copy_tangents(source, target):  # type: ignore[no-untyped-def]
     """target = source, (n_pair, 6, 6)."""
     for p in range(source.shape[0]):

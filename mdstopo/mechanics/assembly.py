@@ -54,7 +54,7 @@ def load_tangent(model, segment, t, q, turn):  # type: ignore[no-untyped-def]
             turn[b + 2] -= rx * x + ry * y
 
 
-@kernel
+@part
 def pair_tangents(pair, rel, q, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
     """Tangents in body coordinates of one pose: k_out (n_pair, 6, 6) = -dF/dq, c_out = -dF/dv (if damped).
 

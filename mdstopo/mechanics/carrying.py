@@ -8,7 +8,7 @@ at mu = 1 one that carries nothing has a slope.
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.passes import springs_of, threads_for
 from mdstopo.native.threads import shared, taken
 from mdstopo.scene.model import BLOCK, VECTOR, Model, Springs
@@ -19,7 +19,7 @@ IN_GRID, PLAIN = 2, 3
 ROOMY = 11
 
 
-@kernel
+@part
 def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
     """The model without members that carry nothing, its strengths, and how many members are left.
 

@@ -43,7 +43,7 @@ def threads_for(springs, poses):  # type: ignore[no-untyped-def]
     return springs.threads if springs.threads > 0 and springs.member.shape[1] * poses >= WORTH else 1
 
 
-@kernel
+@part
 def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
     """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12)."""
     counter = np.zeros(1, np.int64)
@@ -209,7 +209,7 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
                 o[6] += et
 
 
-@kernel
+@part
 def design_gradient(model, stage, pose, z, used, out, work):  # type: ignore[no-untyped-def]
     """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength): one pass, no histories.
 
@@ -280,7 +280,7 @@ def _design(k, start, stop, block, member, rel, u, out):  # type: ignore[no-unty
             )  # fmt: skip
 
 
-@kernel
+@part
 def energy_gradient(model, stage, weight, out):  # type: ignore[no-untyped-def]
     """out (M_padded,) += sum_s weight_s V_i(q_s): the explicit part of the energy's design gradient."""
     count = weight.shape[0]
@@ -314,7 +314,7 @@ def _energy(k, lo, hi, block, member, rel, weight, out):  # type: ignore[no-unty
             )  # fmt: skip
 
 
-@kernel
+@part
 def unscale_gradient(model, alpha, padded, out):  # type: ignore[no-untyped-def]
     """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
     counter = np.zeros(1, np.int64)

@@ -52,7 +52,7 @@ def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
     return rx, ry, inverse_root(rx * rx + ry * ry, ZERO_LENGTH_SQUARED)
 
 
-@kernel
+@part
 def _tangent(px, py, qx, qy, kl, k, width, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
     """As `spring_grid.grid_tangent`, of k and k l0, without E: with u = k l0/L they are w = k - u and g = u/L^2."""
     rows = room.shape[0]
@@ -125,7 +125,7 @@ def _tangent(px, py, qx, qy, kl, k, width, dx, dy, c, s, room):  # type: ignore[
     )
 
 
-@kernel
+@part
 def rough_sums(springs, strength, rel, m, sums):  # type: ignore[no-untyped-def]
     """As `passes.member_sums` with tangents, of grids alone; without energies and their slopes."""
     block = springs.block
@@ -139,7 +139,7 @@ def rough_sums(springs, strength, rel, m, sums):  # type: ignore[no-untyped-def]
         _sum_roughly(k, wide, block, springs.member, strength[0], rel, m, sums, room, own)
 
 
-@kernel
+@part
 def _sum_roughly(k, wide, block, member, stiffness, rel, m, sums, room, own):  # type: ignore[no-untyped-def]
     """Add block k to sums, tile by tile; own (6, rows, columns): the members of a tile."""
     p = block[k, 0]

@@ -5,12 +5,12 @@ Along the motion dg/dt = sum over pairs of E_xi . xi', and dg/dq = T^T E_xi: bot
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import add_pair_force, relative_pose
 from mdstopo.mechanics.passes import member_sums
 
 
-@kernel
+@part
 def energy_at(pair, springs, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
     """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
     relative_pose(pair, q, v, rel[0])

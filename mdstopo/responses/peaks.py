@@ -10,7 +10,7 @@ import numpy as np
 
 from mdstopo.integrators.contract import point_of, sample
 from mdstopo.integrators.steps import step_at
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of
 from mdstopo.responses.energy import energy_at, energy_of
@@ -106,7 +106,7 @@ def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-
     return count, found
 
 
-@kernel
+@part
 def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, pull, work):  # type: ignore[no-untyped-def]
     """Fill peaks (rows, 4) with the highest peaks of sign g (VALUE holds g); return how many.
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import part
 from mdstopo.native.threads import allowed
 from mdstopo.scene.model import BLOCK, CHUNK, MANY, ROWS, START, STOP, WIDTH, FloatArray, IndexArray, Model
 
@@ -87,7 +87,7 @@ def aligned(shape: tuple[int, ...]) -> FloatArray:
     return room[first : first + count].reshape(shape)
 
 
-@kernel
+@part
 def unpack(ints, floats):  # type: ignore[no-untyped-def]
     """The `Model` whose arrays are views of the packed ones."""
     n = ints[0]

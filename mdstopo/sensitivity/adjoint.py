@@ -9,7 +9,7 @@ inside. The peak's time is held fixed (envelope theorem).
 import numpy as np
 
 from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
-from mdstopo.jit import kernel
+from mdstopo.jit import part
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
@@ -20,7 +20,7 @@ from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 AT_START, AT_END, ELSEWHERE = range(3)
 
 
-@kernel
+@part
 def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, accuracy, work):  # type: ignore[no-untyped-def]
     """Pull the cotangent mu_q (n,) of the position at fraction c of step w (c < 0: its end) back to the start.
 
@@ -52,7 +52,7 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
         w = parent_of(steps, w)
 
 
-@kernel
+@part
 def energy_rows(  # type: ignore[no-untyped-def]
     model,
     motion,

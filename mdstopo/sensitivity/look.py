@@ -8,7 +8,7 @@ import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
 from mdstopo.integrators.steps import FORCES, SPRINGS, carve, copy_rows, deflection, solved_to, step_at
-from mdstopo.jit import entry, kernel
+from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_poses, relative_pose
@@ -67,7 +67,7 @@ def look(  # type: ignore[no-untyped-def]
     work[SPRINGS] += left * work[FORCES]
 
 
-@kernel
+@part
 def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[no-untyped-def]
     """meeting (2,): padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
