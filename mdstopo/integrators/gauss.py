@@ -50,7 +50,7 @@ from mdstopo.integrators.steps import (
     motion_weights,
     solved_to,
 )
-from mdstopo.jit import entry, kernel, part
+from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads, forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
@@ -364,7 +364,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     return OK, count, t
 
 
-@kernel
+@part
 def caution(coef, weight, s):  # type: ignore[no-untyped-def]
     """By how much the last coefficients understate what is left: 1 where they fall fast, up to MOST_CAUTIOUS.
 

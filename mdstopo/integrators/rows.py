@@ -6,17 +6,17 @@ without remainders.
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import part
 from mdstopo.native.vector import WIDE, lanes, larger, largest, load, magnitude, store, total, zero
 
 
-@kernel
+@part
 def row_width(n):  # type: ignore[no-untyped-def]
     """Length of a row of n coordinates."""
     return (n + WIDE - 1) // WIDE * WIDE
 
 
-@kernel
+@part
 def make_rows(count, n):  # type: ignore[no-untyped-def]
     """Zeros (count, W), no vector of which lies in two lines of the cache: reading those takes half as long again."""
     width = row_width(n)
@@ -25,7 +25,7 @@ def make_rows(count, n):  # type: ignore[no-untyped-def]
     return room[first : first + count * width].reshape((count, width))
 
 
-@kernel
+@part
 def copy_row(source, target):  # type: ignore[no-untyped-def]
     """target (W,) = source (n,), zeros after it."""
     target[:] = 0.0
@@ -33,7 +33,7 @@ def copy_row(source, target):  # type: ignore[no-untyped-def]
         target[d] = source[d]
 
 
-@kernel
+@part
 def combine_rows(matrix, s, columns, factor, base, a, out):  # type: ignore[no-untyped-def]
     """out[i] = base[i] + factor sum_j matrix_ij a[j] for i < s, j < columns; base (s, W), a (columns, W)."""
     for d in range(0, out.shape[1], lanes()):
@@ -44,7 +44,7 @@ def combine_rows(matrix, s, columns, factor, base, a, out):  # type: ignore[no-u
             store(out[i], d, load(base[i], d) + factor * x)
 
 
-@kernel
+@part
 def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):  # type: ignore[no-untyped-def]
     """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s, j < columns; all rows."""
     for d in range(0, out.shape[1], lanes()):
@@ -57,7 +57,7 @@ def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):  # 
             store(out[i], d, x0 + c[i] * x1 + factor * x)
 
 
-@kernel
+@part
 def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx):  # type: ignore[no-untyped-def]
     """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i, j < s, and dx[i] = out[i] - ref[i].
 
@@ -82,7 +82,7 @@ def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx): 
     return np.nan if total(lost) != 0.0 else largest(most)
 
 
-@kernel
+@part
 def renew_rows(matrix, s, factor, base, a, weight, out):  # type: ignore[no-untyped-def]
     """out[i] = base[i] + factor sum_j matrix_ij a[j] for i, j < s.
 
@@ -103,7 +103,7 @@ def renew_rows(matrix, s, factor, base, a, weight, out):  # type: ignore[no-unty
     return largest(most), largest(size)
 
 
-@kernel
+@part
 def add_products(matrix, x, s, base, out):  # type: ignore[no-untyped-def]
     """out[i] = base[i] + sum_d x[i, d] matrix[i, d] for i < s; matrix (s, n, W), a row for each coordinate of x[i]."""
     for e in range(0, out.shape[1], lanes()):
@@ -114,7 +114,7 @@ def add_products(matrix, x, s, base, out):  # type: ignore[no-untyped-def]
             store(out[i], e, y)
 
 
-@kernel
+@part
 def scale_rows(factor, x, s, out):  # type: ignore[no-untyped-def]
     """out[i] = factor x[i] for i < s; factor (W,)."""
     for d in range(0, x.shape[1], lanes()):
@@ -123,7 +123,7 @@ def scale_rows(factor, x, s, out):  # type: ignore[no-untyped-def]
             store(out[i], d, f * load(x[i], d))
 
 
-@kernel
+@part
 def subtract_rows(x, y, s, out):  # type: ignore[no-untyped-def]
     """out[i] = x[i] - y[i] for i < s."""
     for d in range(0, x.shape[1], lanes()):
@@ -131,7 +131,7 @@ def subtract_rows(x, y, s, out):  # type: ignore[no-untyped-def]
             store(out[i], d, load(x[i], d) - load(y[i], d))
 
 
-@kernel
+@part
 def take_rows(x, s, out):  # type: ignore[no-untyped-def]
     """out[i] = x[i] for i < s."""
     for d in range(0, x.shape[1], lanes()):
@@ -139,7 +139,7 @@ def take_rows(x, s, out):  # type: ignore[no-untyped-def]
             store(out[i], d, load(x[i], d))
 
 
-@kernel
+@part
 def largest_difference(x, y, weight, s):  # type: ignore[no-untyped-def]
     """max over i < s and coordinates of weight |x[i] - y[i]|; NaN where one is not finite."""
     most = zero()

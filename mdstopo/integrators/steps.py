@@ -141,7 +141,7 @@ def copy_tangents(source, target):  # type: ignore[no-untyped-def]
                 target[p, i, j] = source[p, i, j]
 
 
-@kernel
+@part
 def keep_state(times, state, k, t, q, v):  # type: ignore[no-untyped-def]
     """State k: time, q, v."""
     times[k] = t
@@ -190,7 +190,7 @@ def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_ou
     scalar[o, 2] = rate
 
 
-@kernel
+@part
 def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
     """How far the pair p has moved from its pose at the start, at its attachment points, m (angle within a turn)."""
     x = rel[p, 0] - rel0[p, 0]
@@ -200,7 +200,7 @@ def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
     return np.sqrt(x * x + y * y) + reach[p] * np.sqrt(c * c + s * s)
 
 
-@kernel
+@part
 def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
     """How far the bodies of a pair turn against each other between two states (n,), rad, at most."""
     largest = 0.0
@@ -211,7 +211,7 @@ def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
     return largest
 
 
-@kernel
+@part
 def motion_weights(pair, rel, reach, scale, weight):  # type: ignore[no-untyped-def]
     """weight (n,): change of each coordinate times its weight is at least the displacement relative to the scale.
 

@@ -48,7 +48,7 @@ def tile_of(rows, width):  # type: ignore[no-untyped-def]
     return tall, min(width, PLACES // tall // lanes() * lanes())
 
 
-@kernel
+@part
 def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
     """Add the rows from start to stop of block k to sums (m, columns, SUMS) at the poses rel (m, n_pair, POSE)."""
     p = block[k, 0]
@@ -81,7 +81,7 @@ def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, co
                     add_forces(found_force, counted, o)
 
 
-@kernel
+@part
 def design_grid(start, stop, width, member, pose, u, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) at the poses pose (m, POSE) to out (M_padded,) for the rows from start to stop."""
     rows = (stop - start) // width

@@ -13,7 +13,7 @@ Arguments: member arrays (n,) of whole rows, beginning at the first of them; the
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
 
@@ -66,7 +66,7 @@ def grid_force(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  
     return -total(sum_x), -total(sum_y), -total(sum_t), 0.5 * total(energy)
 
 
-@kernel
+@part
 def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
 
@@ -156,7 +156,7 @@ def _seen_at(turned, room, j, m):  # type: ignore[no-untyped-def]
     return rx, ry, r2, inverse_root(r2, ZERO_LENGTH_SQUARED)
 
 
-@kernel
+@part
 def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, room, turned, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) of each spring at pose (m, >= 4) j to out; u (m, 3), room (rows, m, 4).
 
