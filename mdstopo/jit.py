@@ -33,7 +33,11 @@ def kernel(function: F) -> F:
 
 
 def part(function: F) -> F:
-    """Compile a `kernel` into all that call it: a small one, to which passing arrays takes as long as it runs."""
+    """Compile a `kernel` into all that call it.
+
+    An array is seven numbers or more on the stack, a model a hundred and more: what is given many of them, or runs
+    shortly, spends as long on being called. What is called from several places and is long stays a `kernel`.
+    """
     return cast(F, Kernel(function, frozenset(), part=True))
 
 
