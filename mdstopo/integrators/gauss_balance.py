@@ -71,6 +71,10 @@ def balance(  # type: ignore[no-untyped-def]
     second = planes[2]
     # what the linearisation is off by grows with the square of what it corrects; a prediction is off by more
     share = 1e-2 if alike else 1e-3
+    # what rounding of the positions leaves in a sweep's change, where bodies move by little of where they are
+    rounding = 1e-13
+    for d in range(q0.shape[0]):
+        rounding = max(rounding, min(1e-14 * weight[d] * abs(q0[d]), 1e-6))
     correction = 0.0
     last = np.inf
     growing = 0
@@ -84,7 +88,8 @@ def balance(  # type: ignore[no-untyped-def]
                 correction = largest_difference(q, q_ref, weight, s)
             if not change <= 1e8:
                 return -1.0
-            if change <= max(share * correction * correction, accuracy, 1e-15) or (change >= last and change < 1e-13):
+            enough = max(share * correction * correction, accuracy, 1e-15)
+            if change <= enough or (change >= last and change < rounding):
                 break
             growing = growing + 1 if change >= last else 0
             if growing >= 3 or sweep == 80:
