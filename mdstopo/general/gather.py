@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import block_design, whole_vectors
+from mdstopo.general.members import block_design
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
@@ -14,6 +14,7 @@ from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.alike import elastic_designs
 from mdstopo.mechanics.laws.table import SPRING, law
+from mdstopo.native.padding import whole_vectors
 
 
 @kernel

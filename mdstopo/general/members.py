@@ -15,11 +15,11 @@ import math
 from mdstopo.general.model import INERTER
 from mdstopo.jit import inline, kernel, part
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
-from mdstopo.mechanics.grids import add_forces, add_tangent
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
+from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import CRUSH, SPRING, law, law_first_set, law_start
-from mdstopo.native.vector import lanes
+from mdstopo.native.padding import whole_vectors
 
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
 SCALE, MODE, SET = range(3)
@@ -53,12 +53,6 @@ def stretch_of(member, i, r):  # type: ignore[no-untyped-def]
     """Delta and dDelta/dt of member i at the relative pose r (POSE,)."""
     length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
     return length - member[4, i], bx * r[4] + by * r[5] + bt * r[6]
-
-
-@part
-def whole_vectors(count):  # type: ignore[no-untyped-def]
-    """So many members with as much of the padding behind them as fills the last vector."""
-    return (count + lanes() - 1) // lanes() * lanes()
 
 
 @kernel

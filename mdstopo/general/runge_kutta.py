@@ -33,13 +33,12 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     TURN,
-    copy_rows,
     deflection,
     largest_turn,
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own.

@@ -18,8 +18,9 @@ from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.switches import DAMPED
 from mdstopo.general.track import has_factors, mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.integrators.steps import REVERSE, copy_rows
+from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel
+from mdstopo.mechanics.geometry import copy_rows
 
 #: change of a sweep of the iterative method, relative, at which it has settled
 SETTLED = 1e-12

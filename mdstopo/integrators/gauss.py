@@ -41,7 +41,6 @@ from mdstopo.integrators.steps import (
     TANGENTS,
     TURN,
     carve,
-    copy_rows,
     copy_tangents,
     deflection,
     keep_stage,
@@ -53,7 +52,7 @@ from mdstopo.integrators.steps import (
 from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads, forces
 from mdstopo.mechanics.carrying import carrying
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose
 from mdstopo.mechanics.passes import SUMS, scale_members
 from mdstopo.mechanics.rough import may_be_rough, rough_forces
 from mdstopo.scene.packing import unpack

@@ -121,15 +121,7 @@ def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning
 
 
 # Numba's own assignment of an array to a slice brings code that formats its error messages into every kernel: seconds
-# of compilation. Hence these.
-
-
-@part
-def copy_rows(source, target):  # type: ignore[no-untyped-def]
-    """target = source, two-dimensional."""
-    for i in range(source.shape[0]):
-        for j in range(source.shape[1]):
-            target[i, j] = source[i, j]
+# of compilation. Hence these, and `geometry.copy_rows`.
 
 
 @part

@@ -74,14 +74,7 @@ def pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out):  # type: ignore[n
     wx = q[3 * pair[p, 1] + 1] - q[3 * pair[p, 0] + 1]
     wy = q[3 * pair[p, 0]] - q[3 * pair[p, 1]]
     # K_xi turned into global axes: rows and columns x, y, theta
-    rx = ca * o[7] - sa * o[10]
-    ry = ca * o[8] - sa * o[11]
-    sx = sa * o[7] + ca * o[10]
-    sy = sa * o[8] + ca * o[11]
-    kxx = ca * rx - sa * ry
-    kxy = sa * rx + ca * ry
-    kyx = ca * sx - sa * sy
-    kyy = sa * sx + ca * sy
+    kxx, kxy, kyx, kyy = _turned(ca, sa, o[7], o[8], o[10], o[11])
     kxt = ca * o[9] - sa * o[12]
     kyt = sa * o[9] + ca * o[12]
     ktx = ca * o[13] - sa * o[14]
@@ -93,13 +86,7 @@ def pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out):  # type: ignore[n
     at = ktx * wx + kty * wy - ktt
     if damped:
         omega = rel[p, 9]
-        rx = ca * o[16] - sa * o[17]
-        ry = ca * o[17] - sa * o[18]
-        sx = sa * o[16] + ca * o[17]
-        sy = sa * o[17] + ca * o[18]
-        cxx = ca * rx - sa * ry
-        cxy = sa * rx + ca * ry
-        cyy = sa * sx + ca * sy
+        cxx, cxy, _, cyy = _turned(ca, sa, o[16], o[17], o[17], o[18])
         cxt = ca * o[19] - sa * o[20]
         cyt = sa * o[19] + ca * o[20]
         ctt = o[21]
@@ -133,6 +120,16 @@ def pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out):  # type: ignore[n
     m[2, 3] += fy
     m[2, 4] -= fx
     m[2, 2] += o[0] * rel[p, 0] + o[1] * rel[p, 1]
+
+
+@part
+def _turned(c, s, xx, xy, yx, yy):  # type: ignore[no-untyped-def]
+    """R [xx, xy; yx, yy] R^T, R turning by the angle whose cos and sin are c and s."""
+    ax = c * xx - s * yx
+    ay = c * xy - s * yy
+    bx = s * xx + c * yx
+    by = s * xy + c * yy
+    return c * ax - s * ay, s * ax + c * ay, c * bx - s * by, s * bx + c * by
 
 
 @inline

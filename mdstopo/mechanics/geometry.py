@@ -6,7 +6,7 @@ T = dxi/dq (3 x 6, columns x_A y_A psi_A x_B y_B psi_B). With one member's row b
 compatibility matrix (Eq. 32) is B = -b T, and dDelta/dq = -B (Eq. 36). Nothing here depends on members.
 """
 
-from mdstopo.jit import kernel, part
+from mdstopo.jit import part
 from mdstopo.mechanics.angles import cos_sin
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A
@@ -49,12 +49,12 @@ def fill_pose(pair, p, q, v, ca, sa, c, s, rel):  # type: ignore[no-untyped-def]
     rel[p, 9] = omega
 
 
-@kernel
-def copy_poses(source, target):  # type: ignore[no-untyped-def]
-    """target = source, (n_pair, POSE)."""
-    for p in range(source.shape[0]):
-        for j in range(POSE):
-            target[p, j] = source[p, j]
+@part
+def copy_rows(source, target):  # type: ignore[no-untyped-def]
+    """target = source, two-dimensional."""
+    for i in range(source.shape[0]):
+        for j in range(source.shape[1]):
+            target[i, j] = source[i, j]
 
 
 @part

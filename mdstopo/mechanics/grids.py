@@ -8,37 +8,12 @@ import numpy as np
 
 from mdstopo.jit import kernel, part
 from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
+from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.native.vector import lanes
 from mdstopo.scene.model import ROWS, TILE
 
 #: places of a tile: of each it reads two numbers, where `passes` reads six
 PLACES = 4 * TILE
-
-
-@part
-def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
-    """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is energy that is looked at."""
-    for i in range(3):
-        out[i] += found[i]
-    if counted:
-        out[3] += found[3]
-        for i in range(3):
-            out[4 + i] -= found[i]
-
-
-@part
-def add_tangent(found, out):  # type: ignore[no-untyped-def]
-    """Add the upper triangle xx, xy, yy, xt, yt, tt of K to out (SUMS,)."""
-    kxx, kxy, kyy, kxt, kyt, ktt = found
-    out[7] += kxx
-    out[8] += kxy
-    out[9] += kxt
-    out[10] += kxy
-    out[11] += kyy
-    out[12] += kyt
-    out[13] += kxt
-    out[14] += kyt
-    out[15] += ktt
 
 
 @kernel

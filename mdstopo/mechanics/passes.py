@@ -9,8 +9,8 @@ share them (`native.threads`) and no bit depends on how many do.
 import numpy as np
 
 from mdstopo.jit import kernel, part
-from mdstopo.mechanics.geometry import POSE, copy_poses, pair_displacement, relative_pose
-from mdstopo.mechanics.grids import add_forces, add_tangent, design_grid, sum_grid
+from mdstopo.mechanics.geometry import POSE, copy_rows, pair_displacement, relative_pose
+from mdstopo.mechanics.grids import design_grid, sum_grid
 from mdstopo.mechanics.laws.spring import (
     elastic_design,
     elastic_force,
@@ -20,6 +20,7 @@ from mdstopo.mechanics.laws.spring import (
     viscous_force,
     viscous_tangent,
 )
+from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.native.threads import shared, taken
 from mdstopo.scene.model import TILE, Springs
 
@@ -229,7 +230,7 @@ def design_gradient(model, stage, pose, z, used, out, work):  # type: ignore[no-
     for i in range(used.shape[0]):
         if used[i]:
             if i < pose.shape[0]:
-                copy_poses(pose[i], rel[j])
+                copy_rows(pose[i], rel[j])
             else:
                 relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
             for p in range(n_pair):

@@ -8,11 +8,12 @@ import numpy as np
 
 from mdstopo.jit import kernel, member_kernel, part
 from mdstopo.mechanics.assembly import place_bodies, sum_bodies
-from mdstopo.mechanics.grids import add_tangent, tile_of
+from mdstopo.mechanics.grids import tile_of
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.mechanics.laws.spring_grid import begin_rows
+from mdstopo.mechanics.laws.spring_grid import add_column, add_member, begin_rows, columns, no_columns, no_members
+from mdstopo.mechanics.laws.sums import add_tangent
 from mdstopo.mechanics.passes import springs_of
-from mdstopo.native.vector import inverse_root, lanes_of, load, total, zero_of
+from mdstopo.native.vector import inverse_root, lanes_of, load, zero_of
 
 
 @kernel
@@ -34,16 +35,6 @@ def shorten(source, target):  # type: ignore[no-untyped-def]
         target[i] = 0.0
 
 
-@member_kernel
-def multiply(source, factor, target):  # type: ignore[no-untyped-def]
-    """target = source times factor in single precision; zeros behind it, where the factor is zero."""
-    n = source.shape[0]
-    for i in range(n):
-        target[i] = np.float32(source[i]) * factor[i]
-    for i in range(n, target.shape[0]):
-        target[i] = 0.0
-
-
 @kernel
 def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
     """r and 1/L of the members of row j."""
@@ -57,72 +48,25 @@ def _tangent(px, py, qx, qy, kl, k, width, dx, dy, c, s, room):  # type: ignore[
     """As `spring_grid.grid_tangent`, of k and k l0, without E: with u = k l0/L they are w = k - u and g = u/L^2."""
     rows = room.shape[0]
     begin_rows(px, py, width, dx, dy, room)
-    sum_x = zero_of(k)
-    sum_y = zero_of(k)
-    sum_t = zero_of(k)
-    sum_w = zero_of(k)
-    sum_wx = zero_of(k)
-    sum_wy = zero_of(k)
-    kxx = zero_of(k)
-    kxy = zero_of(k)
-    kyy = zero_of(k)
-    kxt = zero_of(k)
-    kyt = zero_of(k)
-    ktt = zero_of(k)
+    nothing = zero_of(k)
+    sums = no_columns(nothing)
     for i in range(0, width, lanes_of(k)):
         p = load(qx, i)
         q = load(qy, i)
         ax = c * p - s * q
         ay = s * p + c * q
-        own_w = zero_of(k)
-        own_x = zero_of(k)
-        own_y = zero_of(k)
-        gxx = zero_of(k)
-        gxy = zero_of(k)
-        gyy = zero_of(k)
+        own = no_members(nothing)
         at = i
         rx, ry, y = _seen(ax, ay, room, np.int64(0))
         for j in range(rows):
             following = _seen(ax, ay, room, min(j + 1, rows - 1))
             u = load(kl, at) * y
             w = load(k, at) - u
-            g = u * (y * y)
-            gx = g * rx
-            gy = g * ry
-            gxx += gx * rx
-            gxy += gx * ry
-            gyy += gy * ry
-            own_w += w
-            own_x += w * rx
-            own_y += w * ry
+            own = add_member(own, rx, ry, w, u * (y * y))
             at += width
             rx, ry, y = following
-        sum_x += own_x
-        sum_y += own_y
-        sum_t += ax * own_y - ay * own_x
-        sum_w += own_w
-        sum_wx += own_w * ax
-        sum_wy += own_w * ay
-        gxt = ax * gxy - ay * gxx
-        gyt = ax * gyy - ay * gxy
-        kxx += gxx
-        kxy += gxy
-        kyy += gyy
-        kxt += gxt
-        kyt += gyt
-        ktt += ax * gyt - ay * gxt - (ax * own_x + ay * own_y - own_w * (ax * ax + ay * ay))
-    w = total(sum_w)
-    return (
-        (-total(sum_x), -total(sum_y), -total(sum_t)),
-        (
-            total(kxx) + w,
-            total(kxy),
-            total(kyy) + w,
-            total(kxt) - total(sum_wy),
-            total(kyt) + total(sum_wx),
-            total(ktt),
-        ),
-    )
+        sums = add_column(sums, ax, ay, own)
+    return columns(sums)
 
 
 @part
@@ -156,7 +100,9 @@ def _sum_roughly(k, wide, block, member, stiffness, rel, m, sums, room, own):  #
                 own[0, j, 0] = member[0, at]
                 own[1, j, 0] = member[1, at]
                 shorten(stiffness[at + first : at + last], own[5, j])
-                multiply(member[4, at + first : at + last], own[5, j], own[4, j])
+                shorten(member[4, at + first : at + last], own[4, j])
+                for i in range(places):
+                    own[4, j, i] *= own[5, j, i]
             shorten(member[2, start + first : start + last], own[2, 0])
             shorten(member[3, start + first : start + last], own[3, 0])
             for j in range(m):

@@ -11,6 +11,7 @@ Arrays, one column for each such variable:
 import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel
+from mdstopo.native.padding import whole_vectors
 from mdstopo.native.vector import lanes, load, negative
 from mdstopo.optimizer.powers import largest, primitives
 from mdstopo.optimizer.problem import Floats, Ints
@@ -56,12 +57,6 @@ def chosen(mark: Floats, n: int, found: Ints) -> int:
     for k in range(count, whole_vectors(count)):
         found[k] = found[count - 1]
     return count
-
-
-@inline
-def whole_vectors(n: int) -> int:
-    """n rounded up to a multiple of `lanes()`."""
-    return (n + lanes() - 1) // lanes() * lanes()
 
 
 @kernel

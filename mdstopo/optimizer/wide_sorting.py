@@ -10,12 +10,13 @@ of variables; sums of the pieces are added in order, so that results do not depe
 import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel
+from mdstopo.native.padding import whole_vectors
 from mdstopo.native.threads import shared, taken
 from mdstopo.native.vector import lanes, larger, load, magnitude, negative, store, total, zero
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.wide_passes import PIECE, RUN, part, pieces
-from mdstopo.optimizer.wide_slots import BLOCK, WHOLE, box, enter_slot, whole_vectors
+from mdstopo.optimizer.wide_slots import BLOCK, WHOLE, box, enter_slot
 
 #: variables that move and from which on threads share what is done with them
 CROWD = 50_000

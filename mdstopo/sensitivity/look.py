@@ -7,11 +7,11 @@ method; its tag.
 import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
-from mdstopo.integrators.steps import FORCES, SPRINGS, carve, copy_rows, deflection, solved_to, step_at
+from mdstopo.integrators.steps import FORCES, SPRINGS, carve, deflection, solved_to, step_at
 from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
-from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_poses, relative_pose
+from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
 from mdstopo.scene.packing import unpack
@@ -92,7 +92,7 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
         if i == stages:
             relative_pose(pair, steps.state[count, 0], steps.state[count, 1], rel)
         else:
-            copy_poses(pose[i], rel)
+            copy_rows(pose[i], rel)
         for p in range(n_pair):
             moved = deflection(rel, before, model.reach, p)
             spare[p] -= moved

@@ -11,6 +11,7 @@ import numpy as np
 
 from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_work
+from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
 from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 
@@ -92,19 +93,7 @@ def alike_tangent(member, width, scale, start, stop, p, r, o):  # type: ignore[n
         sum_w += w
         sum_wx += w * ax
         sum_wy += w * ay
-    w = total(sum_w)
-    xy = total(kxy)
-    xt = total(kxt) - total(sum_wy)
-    yt = total(kyt) + total(sum_wx)
-    o[7] += total(kxx) + w
-    o[8] += xy
-    o[9] += xt
-    o[10] += xy
-    o[11] += total(kyy) + w
-    o[12] += yt
-    o[13] += xt
-    o[14] += yt
-    o[15] += total(ktt)
+    add_tangent(upper_triangle(kxx, kxy, kyy, kxt, kyt, ktt, sum_w, sum_wx, sum_wy), o)
 
 
 @kernel

@@ -22,6 +22,7 @@ import math
 import numpy as np
 
 from mdstopo.jit import inline, kernel, member_kernel, part
+from mdstopo.mechanics.laws.sums import upper_triangle
 from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 ELASTIC = 0
@@ -125,18 +126,12 @@ def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-un
         sum_wy += w * ay
         ktt += g * (t * t) - w * (ax * (rx - ax) + ay * (ry - ay))
         ax, ay, rx, ry, r2, y = following
-    w = total(sum_w)
     return (
         -total(sum_x),
         -total(sum_y),
         -total(sum_t),
         0.5 * total(energy),
-        total(kxx) + w,
-        total(kxy),
-        total(kyy) + w,
-        total(kxt) - total(sum_wy),
-        total(kyt) + total(sum_wx),
-        total(ktt),
+        *upper_triangle(kxx, kxy, kyy, kxt, kyt, ktt, sum_w, sum_wx, sum_wy),
     )
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from mdstopo.jit import kernel, part
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.mechanics.laws.sums import upper_triangle
 from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
 
 
@@ -67,6 +68,55 @@ def grid_force(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  
 
 
 @part
+def no_members(nothing):  # type: ignore[no-untyped-def]
+    """Sums over the members of a column: w, w r, and the upper triangle of g r r^T; of none."""
+    return nothing, nothing, nothing, nothing, nothing, nothing
+
+
+@part
+def add_member(own, rx, ry, w, g):  # type: ignore[no-untyped-def]
+    """The sums with a member more."""
+    own_w, own_x, own_y, gxx, gxy, gyy = own
+    gx = g * rx
+    gy = g * ry
+    return own_w + w, own_x + w * rx, own_y + w * ry, gxx + gx * rx, gxy + gx * ry, gyy + gy * ry
+
+
+@part
+def no_columns(nothing):  # type: ignore[no-untyped-def]
+    """Sums over columns: -Q, w and w a, and xx, xy, yy, xt, yt, tt of what K has besides these; of none."""
+    return (nothing, nothing, nothing), (nothing, nothing, nothing), no_members(nothing)
+
+
+@part
+def add_column(sums, ax, ay, own):  # type: ignore[no-untyped-def]
+    """The sums with a column more, whose members are summed in `own`."""
+    (sum_x, sum_y, sum_t), (sum_w, sum_wx, sum_wy), (kxx, kxy, kyy, kxt, kyt, ktt) = sums
+    w, x, y, gxx, gxy, gyy = own
+    gxt = ax * gxy - ay * gxx
+    gyt = ax * gyy - ay * gxy
+    return (
+        (sum_x + x, sum_y + y, sum_t + (ax * y - ay * x)),
+        (sum_w + w, sum_wx + w * ax, sum_wy + w * ay),
+        (
+            kxx + gxx,
+            kxy + gxy,
+            kyy + gyy,
+            kxt + gxt,
+            kyt + gyt,
+            ktt + (ax * gyt - ay * gxt - (ax * x + ay * y - w * (ax * ax + ay * ay))),
+        ),
+    )
+
+
+@part
+def columns(sums):  # type: ignore[no-untyped-def]
+    """Q and the upper triangle of K."""
+    (sum_x, sum_y, sum_t), weights, tangent = sums
+    return (-total(sum_x), -total(sum_y), -total(sum_t)), upper_triangle(*tangent, *weights)
+
+
+@part
 def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
 
@@ -74,30 +124,15 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
     """
     rows = room.shape[0]
     begin_rows(px, py, width, dx, dy, room)
-    sum_x = zero()
-    sum_y = zero()
-    sum_t = zero()
-    energy = zero()
-    sum_w = zero()
-    sum_wx = zero()
-    sum_wy = zero()
-    kxx = zero()
-    kxy = zero()
-    kyy = zero()
-    kxt = zero()
-    kyt = zero()
-    ktt = zero()
+    nothing = zero()
+    sums = no_columns(nothing)
+    energy = nothing
     for i in range(first, last, lanes()):
         u = load(qx, i)
         v = load(qy, i)
         ax = c * u - s * v
         ay = s * u + c * v
-        own_w = zero()
-        own_x = zero()
-        own_y = zero()
-        gxx = zero()
-        gxy = zero()
-        gyy = zero()
+        own = no_members(nothing)
         at = i
         rx, ry, r2, y = _seen(ax, ay, room, np.int64(0))
         for j in range(rows):
@@ -108,43 +143,12 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
             energy += w * stretch
             w *= y
             g = (stiffness - w) * (y * y)
-            gx = g * rx
-            gy = g * ry
-            gxx += gx * rx
-            gxy += gx * ry
-            gyy += gy * ry
-            own_w += w
-            own_x += w * rx
-            own_y += w * ry
+            own = add_member(own, rx, ry, w, g)
             at += width
             rx, ry, r2, y = following
-        sum_x += own_x
-        sum_y += own_y
-        sum_t += ax * own_y - ay * own_x
-        sum_w += own_w
-        sum_wx += own_w * ax
-        sum_wy += own_w * ay
-        gxt = ax * gxy - ay * gxx
-        gyt = ax * gyy - ay * gxy
-        kxx += gxx
-        kxy += gxy
-        kyy += gyy
-        kxt += gxt
-        kyt += gyt
-        ktt += ax * gyt - ay * gxt - (ax * own_x + ay * own_y - own_w * (ax * ax + ay * ay))
-    w = total(sum_w)
-    return (
-        -total(sum_x),
-        -total(sum_y),
-        -total(sum_t),
-        0.5 * total(energy),
-        total(kxx) + w,
-        total(kxy),
-        total(kyy) + w,
-        total(kxt) - total(sum_wy),
-        total(kyt) + total(sum_wx),
-        total(ktt),
-    )
+        sums = add_column(sums, ax, ay, own)
+    force, tangent = columns(sums)
+    return (*force, 0.5 * total(energy), *tangent)
 
 
 @kernel

@@ -1,0 +1,44 @@
+"""From what members add up to, to the sums of a pair of bodies (`passes.SUMS`)."""
+
+from mdstopo.jit import part
+from mdstopo.native.vector import total
+
+
+@part
+def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):  # type: ignore[no-untyped-def]
+    """xx, xy, yy, xt, yt, tt of K from vectors: of g c c^T, and of w and w a, whose place in K is the same for all."""
+    whole = total(w)
+    return (
+        total(xx) + whole,
+        total(xy),
+        total(yy) + whole,
+        total(xt) - total(wy),
+        total(yt) + total(wx),
+        total(tt),
+    )
+
+
+@part
+def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
+    """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is energy that is looked at."""
+    for i in range(3):
+        out[i] += found[i]
+    if counted:
+        out[3] += found[3]
+        for i in range(3):
+            out[4 + i] -= found[i]
+
+
+@part
+def add_tangent(found, out):  # type: ignore[no-untyped-def]
+    """Add the upper triangle xx, xy, yy, xt, yt, tt of K to out (SUMS,)."""
+    kxx, kxy, kyy, kxt, kyt, ktt = found
+    out[7] += kxx
+    out[8] += kxy
+    out[9] += kxt
+    out[10] += kxy
+    out[11] += kyy
+    out[12] += kyt
+    out[13] += kxt
+    out[14] += kyt
+    out[15] += ktt

@@ -1,0 +1,10 @@
+"""Lengths in whole vectors."""
+
+from mdstopo.jit import part
+from mdstopo.native.vector import lanes
+
+
+@part
+def whole_vectors(count: int) -> int:
+    """count rounded up to a multiple of `lanes()`."""
+    return (count + lanes() - 1) // lanes() * lanes()
