@@ -57,8 +57,8 @@ def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, co
 
 
 @part
-def design_grid(start, stop, width, member, pose, u, out):  # type: ignore[no-untyped-def]
-    """Add sum_j f_i (b_i . u_j) at the poses pose (m, POSE) to out (M_padded,) for the rows from start to stop."""
+def design_grid(start, stop, width, member, pose, u, weight, out):  # type: ignore[no-untyped-def]
+    """Add what `grid_design` does at the poses pose (any, POSE) to out (M_padded,) for the rows from start to stop."""
     rows = (stop - start) // width
     tall, wide = tile_of(rows, width)
     room = np.empty((tall, pose.shape[0], 4))
@@ -70,5 +70,6 @@ def design_grid(start, stop, width, member, pose, u, out):  # type: ignore[no-un
         for first in range(0, width, wide):
             grid_design(
                 member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[5, lo:hi], width, first, min(first + wide, width), pose, u, own, turned, out[lo:hi],
+                member[5, lo:hi], width, first, min(first + wide, width), pose, u, weight, own,
+                turned, out[lo:hi],
             )  # fmt: skip

@@ -22,6 +22,7 @@ from mdstopo.mechanics.laws.spring import (
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.native.threads import shared, taken
+from mdstopo.native.vector import lanes, load, store
 from mdstopo.scene.model import TILE, Springs
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
@@ -70,44 +71,45 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
             strength[2, i] = member[7, i]
         return
     mu = power[k]
-    at = start
-    while at < stop:
-        count, first, last = _row(block, k, at, stop)
-        a = alpha[first : first + count]
-        for row in range(3 if block[k, 3] == 1 else 1):
-            whole = member[5 + row, at : at + count]
-            scaled = strength[row, at : at + count]
+    rows, count, first, width = _rows(block, k, start, stop)
+    for row in range(3 if block[k, 3] == 1 else 1):
+        for j in range(rows):
+            at = start + j * width
+            own = first + j * count
+            a = alpha[own : own + count]
+            whole = member[5 + row, at : at + width]
+            scaled = strength[row, at : at + width]
+            if mu == 1.0 and own + width <= alpha.shape[0]:
+                # with what is padding, whose variables are others' and whose strengths are zero
+                for i in range(0, width, lanes()):
+                    store(scaled, i, load(alpha, own + i) * load(whole, i))
+                continue
             if mu == 1.0:  # a loop of its own: a power that is not used would be computed all the same
                 for i in range(count):
                     scaled[i] = a[i] * whole[i]
             else:
                 for i in range(count):
                     scaled[i] = a[i] ** mu * whole[i]
-        for i in range(at + count, last):
-            strength[0, i] = 0.0
-            strength[1, i] = 0.0
-            strength[2, i] = 0.0
-        at = last
+            for i in range(count, width):
+                scaled[i] = 0.0
+        for i in range(start + rows * width, stop):
+            strength[row, i] = 0.0
 
 
-@kernel
-def _row(block, k, at, stop):  # type: ignore[no-untyped-def]
-    """How many members of block k lie one after the other from `at` on, the first's variable, and where the next do.
+@part
+def _rows(block, k, start, stop):  # type: ignore[no-untyped-def]
+    """The part start..stop of block k by rows: how many, the members of one, the first's variable, places of a row.
 
-    Behind the last row of a grid there may be eight places that are none of it: blocks are padded to sixteen.
+    Of a grid its rows, else one row. Behind the last row of a grid there may be eight places that are none of it:
+    blocks are padded to sixteen.
     """
     width = block[k, 6]
+    before = start - block[k, 1]
     if width == 0:
-        return min(stop, _end(block, k)) - at, block[k, 4] + at - block[k, 1], stop
-    if at >= _end(block, k):
-        return 0, 0, stop
-    return block[k, 7], block[k, 4] + (at - block[k, 1]) // width * block[k, 7], at + width
-
-
-@kernel
-def _end(block, k):  # type: ignore[no-untyped-def]
-    """Where the members of block k end, and of a grid the places of its last row."""
-    return block[k, 1] + (block[k, 5] if block[k, 6] == 0 else block[k, 5] // block[k, 7] * block[k, 6])
+        return np.int64(1), min(stop - start, block[k, 5] - before), block[k, 4] + before, stop - start
+    count = block[k, 7]
+    before //= width
+    return min(block[k, 5] // count - before, (stop - start) // width), count, block[k, 4] + before * count, width
 
 
 @kernel
@@ -211,12 +213,13 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
 
 
 @part
-def design_gradient(model, stage, pose, z, used, out, work):  # type: ignore[no-untyped-def]
-    """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength): one pass, no histories.
+def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength) + sum_e weight_e V_i(q_e).
 
-    In: stage (S, 3, n) with q, v; pose (any, n_pair, POSE): relative poses of the first of them; z (S, n): virtual
-    displacements, the adjoint of the force balance; used (S,): which stages. The member's generalised force is
-    -T^T b f, so each adds -f_i (b_i . T z_s). Fixed members are passed over. work: counts the stages.
+    One pass, no histories. In: stage (S, 3, n) with q, v; pose (any, n_pair, POSE): relative poses of the first of
+    them; z (S, n): virtual displacements, the adjoint of the force balance; used (S,): which stages. The member's
+    generalised force is -T^T b f, so each adds -f_i (b_i . T z_s). point (E, 2 or more, n), weight (E,): where the
+    energies V are looked at. Fixed members are passed over. work: counts the stages.
     """
     pair = model.pair
     n_pair = pair.shape[0]
@@ -224,7 +227,8 @@ def design_gradient(model, stage, pose, z, used, out, work):  # type: ignore[no-
     for i in range(used.shape[0]):
         count += used[i]
     work[7] += count
-    rel = np.empty((count, n_pair, POSE))
+    energies = weight.shape[0]
+    rel = np.empty((count + energies, n_pair, POSE))
     u = np.empty((count, n_pair, 3))
     j = 0
     for i in range(used.shape[0]):
@@ -238,27 +242,41 @@ def design_gradient(model, stage, pose, z, used, out, work):  # type: ignore[no-
                 for axis in range(3):
                     u[j, p, axis] = -u[j, p, axis]
             j += 1
+    for i in range(energies):
+        relative_pose(pair, point[i, 0], point[i, 1], rel[count + i])
     counter = np.zeros(1, np.int64)
-    job = (counter, model.chunk, model.block, model.member, rel, u, out)
-    shared(_design_chunks, threads_for(model, count), job)
+    job = (counter, model.chunk, model.block, model.member, rel, u, weight, out)
+    shared(_design_chunks, threads_for(model, count + energies), job)
+
+
+@part
+def energy_gradient(model, point, weight, out):  # type: ignore[no-untyped-def]
+    """out (M_padded,) += sum_e weight_e V_i(q_e) alone: the explicit part of the energy's design gradient."""
+    n = model.q0.shape[0]
+    pose = np.empty((0, model.pair.shape[0], POSE))
+    none = np.empty(0, np.int64)
+    design_gradient(model, point, pose, np.empty((0, n)), none, point, weight, out, np.zeros(8, np.int64))
 
 
 @kernel
-def _design_chunks(counter, chunk, block, member, rel, u, out):  # type: ignore[no-untyped-def]
+def _design_chunks(counter, chunk, block, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
     i = taken(counter)
     while i < chunk.shape[0]:
-        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, u, out)
+        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, u, weight, out)
         i = taken(counter)
 
 
 @kernel
-def _design(k, start, stop, block, member, rel, u, out):  # type: ignore[no-untyped-def]
-    """The part start..stop of block k, at the poses rel (S, n_pair, POSE) and their changes u (S, n_pair, 3)."""
+def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+    """The part start..stop of block k: works at the first poses of rel (any, n_pair, POSE), energies at the others.
+
+    u (S, n_pair, 3): changes of the first poses.
+    """
     if block[k, 4] < 0:
         return
     p = block[k, 0]
     if block[k, 6] > 0:
-        design_grid(start, stop, block[k, 6], member, rel[:, p], u[:, p], out)
+        design_grid(start, stop, block[k, 6], member, rel[:, p], u[:, p], weight, out)
         return
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)
@@ -269,50 +287,21 @@ def _design(k, start, stop, block, member, rel, u, out):  # type: ignore[no-unty
         l0 = member[4, lo:hi]
         ks = member[5, lo:hi]
         o = out[lo:hi]
+        many = u.shape[0]
         if block[k, 3] == 0:
-            elastic_design(px, py, qx, qy, l0, ks, rel[:, p], u[:, p], o)
-            continue
-        for j in range(rel.shape[0]):
-            r = rel[j, p]
-            w = u[j, p]
-            viscous_design(
-                px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
-                r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
-            )  # fmt: skip
-
-
-@part
-def energy_gradient(model, stage, weight, out):  # type: ignore[no-untyped-def]
-    """out (M_padded,) += sum_s weight_s V_i(q_s): the explicit part of the energy's design gradient."""
-    count = weight.shape[0]
-    rel = np.empty((count, model.pair.shape[0], POSE))
-    for j in range(count):
-        relative_pose(model.pair, stage[j, 0], stage[j, 1], rel[j])
-    counter = np.zeros(1, np.int64)
-    job = (counter, model.chunk, model.block, model.member, rel, weight, out)
-    shared(_energy_chunks, threads_for(model, count), job)
-
-
-@kernel
-def _energy_chunks(counter, chunk, block, member, rel, weight, out):  # type: ignore[no-untyped-def]
-    i = taken(counter)
-    while i < chunk.shape[0]:
-        _energy(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, weight, out)
-        i = taken(counter)
-
-
-@kernel
-def _energy(k, lo, hi, block, member, rel, weight, out):  # type: ignore[no-untyped-def]
-    """The part lo..hi of block k, at the poses rel (S, n_pair, POSE)."""
-    if block[k, 4] < 0:
-        return
-    for j in range(weight.shape[0]):
-        if weight[j] != 0.0:
-            r = rel[j, block[k, 0]]
-            stored_energy(
-                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[5, lo:hi], r[0], r[1], r[2], r[3], weight[j], out[lo:hi],
-            )  # fmt: skip
+            elastic_design(px, py, qx, qy, l0, ks, rel[:many, p], u[:, p], o)
+        else:
+            for j in range(many):
+                r = rel[j, p]
+                w = u[j, p]
+                viscous_design(
+                    px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
+                    r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
+                )  # fmt: skip
+        for j in range(weight.shape[0]):
+            if weight[j] != 0.0:
+                r = rel[many + j, p]
+                stored_energy(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], weight[j], o)
 
 
 @part
@@ -337,16 +326,20 @@ def _unscale(k, start, stop, block, power, alpha, padded, out):  # type: ignore[
     if block[k, 4] < 0:
         return
     mu = power[k]
-    at = start
-    while at < stop:
-        count, first, last = _row(block, k, at, stop)
-        a = alpha[first : first + count]
+    rows, count, first, width = _rows(block, k, start, stop)
+    for j in range(rows):
+        at = start + j * width
+        begin = first + j * count
+        a = alpha[begin : begin + count]
         given = padded[at : at + count]
-        own = out[first : first + count]
-        if mu == 1.0:
+        own = out[begin : begin + count]
+        if mu == 1.0 and j + 1 < rows and 2 * count >= width:
+            # what is written behind this row's variables, the next row's overwrite
+            for i in range(0, width, lanes()):
+                store(out, begin + i, load(padded, at + i))
+        elif mu == 1.0:
             for i in range(count):
                 own[i] = given[i]
         else:
             for i in range(count):
                 own[i] = mu * a[i] ** (mu - 1.0) * given[i]
-        at = last

@@ -6,14 +6,22 @@ so it serves where bodies move by much more than that. Grids of undamped springs
 
 import numpy as np
 
-from mdstopo.jit import kernel, member_kernel, part
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import place_bodies, sum_bodies
 from mdstopo.mechanics.grids import tile_of
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.mechanics.laws.spring_grid import add_column, add_member, begin_rows, columns, no_columns, no_members
+from mdstopo.mechanics.laws.spring_grid import (
+    add_column,
+    add_member,
+    begin_rows,
+    columns,
+    no_columns,
+    no_members,
+    turned_columns,
+)
 from mdstopo.mechanics.laws.sums import add_tangent
 from mdstopo.mechanics.passes import springs_of
-from mdstopo.native.vector import inverse_root, lanes_of, load, zero_of
+from mdstopo.native.vector import WIDE, inverse_root, lanes, lanes_of, load, store, zero, zero_of
 
 
 @kernel
@@ -25,16 +33,6 @@ def may_be_rough(model):  # type: ignore[no-untyped-def]
     return found
 
 
-@member_kernel
-def shorten(source, target):  # type: ignore[no-untyped-def]
-    """target = source in single precision, zeros behind it."""
-    n = source.shape[0]
-    for i in range(n):
-        target[i] = source[i]
-    for i in range(n, target.shape[0]):
-        target[i] = 0.0
-
-
 @kernel
 def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
     """r and 1/L of the members of row j."""
@@ -44,29 +42,43 @@ def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
 
 
 @part
-def _tangent(px, py, qx, qy, kl, k, width, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
-    """As `spring_grid.grid_tangent`, of k and k l0, without E: with u = k l0/L they are w = k - u and g = u/L^2."""
-    rows = room.shape[0]
-    begin_rows(px, py, width, dx, dy, room)
+def _tangent(qx, qy, kl, k, room, c, s):  # type: ignore[no-untyped-def]
+    """Q and K as in `spring_grid.grid_tangent`, of the columns q, and k and k l0 (rows, columns); e of rows in room.
+
+    With u = k l0/L they are w = k - u and g = u.
+    """
+    rows, width = k.shape
+    k = k.reshape(rows * width)
+    kl = kl.reshape(rows * width)
+    some = lanes_of(k)
     nothing = zero_of(k)
     sums = no_columns(nothing)
-    for i in range(0, width, lanes_of(k)):
-        p = load(qx, i)
-        q = load(qy, i)
-        ax = c * p - s * q
-        ay = s * p + c * q
+    ax, ay = turned_columns(qx, qy, np.int64(0), c, s)
+    seen = _seen(ax, ay, room, np.int64(0))
+    for i in range(0, width, some):
+        bx, by = turned_columns(qx, qy, min(i + some, width - some), c, s)
         own = no_members(nothing)
         at = i
-        rx, ry, y = _seen(ax, ay, room, np.int64(0))
-        for j in range(rows):
-            following = _seen(ax, ay, room, min(j + 1, rows - 1))
-            u = load(kl, at) * y
-            w = load(k, at) - u
-            own = add_member(own, rx, ry, w, u * (y * y))
+        for j in range(1, rows):
+            following = _seen(ax, ay, room, j)
+            own = _add(own, seen, load(k, at), load(kl, at))
             at += width
-            rx, ry, y = following
+            seen = following
+        following = _seen(bx, by, room, np.int64(0))
+        own = _add(own, seen, load(k, at), load(kl, at))
+        seen = following
         sums = add_column(sums, ax, ay, own)
+        ax = bx
+        ay = by
     return columns(sums)
+
+
+@part
+def _add(own, seen, k, kl):  # type: ignore[no-untyped-def]
+    """The sums of a column with a member more."""
+    rx, ry, y = seen
+    u = kl * y
+    return add_member(own, rx, ry, y, k - u, u)
 
 
 @part
@@ -78,42 +90,60 @@ def rough_sums(springs, strength, rel, m, sums):  # type: ignore[no-untyped-def]
         width = block[k, 6]
         tall, wide = tile_of((block[k, 2] - block[k, 1]) // width, width)
         room = np.empty((tall, 2), np.float32)
-        some = lanes_of(room[0])
-        own = np.empty((6, tall, (wide + some - 1) // some * some), np.float32)
-        _sum_roughly(k, wide, block, springs.member, strength[0], rel, m, sums, room, own)
+        own = _rows(2 * tall + 2, wide)
+        _sum_roughly(block[k], wide, springs.member, strength[0], rel, m, sums, room, own[2:], own[:2])
 
 
 @part
-def _sum_roughly(k, wide, block, member, stiffness, rel, m, sums, room, own):  # type: ignore[no-untyped-def]
-    """Add block k to sums, tile by tile; own (6, rows, columns): the members of a tile."""
-    p = block[k, 0]
-    width = block[k, 6]
-    tall = own.shape[1]
-    places = own.shape[2]
-    flat = own.reshape((6, tall * places))
-    for start in range(block[k, 1], block[k, 2], tall * width):
-        rows = min(tall, (block[k, 2] - start) // width)
+def _rows(count, width):  # type: ignore[no-untyped-def]
+    """Room for rows of whole vectors in single precision, each on a line of the cache."""
+    some = 2 * WIDE
+    width = (width + some - 1) // some * some
+    room = np.empty(count * width + some, np.float32)
+    first = -(room.ctypes.data // room.itemsize) % some
+    return room[first : first + count * width].reshape((count, width))
+
+
+@part
+def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):  # type: ignore[no-untyped-def]
+    """Add a block to sums, tile by tile. Room for a tile's k and k l0: own; for its q (2, columns)."""
+    p = block[0]
+    width = block[6]
+    tall = own.shape[0] // 2
+    for start in range(block[1], block[2], tall * width):
+        rows = min(tall, (block[2] - start) // width)
         for first in range(0, width, wide):
-            last = min(first + wide, width)
+            count = min(wide, width - first)
+            for axis in range(2):
+                at = start + first
+                _shorten(member[2 + axis, at : at + count], q[axis])
             for j in range(rows):
-                at = start + j * width
-                own[0, j, 0] = member[0, at]
-                own[1, j, 0] = member[1, at]
-                shorten(stiffness[at + first : at + last], own[5, j])
-                shorten(member[4, at + first : at + last], own[4, j])
-                for i in range(places):
-                    own[4, j, i] *= own[5, j, i]
-            shorten(member[2, start + first : start + last], own[2, 0])
-            shorten(member[3, start + first : start + last], own[3, 0])
+                at = start + j * width + first
+                _shorten_products(stiffness[at : at + count], member[4, at : at + count], own[j], own[tall + j])
             for j in range(m):
                 r = rel[j, p]
-                force, tangent = _tangent(
-                    flat[0], flat[1], flat[2], flat[3], flat[4], flat[5], places, r[0], r[1], r[2], r[3], room[:rows]
-                )
+                begin_rows(member[0, start:], member[1, start:], width, r[0], r[1], room[:rows])
+                force, tangent = _tangent(q[0], q[1], own[tall : tall + rows], own[:rows], room[:rows], r[2], r[3])
                 o = sums[j, p]
                 for axis in range(3):
                     o[axis] += force[axis]
                 add_tangent(tangent, o)
+
+
+@part
+def _shorten(source, target):  # type: ignore[no-untyped-def]
+    """target = source in single precision, zeros behind it."""
+    for i in range(0, target.shape[0], lanes()):
+        store(target, i, load(source, i) if i < source.shape[0] else zero())
+
+
+@part
+def _shorten_products(k, l0, own, product):  # type: ignore[no-untyped-def]
+    """own, product = k, k l0 in single precision, zeros behind them."""
+    for i in range(0, own.shape[0], lanes()):
+        stiffness = load(k, i) if i < k.shape[0] else zero()
+        store(own, i, stiffness)
+        store(product, i, stiffness * load(l0, i) if i < k.shape[0] else stiffness)
 
 
 @part

@@ -50,7 +50,7 @@ def load(array: Floats, i: int) -> Floats:
 
 
 def store(array: Floats, i: int, vector: Floats) -> None:
-    """Write a vector into a contiguous array from i on."""
+    """Write a vector into a contiguous array from i on; into one in single precision, its numbers are shortened."""
     array[i : i + len(vector)] = vector
 
 
@@ -64,8 +64,23 @@ def total(vector: Floats) -> float:
 
 def inverse_root(vector: Floats, floor: float) -> Floats:
     """1/sqrt(x) to rounding where x > floor, else 0; floor is at least the smallest normal number."""
+    return finished_root(root_seed(vector), vector, floor)
+
+
+def root_seed(vector: Floats) -> Floats:
+    """What 1/sqrt(x) begins with; a loop that has the next vector's seed early waits less."""
     with np.errstate(all="ignore"):
-        return np.where(vector > floor, 1.0 / np.sqrt(vector), 0.0)
+        return np.asarray(1.0 / np.sqrt(vector))
+
+
+def finished_root(seed: Floats, vector: Floats, floor: float) -> Floats:
+    """`inverse_root` from the seed."""
+    return where_larger(vector, floor, seed)
+
+
+def where_larger(vector: Floats, floor: float, value: Floats) -> Floats:
+    """The value where x > floor, else 0."""
+    return np.where(vector > floor, value, 0.0)
 
 
 def magnitude(vector: Floats) -> Floats:

@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
 from mdstopo.jit import part
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.passes import SUMS, design_gradient, energy_gradient, springs_of
+from mdstopo.mechanics.passes import SUMS, design_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
@@ -153,16 +153,16 @@ def energy_rows(  # type: ignore[no-untyped-def]
             continue
         out = padded[r]
         out[:] = 0.0
+        reached = 0
         if integral or not (k == 0 and c == 0.0):  # a peak at the start is not reached by the motion
             reached = max(stages, steps.index[w + 1, 0])
-            z = np.empty((reached, n))
-            used = np.zeros(reached, np.int64)
+        z = np.empty((reached, n))
+        used = np.zeros(reached, np.int64)
+        if reached > 0:
             reverse_sweep(
                 pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, accuracy, work
             )
-            design_gradient(model, steps.stage, pose, z, used, out, work)
-        if integral:
-            energy_gradient(model, steps.stage, weight, out)
-        else:
-            energy_gradient(model, point, weight, out)
+        design_gradient(
+            model, steps.stage, pose, z, used, steps.stage if integral else point, weight, out, work
+        )  # fmt: skip
     return found

@@ -16,7 +16,6 @@ from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import (
     SUMS,
     design_gradient,
-    energy_gradient,
     member_sums,
     scale_members,
     springs_of,
@@ -64,8 +63,7 @@ def _gradient(ints, floats, alpha, weights, states, z, padded, out):  # type: ig
     work = np.zeros(8, np.int64)
     padded[:] = 0.0
     poses = np.empty((0, model.pair.shape[0], POSE))
-    design_gradient(model, states, poses, z, used, padded, work)
-    energy_gradient(model, states, weights, padded)
+    design_gradient(model, states, poses, z, used, states, weights, padded, work)
     unscale_gradient(model, alpha, padded, out)
 
 

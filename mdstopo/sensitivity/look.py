@@ -13,6 +13,7 @@ from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
+from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
@@ -103,11 +104,7 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
                 lo = block[k, 1]
                 hi = block[k, 2]
                 if block[k, 0] == p:
-                    r = rel[p]
-                    shortest = min(
-                        shortest,
-                        shortest_in(m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], r[0], r[1], r[2], r[3]),
-                    )
+                    shortest = min(shortest, _shortest(m, lo, hi, block[k, 6], rel[p]))
             spare[p] = shortest
             for k in range(block.shape[0]):
                 if shortest > moved or block[k, 0] != p:
@@ -123,6 +120,19 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
                     meeting[1] = i
                     return
         copy_rows(rel, before)
+
+
+@part
+def _shortest(m, lo, hi, width, r):  # type: ignore[no-untyped-def]
+    """Smallest length of the members lo..hi, rows of a grid where there is a width, at relative pose r."""
+    px = m[0, lo:hi]
+    py = m[1, lo:hi]
+    qx = m[2, lo:hi]
+    qy = m[3, lo:hi]
+    if width > 0:
+        rows = (hi - lo) // width * width
+        return grid_shortest(px[:rows], py[:rows], qx, qy, width, r[0], r[1], r[2], r[3])
+    return shortest_in(px, py, qx, qy, r[0], r[1], r[2], r[3])
 
 
 @entry

@@ -13,6 +13,7 @@ from mdstopo.native.kernel import numba as with_vectors
 from mdstopo.native.vector import (
     NARROW,
     WIDE,
+    finished_root,
     inverse_root,
     lanes,
     lanes_of,
@@ -21,8 +22,10 @@ from mdstopo.native.vector import (
     load,
     magnitude,
     negative,
+    root_seed,
     store,
     total,
+    where_larger,
     zero,
     zero_of,
 )
@@ -40,6 +43,22 @@ def _width():
 def _roots(x, out):
     for i in range(0, len(x), lanes()):
         store(out, i, inverse_root(load(x, i), FLOOR))
+
+
+@numba.njit
+def _roots_in_steps(x, value, out, chosen):
+    seed = root_seed(load(x, 0))
+    for i in range(0, len(x), lanes()):
+        following = root_seed(load(x, min(i + lanes(), len(x) - lanes())))
+        store(out, i, finished_root(seed, load(x, i), FLOOR))
+        store(chosen, i, where_larger(load(x, i), FLOOR, load(value, i)))
+        seed = following
+
+
+@numba.njit
+def _shortened(x, out):
+    for i in range(0, len(x), lanes()):
+        store(out, i, load(x, i))
 
 
 @numba.njit
@@ -103,6 +122,25 @@ def test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number():
     np.testing.assert_array_equal(out, 0.0)
 
 
+def test_a_root_begun_early_is_the_same_and_a_value_is_chosen_where_there_is_one():
+    x = np.concatenate([10.0 ** np.random.default_rng(8).uniform(-60, 60, 58), [0.0, FLOOR, -1.0, np.nan, np.inf, 2.0]])
+    value = np.arange(64.0)
+    at_once, out, chosen = np.empty((3, 64))
+    _roots(x, at_once)
+    _roots_in_steps(x, value, out, chosen)
+    np.testing.assert_array_equal(out, at_once)
+    np.testing.assert_array_equal(chosen, where_larger(x, FLOOR, value))
+    assert 20 < np.count_nonzero(chosen) < 60
+
+
+def test_numbers_are_shortened_into_an_array_of_single_precision():
+    x = np.random.default_rng(9).normal(size=64)
+    out = np.full(66, 7.0, np.float32)
+    _shortened(x, out[1:65])
+    np.testing.assert_array_equal(out[1:65], x.astype(np.float32))
+    assert out[0] == out[65] == 7.0
+
+
 def test_operators_are_those_of_arrays():
     rng = np.random.default_rng(5)
     x, y = rng.normal(size=(2, 64))
@@ -162,6 +200,8 @@ def test_processors_without_the_widest_vectors_get_the_same_numbers():
         "assert own._width() == own.NARROW\n"
         "own.test_inverse_roots_are_right_to_rounding_over_the_whole_range()\n"
         "own.test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number()\n"
+        "own.test_a_root_begun_early_is_the_same_and_a_value_is_chosen_where_there_is_one()\n"
+        "own.test_numbers_are_shortened_into_an_array_of_single_precision()\n"
         "own.test_operators_are_those_of_arrays()\n"
         "own.test_vectors_are_of_their_array_s_precision(np.float32)\n"
         "own.test_a_number_lost_anywhere_is_seen(np.nan)\n"

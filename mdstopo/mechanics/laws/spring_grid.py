@@ -3,20 +3,23 @@
 Members lie in rows: those of one row begin at one point P, and those of one column end at one point Q. With
 a = R q of a column and e = d - p of a row, r = a + e; so in a column, where a stays,
 
-    tau L = a x r,   Q = -(sum w r, a x sum w r),   w = f/L,   g = (k - w)/L^2,
-    K = sum g c c^T + w B2',   c = (r, a x r):   sums of w, w r and g r r^T are all that a member adds to.
+    tau L = a x r,   Q = -(sum w r, a x sum w r),   w = f/L,   g = k - w,   n = r/L,
+    K = sum g c c^T + w B2',   c = (n, a x n):   sums of w, w r and g n n^T are all that a member adds to;
+    of the last its first row and its trace, sum g.
 
 Rows are padded by members of no stiffness at the row's last point, so that vectors take whole columns.
 Arguments: member arrays (n,) of whole rows, beginning at the first of them; the length of a row; the columns from
 `first` to `last`; the pose; room (rows, 2) for what belongs to rows.
 """
 
+import math
+
 import numpy as np
 
 from mdstopo.jit import kernel, part
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.sums import upper_triangle
-from mdstopo.native.vector import inverse_root, lanes, load, store, total, zero
+from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, where_larger, zero
 
 
 @kernel
@@ -36,50 +39,76 @@ def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
         room[j, 1] = dy - py[j * width]
 
 
-@kernel
+@part
 def grid_force(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
-    """Return Q (3 numbers) and E."""
+    """Return Q (3 numbers) and E.
+
+    The lengths of the next row, or of the next columns' first, are found while this one is summed, as in
+    `spring.elastic_tangent`.
+    """
     begin_rows(px, py, width, dx, dy, room)
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
     energy = zero()
+    ax, ay = turned_columns(qx, qy, first, c, s)
+    seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
-        u = load(qx, i)
-        v = load(qy, i)
-        ax = c * u - s * v
-        ay = s * u + c * v
+        bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), c, s)
         own_x = zero()
         own_y = zero()
         at = i
-        for j in range(room.shape[0]):
-            rx, ry, r2, y = _seen(ax, ay, room, j)
-            stretch = r2 * y - load(l0, at)
-            w = load(k, at) * stretch
-            energy += w * stretch
-            w *= y
-            own_x += w * rx
-            own_y += w * ry
+        for j in range(1, room.shape[0]):
+            following = _seen(ax, ay, room, j)
+            w, energy = _weight(energy, seen, load(k, at), load(l0, at))
+            own_x += w * seen[0]
+            own_y += w * seen[1]
             at += width
+            seen = following
+        following = _seen(bx, by, room, np.int64(0))
+        w, energy = _weight(energy, seen, load(k, at), load(l0, at))
+        own_x += w * seen[0]
+        own_y += w * seen[1]
+        seen = following
         sum_x += own_x
         sum_y += own_y
         sum_t += ax * own_y - ay * own_x
+        ax = bx
+        ay = by
     return -total(sum_x), -total(sum_y), -total(sum_t), 0.5 * total(energy)
 
 
 @part
+def turned_columns(qx, qy, i, c, s):  # type: ignore[no-untyped-def]
+    """a of the columns from i on."""
+    u = load(qx, i)
+    v = load(qy, i)
+    return c * u - s * v, s * u + c * v
+
+
+@part
+def _weight(energy, seen, k, l0):  # type: ignore[no-untyped-def]
+    """w of a member, and twice the energy with it."""
+    _, _, r2, y = seen
+    stretch = r2 * y - l0
+    w = k * stretch
+    return w * y, energy + w * stretch
+
+
+@part
 def no_members(nothing):  # type: ignore[no-untyped-def]
-    """Sums over the members of a column: w, w r, and the upper triangle of g r r^T; of none."""
+    """Sums over the members of a column: w, w r, and of g n n^T xx, xy and the trace; of none."""
     return nothing, nothing, nothing, nothing, nothing, nothing
 
 
 @part
-def add_member(own, rx, ry, w, g):  # type: ignore[no-untyped-def]
-    """The sums with a member more."""
-    own_w, own_x, own_y, gxx, gxy, gyy = own
-    gx = g * rx
-    gy = g * ry
-    return own_w + w, own_x + w * rx, own_y + w * ry, gxx + gx * rx, gxy + gx * ry, gyy + gy * ry
+def add_member(own, rx, ry, y, w, g):  # type: ignore[no-untyped-def]
+    """The sums with a member more; y = 1/L."""
+    own_w, own_x, own_y, gxx, gxy, trace = own
+    nx = rx * y
+    ny = ry * y
+    gx = g * nx
+    return own_w + w, own_x + w * rx, own_y + w * ry, gxx + gx * nx, gxy + gx * ny, trace + g
 
 
 @part
@@ -92,7 +121,8 @@ def no_columns(nothing):  # type: ignore[no-untyped-def]
 def add_column(sums, ax, ay, own):  # type: ignore[no-untyped-def]
     """The sums with a column more, whose members are summed in `own`."""
     (sum_x, sum_y, sum_t), (sum_w, sum_wx, sum_wy), (kxx, kxy, kyy, kxt, kyt, ktt) = sums
-    w, x, y, gxx, gxy, gyy = own
+    w, x, y, gxx, gxy, trace = own
+    gyy = trace - gxx
     gxt = ax * gxy - ay * gxx
     gyt = ax * gyy - ay * gxy
     return (
@@ -120,35 +150,39 @@ def columns(sums):  # type: ignore[no-untyped-def]
 def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
 
-    The lengths of the next row are found while this one is summed, as in `spring.elastic_tangent`.
+    Ahead of its sums as in `grid_force`.
     """
-    rows = room.shape[0]
     begin_rows(px, py, width, dx, dy, room)
     nothing = zero()
     sums = no_columns(nothing)
     energy = nothing
+    ax, ay = turned_columns(qx, qy, first, c, s)
+    seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
-        u = load(qx, i)
-        v = load(qy, i)
-        ax = c * u - s * v
-        ay = s * u + c * v
+        bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), c, s)
         own = no_members(nothing)
         at = i
-        rx, ry, r2, y = _seen(ax, ay, room, np.int64(0))
-        for j in range(rows):
-            following = _seen(ax, ay, room, min(j + 1, rows - 1))
-            stiffness = load(k, at)
-            stretch = r2 * y - load(l0, at)
-            w = stiffness * stretch
-            energy += w * stretch
-            w *= y
-            g = (stiffness - w) * (y * y)
-            own = add_member(own, rx, ry, w, g)
+        for j in range(1, room.shape[0]):
+            following = _seen(ax, ay, room, j)
+            own, energy = _add(own, energy, seen, load(k, at), load(l0, at))
             at += width
-            rx, ry, r2, y = following
+            seen = following
+        following = _seen(bx, by, room, np.int64(0))
+        own, energy = _add(own, energy, seen, load(k, at), load(l0, at))
+        seen = following
         sums = add_column(sums, ax, ay, own)
+        ax = bx
+        ay = by
     force, tangent = columns(sums)
     return (*force, 0.5 * total(energy), *tangent)
+
+
+@part
+def _add(own, energy, seen, k, l0):  # type: ignore[no-untyped-def]
+    """The sums of a column, and the energy, with a member more."""
+    rx, ry, r2, y = seen
+    w, energy = _weight(energy, seen, k, l0)
+    return add_member(own, rx, ry, y, w, where_larger(r2, ZERO_LENGTH_SQUARED, k - w)), energy
 
 
 @kernel
@@ -161,41 +195,58 @@ def _seen_at(turned, room, j, m):  # type: ignore[no-untyped-def]
 
 
 @part
-def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, room, turned, out):  # type: ignore[no-untyped-def]
-    """Add sum_j f_i (b_i . u_j) of each spring at pose (m, >= 4) j to out; u (m, 3), room (rows, m, 4).
+def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
+    """Add sum_j f_i (b_i . u_j) and sum_e weight_e V_i of each spring to out: f, b at the first poses, V at the others.
 
-    turned (m, 2, lanes) is room for a at the poses.
+    pose (poses, >= 4), u (m, 3), weight (poses - m,). Room: room (rows, poses, 4); turned (poses, 2, lanes) for a.
     """
     rows = room.shape[0]
-    many = pose.shape[0]
-    if many == 0:
-        return
+    many = u.shape[0]
+    poses = pose.shape[0]
     for j in range(rows):
-        for m in range(many):
+        for m in range(poses):
             ex = pose[m, 0] - px[j * width]
             ey = pose[m, 1] - py[j * width]
             room[j, m, 0] = ex
             room[j, m, 1] = ey
-            # L b . u = r . (u + e x u_theta)
-            room[j, m, 2] = u[m, 0] + ey * u[m, 2]
-            room[j, m, 3] = u[m, 1] - ex * u[m, 2]
+            if m < many:  # L b . u = r . (u + e x u_theta)
+                room[j, m, 2] = u[m, 0] + ey * u[m, 2]
+                room[j, m, 3] = u[m, 1] - ex * u[m, 2]
     for i in range(first, last, lanes()):
         v = load(qx, i)
         w = load(qy, i)
-        for m in range(many):
+        for m in range(poses):
             store(turned[m, 0], 0, pose[m, 2] * v - pose[m, 3] * w)
             store(turned[m, 1], 0, pose[m, 3] * v + pose[m, 2] * w)
         at = i
-        rx, ry, r2, z = _seen_at(turned, room, np.int64(0), np.int64(0))
+        rx, ry, _, z = _seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
             work = zero()
             for m in range(1, many):
                 following = _seen_at(turned, room, j, m)
-                work += (r2 * z - free) * z * (rx * room[j, m - 1, 2] + ry * room[j, m - 1, 3])
-                rx, ry, r2, z = following
-            following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
-            work += (r2 * z - free) * z * (rx * room[j, many - 1, 2] + ry * room[j, many - 1, 3])
-            rx, ry, r2, z = following
+                work += (1.0 - free * z) * (rx * room[j, m - 1, 2] + ry * room[j, m - 1, 3])
+                rx, ry, _, z = following
+            if many > 0:
+                following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
+                work += (1.0 - free * z) * (rx * room[j, many - 1, 2] + ry * room[j, many - 1, 3])
+                rx, ry, _, z = following
+            for m in range(many, poses):
+                _, _, r2, y = _seen_at(turned, room, j, m)
+                stretch = r2 * y - free
+                work += 0.5 * weight[m - many] * stretch * stretch
             store(out, at, load(out, at) + load(k, at) * work)
             at += width
+
+
+@kernel
+def grid_shortest(px, py, qx, qy, width, dx, dy, c, s):  # type: ignore[no-untyped-def]
+    """Smallest length in whole rows, m."""
+    found = zero() - np.inf
+    for i in range(0, width, lanes()):
+        ax, ay = turned_columns(qx, qy, i, c, s)
+        for at in range(0, px.shape[0], width):
+            rx = ax + (dx - px[at])
+            ry = ay + (dy - py[at])
+            found = larger(zero() - (rx * rx + ry * ry), found)
+    return math.sqrt(-largest(found))
