@@ -104,12 +104,12 @@ class Kernel:
     def _inside(self) -> Any:
         """Numba's object for the function where compiled functions call it."""
         compiler = numba()
-        from mdstopo.native.library import LEFT, OPTIMISED, Cache
+        from mdstopo.native.library import LEFT, OPTIMISED, WHOLE, Cache
         from mdstopo.native.store import cache_folder
 
         # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
-        whole = OPTIMISED if self._fastmath or not self._inner else LEFT
-        made = self._made(no_cpython_wrapper=True, pipeline_class=whole)
+        plain = LEFT if self._inner else WHOLE
+        made = self._made(no_cpython_wrapper=True, pipeline_class=OPTIMISED if self._fastmath else plain)
         if self._inner:  # an entry's machine code is kept by `native.store`
             kept, compiler.config.CACHE_DIR = compiler.config.CACHE_DIR, str(cache_folder())
             try:

@@ -52,6 +52,32 @@ class Left(Optimised):
         pass
 
 
+class Whole(Optimised):
+    """An entry: its loops are not unrolled.
+
+    Most of it runs once a call, over few bodies: copies of loops are only more to read. Loops over members have been
+    optimised before, or are vectors' own.
+    """
+
+    def _optimize_final_module(self) -> None:
+        if not IS_KNOWN:
+            super()._optimize_final_module()  # type: ignore[no-untyped-call]
+            return
+        target: Any = self._codegen
+        first, builder = target._module_pass_manager(
+            loop_vectorize=target._loopvect, slp_vectorize=False, opt=target._opt_level, cost="cheap"
+        )
+        first.run(self._final_module, builder)
+        options = llvm.create_pipeline_tuning_options(3)
+        options.loop_vectorization = True
+        options.slp_vectorization = False
+        options.loop_interleaving = options.loop_unrolling = False
+        builder = llvm.create_pass_builder(target._tm, options)
+        full = builder.getModulePassManager()
+        full.add_refprune_pass()
+        full.run(self._final_module, builder)
+
+
 def _compiler(library: type[Optimised]) -> type[Compiler]:
     class Lean(Compiler):
         def __init__(self, typingctx: Any, targetctx: Any, given: Any, *rest: Any) -> None:
@@ -70,6 +96,7 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
 
 OPTIMISED = _compiler(Optimised)
 LEFT = _compiler(Left)
+WHOLE = _compiler(Whole)
 
 
 class _Reader:
