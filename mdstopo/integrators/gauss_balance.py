@@ -170,7 +170,7 @@ def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
                 if inv_mass[d] > 0.0:
                     size += x[0, d] * x[0, d] / inv_mass[d]
             value = np.sqrt(size)
-            if value == 0.0 or abs(value - last) <= 1e-3 * value:
+            if value == 0.0 or abs(value - last) <= 1e-2 * value:
                 break
             for d in range(n):
                 x[0, d] /= value
