@@ -14,7 +14,7 @@ from mdstopo.bench.tables import Table
 
 #: each section is a module with a function of the same name that yields tables
 SECTIONS = {
-    "speed": "objective and exact gradient: error against time",
+    "speed": "objective and exact gradient: error against time; what finding a peak costs",
     "process": "the whole process: start, 50 iterations, file; help; the first run",
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",

@@ -1,9 +1,9 @@
 """The scenes and designs that are measured.
 
-fig6      the paper's Section IV.A: the energy is highest at the end
-end       the same, the energy looked at when time is over
-interior  the same bodies pulled sideways for twice as long: the peak lies inside the interval
-pulled    the same, the energy looked at when time is over: no peak has to be found
+fig6          the paper's Section IV.A: the energy is highest at the end
+end           the same, the energy looked at when time is over
+interior      the same bodies pulled sideways for twice as long: the peak lies inside the interval
+interior_end  the same, the energy looked at when time is over: no peak has to be found
 """
 
 from pathlib import Path
@@ -27,7 +27,7 @@ _CHANGES: dict[str, dict[str, object]] = {
     "fig6": {},
     "end": _AT_END,
     "interior": _PULLED,
-    "pulled": {**_PULLED, **_AT_END},
+    "interior_end": {**_PULLED, **_AT_END},
 }
 
 

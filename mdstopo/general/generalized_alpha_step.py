@@ -6,7 +6,7 @@ from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
 from mdstopo.general.forces import drive_state, turned_pose
 from mdstopo.general.projection import project
 from mdstopo.general.track import copy_vector, keep_stage
-from mdstopo.integrators.gauss_balance import fastest_rate
+from mdstopo.integrators.gauss_balance import CLOSELY, fastest_rate
 from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import (
     FORCES,
@@ -32,7 +32,8 @@ def rate_of(model, desk):  # type: ignore[no-untyped-def]
         if model.free[d] != 0:
             inverse[d] = 1.0 / model.mass[d]
     return fastest_rate(
-        model.pair, inverse, desk.k.reshape((1, n_pair, 6, 6)), desk.c.reshape((1, n_pair, 6, 6)), np.bool_(True)
+        model.pair, inverse, desk.k.reshape((1, n_pair, 6, 6)), desk.c.reshape((1, n_pair, 6, 6)), np.bool_(True),
+        CLOSELY,
     )
 
 

@@ -17,7 +17,7 @@ from collections import namedtuple
 
 import numpy as np
 
-from mdstopo.integrators.gauss_balance import Room, balance, dense_rows, fastest_rate
+from mdstopo.integrators.gauss_balance import ABOUT, Room, balance, dense_rows, fastest_rate
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
     copy_row,
@@ -185,7 +185,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         if sums[0, p, 3] > 0.0 and stiffness > 0.0:
             motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # a pair that starts strained
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
-    rate = fastest_rate(pair, inv_mass, k, c, damped)
+    rate = fastest_rate(pair, inv_mass, k, c, damped, ABOUT)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = span if rate * span <= LONGEST else LONGEST / rate

@@ -33,6 +33,9 @@ from mdstopo.native.vector import lanes, store, zero
 #: Made once, by a function of its own: arrays that a kernel is given cost it no counting of references
 Room = namedtuple("Room", "t rel sums K C turn dense rows vectors motion noise scale rel0 K0 C0")
 
+#: relative change at which the estimate of the fastest rate is settled: closely, and for a first window's length
+CLOSELY, ABOUT = 1e-3, 1e-2
+
 #: coordinates up to which tangents are multiplied as dense matrices
 DENSE = 24
 
@@ -153,8 +156,11 @@ def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ig
 
 
 @part
-def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
-    """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration."""
+def fastest_rate(pair, inv_mass, k, c, damped, settled):  # type: ignore[no-untyped-def]
+    """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration.
+
+    settled: relative change at which the iteration ends.
+    """
     n = inv_mass.shape[0]
     x = np.empty((1, n))
     y = np.empty((1, n))
@@ -170,7 +176,7 @@ def fastest_rate(pair, inv_mass, k, c, damped):  # type: ignore[no-untyped-def]
                 if inv_mass[d] > 0.0:
                     size += x[0, d] * x[0, d] / inv_mass[d]
             value = np.sqrt(size)
-            if value == 0.0 or abs(value - last) <= 1e-2 * value:
+            if value == 0.0 or abs(value - last) <= settled * value:
                 break
             for d in range(n):
                 x[0, d] /= value

@@ -20,7 +20,7 @@ from collections import namedtuple
 import numpy as np
 
 from mdstopo.integrators.banded import factorise, half_width, solve
-from mdstopo.integrators.gauss_balance import fastest_rate
+from mdstopo.integrators.gauss_balance import CLOSELY, fastest_rate
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,
@@ -258,7 +258,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                             x[0, d] = a_now[d]
                         else:
                             x[0, d] = 2.0 * a[d] - a_now[d]
-                    if newton == -2 and not h * fastest_rate(pair, inv_mass, k, c, damped) < RESOLVED:
+                    if newton == -2 and not h * fastest_rate(pair, inv_mass, k, c, damped, CLOSELY) < RESOLVED:
                         newton = -1  # the lagged state would be far off the motion
                 newton += 1
             finite = True
@@ -303,7 +303,7 @@ def rate_at_start(model, strength, damped):  # type: ignore[no-untyped-def]
         model, strength, np.int64(0), np.int64(1), t, state[0], state[1], np.bool_(True), damped, rel, sums,
         state[2], k, c, turn,
     )  # fmt: skip
-    return fastest_rate(model.pair, model.inv_mass, k, c, damped)
+    return fastest_rate(model.pair, model.inv_mass, k, c, damped, CLOSELY)
 
 
 @kernel

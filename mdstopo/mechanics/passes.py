@@ -47,7 +47,10 @@ def threads_for(springs, poses):  # type: ignore[no-untyped-def]
 
 @part
 def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
-    """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12)."""
+    """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12).
+
+    Rows 1 and 2 of design springs that have neither damping nor preload are left as they are: zero.
+    """
     counter = np.zeros(1, np.int64)
     job = (counter, model.chunk, model.block, model.power, model.member, alpha, strength)
     shared(_scale_chunks, threads_for(model, np.int64(1)), job)
@@ -75,14 +78,14 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
     for row in range(3 if block[k, 3] == 1 else 1):
         for j in range(rows):
             at = start + j * width
-            own = first + j * count
-            a = alpha[own : own + count]
+            begin = first + j * count
+            a = alpha[begin : begin + count]
             whole = member[5 + row, at : at + width]
             scaled = strength[row, at : at + width]
-            if mu == 1.0 and own + width <= alpha.shape[0]:
-                # with what is padding, whose variables are others' and whose strengths are zero
+            if mu == 1.0 and begin + width <= alpha.shape[0]:
+                # whole vectors: a place of padding takes some other variable times no stiffness
                 for i in range(0, width, lanes()):
-                    store(scaled, i, load(alpha, own + i) * load(whole, i))
+                    store(scaled, i, load(alpha, begin + i) * load(whole, i))
                 continue
             if mu == 1.0:  # a loop of its own: a power that is not used would be computed all the same
                 for i in range(count):
@@ -227,8 +230,11 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
     for i in range(used.shape[0]):
         count += used[i]
     work[7] += count
-    energies = weight.shape[0]
+    energies = np.int64(0)
+    for i in range(weight.shape[0]):
+        energies += weight[i] != 0.0
     rel = np.empty((count + energies, n_pair, POSE))
+    own = np.empty(energies)
     u = np.empty((count, n_pair, 3))
     j = 0
     for i in range(used.shape[0]):
@@ -242,10 +248,14 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
                 for axis in range(3):
                     u[j, p, axis] = -u[j, p, axis]
             j += 1
-    for i in range(energies):
-        relative_pose(pair, point[i, 0], point[i, 1], rel[count + i])
+    energies = 0
+    for i in range(weight.shape[0]):
+        if weight[i] != 0.0:
+            own[energies] = weight[i]
+            relative_pose(pair, point[i, 0], point[i, 1], rel[count + energies])
+            energies += 1
     counter = np.zeros(1, np.int64)
-    job = (counter, model.chunk, model.block, model.member, rel, u, weight, out)
+    job = (counter, model.chunk, model.block, model.member, rel, u, own, out)
     shared(_design_chunks, threads_for(model, count + energies), job)
 
 
@@ -275,6 +285,7 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
     if block[k, 4] < 0:
         return
     p = block[k, 0]
+    many = u.shape[0]
     if block[k, 6] > 0:
         design_grid(start, stop, block[k, 6], member, rel[:, p], u[:, p], weight, out)
         return
@@ -287,7 +298,6 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
         l0 = member[4, lo:hi]
         ks = member[5, lo:hi]
         o = out[lo:hi]
-        many = u.shape[0]
         if block[k, 3] == 0:
             elastic_design(px, py, qx, qy, l0, ks, rel[:many, p], u[:, p], o)
         else:
@@ -299,9 +309,8 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
                     r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
                 )  # fmt: skip
         for j in range(weight.shape[0]):
-            if weight[j] != 0.0:
-                r = rel[many + j, p]
-                stored_energy(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], weight[j], o)
+            r = rel[many + j, p]
+            stored_energy(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], weight[j], o)
 
 
 @part
@@ -334,7 +343,7 @@ def _unscale(k, start, stop, block, power, alpha, padded, out):  # type: ignore[
         given = padded[at : at + count]
         own = out[begin : begin + count]
         if mu == 1.0 and j + 1 < rows and 2 * count >= width:
-            # what is written behind this row's variables, the next row's overwrite
+            # whole vectors: what spills into the next row's variables, this chunk's own, is written over there
             for i in range(0, width, lanes()):
                 store(out, begin + i, load(padded, at + i))
         elif mu == 1.0:

@@ -14,7 +14,7 @@ from mdstopo.mechanics.laws.spring_grid import (
     add_column,
     add_member,
     begin_rows,
-    columns,
+    force_and_tangent,
     no_columns,
     no_members,
     turned_columns,
@@ -42,8 +42,8 @@ def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
 
 
 @part
-def _tangent(qx, qy, kl, k, room, c, s):  # type: ignore[no-untyped-def]
-    """Q and K as in `spring_grid.grid_tangent`, of the columns q, and k and k l0 (rows, columns); e of rows in room.
+def _tangent(qx, qy, k, kl, room, c, s):  # type: ignore[no-untyped-def]
+    """Q and K as in `spring_grid.grid_tangent`. q: of the columns; k, kl (rows, columns): k, k l0; room: e of the rows.
 
     With u = k l0/L they are w = k - u and g = u.
     """
@@ -70,7 +70,7 @@ def _tangent(qx, qy, kl, k, room, c, s):  # type: ignore[no-untyped-def]
         sums = add_column(sums, ax, ay, own)
         ax = bx
         ay = by
-    return columns(sums)
+    return force_and_tangent(sums)
 
 
 @part
@@ -90,12 +90,12 @@ def rough_sums(springs, strength, rel, m, sums):  # type: ignore[no-untyped-def]
         width = block[k, 6]
         tall, wide = tile_of((block[k, 2] - block[k, 1]) // width, width)
         room = np.empty((tall, 2), np.float32)
-        own = _rows(2 * tall + 2, wide)
+        own = _aligned_rows(2 * tall + 2, wide)
         _sum_roughly(block[k], wide, springs.member, strength[0], rel, m, sums, room, own[2:], own[:2])
 
 
 @part
-def _rows(count, width):  # type: ignore[no-untyped-def]
+def _aligned_rows(count, width):  # type: ignore[no-untyped-def]
     """Room for rows of whole vectors in single precision, each on a line of the cache."""
     some = 2 * WIDE
     width = (width + some - 1) // some * some
@@ -106,12 +106,14 @@ def _rows(count, width):  # type: ignore[no-untyped-def]
 
 @part
 def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):  # type: ignore[no-untyped-def]
-    """Add a block to sums, tile by tile. Room for a tile's k and k l0: own; for its q (2, columns)."""
+    """Add a block to sums, tile by tile. Room for a tile's k and then its k l0: own; for its q: q."""
     p = block[0]
     width = block[6]
     tall = own.shape[0] // 2
-    for start in range(block[1], block[2], tall * width):
-        rows = min(tall, (block[2] - start) // width)
+    whole = (block[2] - block[1]) // width
+    for row in range(0, whole, tall):
+        start = block[1] + row * width
+        rows = min(tall, whole - row)
         for first in range(0, width, wide):
             count = min(wide, width - first)
             for axis in range(2):
@@ -123,7 +125,7 @@ def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):  #
             for j in range(m):
                 r = rel[j, p]
                 begin_rows(member[0, start:], member[1, start:], width, r[0], r[1], room[:rows])
-                force, tangent = _tangent(q[0], q[1], own[tall : tall + rows], own[:rows], room[:rows], r[2], r[3])
+                force, tangent = _tangent(q[0], q[1], own[:rows], own[tall : tall + rows], room[:rows], r[2], r[3])
                 o = sums[j, p]
                 for axis in range(3):
                     o[axis] += force[axis]

@@ -3,7 +3,7 @@
 Numba makes machine code of every function, and optimises each with all that it calls. Here only entries are called
 from outside, and an entry holds a copy of all that it calls. So a function inside gets no machine code, and one at body
 level (`jit.kernel`) is optimised in its entry only: a quarter of the compile time is saved. A loop over members is
-optimised by itself too, so that its vectors do not depend on who calls it.
+optimised by itself too, so that its vectors do not depend on who calls it. Loops of entries are not unrolled.
 """
 
 from typing import Any
@@ -52,11 +52,11 @@ class Left(Optimised):
         pass
 
 
-class Whole(Optimised):
-    """An entry: its loops are not unrolled.
+class Rolled(Optimised):
+    """An entry by Numba's passes, but that its loops are not unrolled.
 
-    Most of it runs once a call, over few bodies: copies of loops are only more to read. Loops over members have been
-    optimised before, or are vectors' own.
+    Most of it runs once a call, over few bodies, and copies of loops are only more to read. Loops over members at body
+    level (strengths, gathering) are left as they are, too; member kernels have been optimised before.
     """
 
     def _optimize_final_module(self) -> None:
@@ -68,8 +68,9 @@ class Whole(Optimised):
             loop_vectorize=target._loopvect, slp_vectorize=False, opt=target._opt_level, cost="cheap"
         )
         first.run(self._final_module, builder)
-        options = llvm.create_pipeline_tuning_options(3)
-        options.loop_vectorization = True
+        config: Any = numba.config
+        options = llvm.create_pipeline_tuning_options(int(config.OPT))
+        options.loop_vectorization = bool(config.LOOP_VECTORIZE)
         options.slp_vectorization = False
         options.loop_interleaving = options.loop_unrolling = False
         builder = llvm.create_pass_builder(target._tm, options)
@@ -96,7 +97,7 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
 
 OPTIMISED = _compiler(Optimised)
 LEFT = _compiler(Left)
-WHOLE = _compiler(Whole)
+ROLLED = _compiler(Rolled)
 
 
 class _Reader:

@@ -64,18 +64,8 @@ def total(vector: Floats) -> float:
 
 def inverse_root(vector: Floats, floor: float) -> Floats:
     """1/sqrt(x) to rounding where x > floor, else 0; floor is at least the smallest normal number."""
-    return finished_root(root_seed(vector), vector, floor)
-
-
-def root_seed(vector: Floats) -> Floats:
-    """What 1/sqrt(x) begins with; a loop that has the next vector's seed early waits less."""
     with np.errstate(all="ignore"):
-        return np.asarray(1.0 / np.sqrt(vector))
-
-
-def finished_root(seed: Floats, vector: Floats, floor: float) -> Floats:
-    """`inverse_root` from the seed."""
-    return where_larger(vector, floor, seed)
+        return where_larger(vector, floor, 1.0 / np.sqrt(vector))
 
 
 def where_larger(vector: Floats, floor: float, value: Floats) -> Floats:

@@ -185,41 +185,32 @@ def _negative(build: Any, kinds: Any, arguments: Any) -> Any:
 
 def _inverse_root(build: Any, kinds: Any, arguments: Any) -> Any:
     x, floor = arguments
-    kind = kinds[0]
-    return _finished_root(build, (kind, kind, kinds[1]), (_root_seed(build, kinds, (x,)), x, floor))
+    root = _refined if _AVX512 else _divided
+    return _where_larger(build, kinds, (x, floor, root(build, kinds[0], x)))
 
 
-def _root_seed(build: Any, kinds: Any, arguments: Any) -> Any:
-    """14 bits of it; without such an instruction, all of it."""
-    kind = kinds[0]
-    (x,) = arguments
-    if not _AVX512:
-        return build.fdiv(_constant(kind, 1.0), _unary(build, kind, "sqrt", x))
-    form = ir.FunctionType(kind.code, [kind.code, kind.code, ir.IntType(kind.count)])
-    name = f"llvm.x86.avx512.rsqrt14.p{'s' if kind is ROUGH else 'd'}.512"
-    start = cgutils.get_or_insert_function(build.module, form, name)
-    return build.call(start, [x, _constant(kind, 0.0), ir.Constant(ir.IntType(kind.count), -1)])
+def _divided(build: Any, kind: VectorType, x: Any) -> Any:
+    return build.fdiv(_constant(kind, 1.0), _unary(build, kind, "sqrt", x))
 
 
-def _finished_root(build: Any, kinds: Any, arguments: Any) -> Any:
-    """With e = 1 - x y^2 of the seed y, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + O(2^-54)).
+def _refined(build: Any, kind: VectorType, x: Any) -> Any:
+    """From a seed y of 14 bits: with e = 1 - x y^2, 1/sqrt(x) = y (1 + e/2 + 3 e^2/8 + 5 e^3/16 + O(2^-54)).
 
     The first of these terms is enough for single precision.
     """
-    kind = kinds[0]
-    y, x, floor = arguments
-    root = y
-    if _AVX512:
-        # other flags would allow e to be taken apart
-        fused = ("contract",)
-        e = build.fsub(_constant(kind, 1.0), build.fmul(x, build.fmul(y, y), flags=fused), flags=fused)
-        series = _constant(kind, 0.5)
-        if kind is not ROUGH:
-            series = _constant(kind, 0.3125)
-            for coefficient in (0.375, 0.5):
-                series = build.fadd(_constant(kind, coefficient), build.fmul(series, e, flags=fused), flags=fused)
-        root = build.fadd(y, build.fmul(build.fmul(y, e), series, flags=fused), flags=fused)
-    return _where_larger(build, kinds[1:], (x, floor, root))
+    rough = kind is ROUGH
+    form = ir.FunctionType(kind.code, [kind.code, kind.code, ir.IntType(kind.count)])
+    name = f"llvm.x86.avx512.rsqrt14.p{'s' if rough else 'd'}.512"
+    start = cgutils.get_or_insert_function(build.module, form, name)
+    y = build.call(start, [x, _constant(kind, 0.0), ir.Constant(ir.IntType(kind.count), -1)])
+    # other flags would allow e to be taken apart
+    fused = ("contract",)
+    e = build.fsub(_constant(kind, 1.0), build.fmul(x, build.fmul(y, y), flags=fused), flags=fused)
+    series = _constant(kind, 0.5)
+    if not rough:
+        series = build.fadd(_constant(kind, 0.375), build.fmul(_constant(kind, 0.3125), e, flags=fused), flags=fused)
+        series = build.fadd(_constant(kind, 0.5), build.fmul(series, e, flags=fused), flags=fused)
+    return build.fadd(y, build.fmul(build.fmul(y, e), series, flags=fused), flags=fused)
 
 
 def _where_larger(build: Any, kinds: Any, arguments: Any) -> Any:
@@ -259,13 +250,6 @@ _implement(
     vector.magnitude, (VectorType,), _common, lambda build, kinds, given: _unary(build, kinds[0], "fabs", given[0])
 )
 _implement(vector.inverse_root, (VectorType, types.Float), lambda kind, _floor: kind, _inverse_root)
-_implement(vector.root_seed, (VectorType,), lambda kind: kind, _root_seed)
-_implement(
-    vector.finished_root,
-    (VectorType, VectorType, types.Float),
-    lambda seed, x, _floor: _common(seed, x),
-    _finished_root,
-)
 _implement(
     vector.where_larger,
     (VectorType, types.Float, VectorType),

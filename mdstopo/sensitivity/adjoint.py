@@ -153,16 +153,15 @@ def energy_rows(  # type: ignore[no-untyped-def]
             continue
         out = padded[r]
         out[:] = 0.0
-        reached = 0
-        if integral or not (k == 0 and c == 0.0):  # a peak at the start is not reached by the motion
-            reached = max(stages, steps.index[w + 1, 0])
-        z = np.empty((reached, n))
-        used = np.zeros(reached, np.int64)
-        if reached > 0:
+        passed = 0
+        if integral or not (k == 0 and c == 0.0):  # a peak at the start is not passed by the motion
+            passed = max(stages, steps.index[w + 1, 0])
+        z = np.empty((passed, n))
+        used = np.zeros(passed, np.int64)
+        if passed > 0:
             reverse_sweep(
                 pair, model.inv_mass, tables, steps, w, c_w, mu_q, bar, z, used, damped, turning, accuracy, work
             )
-        design_gradient(
-            model, steps.stage, pose, z, used, steps.stage if integral else point, weight, out, work
-        )  # fmt: skip
+        where = steps.stage if integral else point
+        design_gradient(model, steps.stage, pose, z, used, where, weight, out, work)
     return found

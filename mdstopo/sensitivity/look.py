@@ -130,8 +130,8 @@ def _shortest(m, lo, hi, width, r):  # type: ignore[no-untyped-def]
     qx = m[2, lo:hi]
     qy = m[3, lo:hi]
     if width > 0:
-        rows = (hi - lo) // width * width
-        return grid_shortest(px[:rows], py[:rows], qx, qy, width, r[0], r[1], r[2], r[3])
+        whole = (hi - lo) // width * width  # without what pads the block
+        return grid_shortest(px[:whole], py[:whole], qx, qy, width, r[0], r[1], r[2], r[3])
     return shortest_in(px, py, qx, qy, r[0], r[1], r[2], r[3])
 
 

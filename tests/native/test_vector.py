@@ -13,7 +13,6 @@ from mdstopo.native.kernel import numba as with_vectors
 from mdstopo.native.vector import (
     NARROW,
     WIDE,
-    finished_root,
     inverse_root,
     lanes,
     lanes_of,
@@ -22,7 +21,6 @@ from mdstopo.native.vector import (
     load,
     magnitude,
     negative,
-    root_seed,
     store,
     total,
     where_larger,
@@ -46,13 +44,9 @@ def _roots(x, out):
 
 
 @numba.njit
-def _roots_in_steps(x, value, out, chosen):
-    seed = root_seed(load(x, 0))
+def _chosen(x, value, out):
     for i in range(0, len(x), lanes()):
-        following = root_seed(load(x, min(i + lanes(), len(x) - lanes())))
-        store(out, i, finished_root(seed, load(x, i), FLOOR))
-        store(chosen, i, where_larger(load(x, i), FLOOR, load(value, i)))
-        seed = following
+        store(out, i, where_larger(load(x, i), FLOOR, load(value, i)))
 
 
 @numba.njit
@@ -122,15 +116,13 @@ def test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number():
     np.testing.assert_array_equal(out, 0.0)
 
 
-def test_a_root_begun_early_is_the_same_and_a_value_is_chosen_where_there_is_one():
+def test_values_are_those_of_arrays_where_there_is_more_than_the_floor():
     x = np.concatenate([10.0 ** np.random.default_rng(8).uniform(-60, 60, 58), [0.0, FLOOR, -1.0, np.nan, np.inf, 2.0]])
-    value = np.arange(64.0)
-    at_once, out, chosen = np.empty((3, 64))
-    _roots(x, at_once)
-    _roots_in_steps(x, value, out, chosen)
-    np.testing.assert_array_equal(out, at_once)
-    np.testing.assert_array_equal(chosen, where_larger(x, FLOOR, value))
-    assert 20 < np.count_nonzero(chosen) < 60
+    value = np.arange(1.0, 65.0)
+    out = np.empty(64)
+    _chosen(x, value, out)
+    np.testing.assert_array_equal(out, np.where(x > FLOOR, value, 0.0))
+    np.testing.assert_array_equal(out, where_larger(x, FLOOR, value))
 
 
 def test_numbers_are_shortened_into_an_array_of_single_precision():
@@ -200,7 +192,7 @@ def test_processors_without_the_widest_vectors_get_the_same_numbers():
         "assert own._width() == own.NARROW\n"
         "own.test_inverse_roots_are_right_to_rounding_over_the_whole_range()\n"
         "own.test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number()\n"
-        "own.test_a_root_begun_early_is_the_same_and_a_value_is_chosen_where_there_is_one()\n"
+        "own.test_values_are_those_of_arrays_where_there_is_more_than_the_floor()\n"
         "own.test_numbers_are_shortened_into_an_array_of_single_precision()\n"
         "own.test_operators_are_those_of_arrays()\n"
         "own.test_vectors_are_of_their_array_s_precision(np.float32)\n"

@@ -8,7 +8,7 @@ a = R q of a column and e = d - p of a row, r = a + e; so in a column, where a s
     of the last its first row and its trace, sum g.
 
 Rows are padded by members of no stiffness at the row's last point, so that vectors take whole columns.
-Arguments: member arrays (n,) of whole rows, beginning at the first of them; the length of a row; the columns from
+Arguments: member arrays (n,) of whole rows, beginning at the first of them; the places of a row; the columns from
 `first` to `last`; the pose; room (rows, 2) for what belongs to rows.
 """
 
@@ -43,8 +43,8 @@ def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
 def grid_force(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
     """Return Q (3 numbers) and E.
 
-    The lengths of the next row, or of the next columns' first, are found while this one is summed, as in
-    `spring.elastic_tangent`.
+    As in `spring.elastic_tangent`, the lengths of the next row (after the last, of the next columns' first) are found
+    while this one is summed.
     """
     begin_rows(px, py, width, dx, dy, room)
     sum_x = zero()
@@ -114,7 +114,11 @@ def add_member(own, rx, ry, y, w, g):  # type: ignore[no-untyped-def]
 @part
 def no_columns(nothing):  # type: ignore[no-untyped-def]
     """Sums over columns: -Q, w and w a, and xx, xy, yy, xt, yt, tt of what K has besides these; of none."""
-    return (nothing, nothing, nothing), (nothing, nothing, nothing), no_members(nothing)
+    return (
+        (nothing, nothing, nothing),
+        (nothing, nothing, nothing),
+        (nothing, nothing, nothing, nothing, nothing, nothing),
+    )
 
 
 @part
@@ -140,7 +144,7 @@ def add_column(sums, ax, ay, own):  # type: ignore[no-untyped-def]
 
 
 @part
-def columns(sums):  # type: ignore[no-untyped-def]
+def force_and_tangent(sums):  # type: ignore[no-untyped-def]
     """Q and the upper triangle of K."""
     (sum_x, sum_y, sum_t), weights, tangent = sums
     return (-total(sum_x), -total(sum_y), -total(sum_t)), upper_triangle(*tangent, *weights)
@@ -173,7 +177,7 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
         sums = add_column(sums, ax, ay, own)
         ax = bx
         ay = by
-    force, tangent = columns(sums)
+    force, tangent = force_and_tangent(sums)
     return (*force, 0.5 * total(energy), *tangent)
 
 
@@ -182,6 +186,7 @@ def _add(own, energy, seen, k, l0):  # type: ignore[no-untyped-def]
     """The sums of a column, and the energy, with a member more."""
     rx, ry, r2, y = seen
     w, energy = _weight(energy, seen, k, l0)
+    # a member without direction has no n: its k must not enter the trace
     return add_member(own, rx, ry, y, w, where_larger(r2, ZERO_LENGTH_SQUARED, k - w)), energy
 
 
@@ -203,6 +208,8 @@ def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, weight, room
     rows = room.shape[0]
     many = u.shape[0]
     poses = pose.shape[0]
+    if poses == 0:
+        return
     for j in range(rows):
         for m in range(poses):
             ex = pose[m, 0] - px[j * width]
@@ -213,27 +220,27 @@ def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, weight, room
                 room[j, m, 2] = u[m, 0] + ey * u[m, 2]
                 room[j, m, 3] = u[m, 1] - ex * u[m, 2]
     for i in range(first, last, lanes()):
-        v = load(qx, i)
-        w = load(qy, i)
         for m in range(poses):
-            store(turned[m, 0], 0, pose[m, 2] * v - pose[m, 3] * w)
-            store(turned[m, 1], 0, pose[m, 3] * v + pose[m, 2] * w)
+            ax, ay = turned_columns(qx, qy, i, pose[m, 2], pose[m, 3])
+            store(turned[m, 0], 0, ax)
+            store(turned[m, 1], 0, ay)
         at = i
-        rx, ry, _, z = _seen_at(turned, room, np.int64(0), np.int64(0))
+        rx, ry, _, y = _seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
             work = zero()
+            # f/k b . u = (1 - l0/L) r . (u + e x u_theta); of no length, r is nothing
             for m in range(1, many):
                 following = _seen_at(turned, room, j, m)
-                work += (1.0 - free * z) * (rx * room[j, m - 1, 2] + ry * room[j, m - 1, 3])
-                rx, ry, _, z = following
+                work += (1.0 - free * y) * (rx * room[j, m - 1, 2] + ry * room[j, m - 1, 3])
+                rx, ry, _, y = following
             if many > 0:
                 following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
-                work += (1.0 - free * z) * (rx * room[j, many - 1, 2] + ry * room[j, many - 1, 3])
-                rx, ry, _, z = following
+                work += (1.0 - free * y) * (rx * room[j, many - 1, 2] + ry * room[j, many - 1, 3])
+                rx, ry, _, y = following
             for m in range(many, poses):
-                _, _, r2, y = _seen_at(turned, room, j, m)
-                stretch = r2 * y - free
+                _, _, r2, inverse = _seen_at(turned, room, j, m)
+                stretch = r2 * inverse - free
                 work += 0.5 * weight[m - many] * stretch * stretch
             store(out, at, load(out, at) + load(k, at) * work)
             at += width

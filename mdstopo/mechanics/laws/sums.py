@@ -6,7 +6,7 @@ from mdstopo.native.vector import total
 
 @part
 def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):  # type: ignore[no-untyped-def]
-    """xx, xy, yy, xt, yt, tt of K from vectors: of g c c^T, and of w and w a, whose place in K is the same for all."""
+    """xx, xy, yy, xt, yt, tt of K from vectors: their own sums, and those of w and w a, alike for all laws."""
     whole = total(w)
     return (
         total(xx) + whole,
