@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from mdstopo.native.call import Native
     from mdstopo.native.store import Code
 
-_LETTERS = {np.dtype(np.float64): "d", np.dtype(np.int64): "q", np.dtype(np.bool_): "?"}
+_LETTERS = {np.dtype(kind).str: letter for kind, letter in ((np.float64, "d"), (np.int64, "q"), (np.bool_, "?"))}
+#: what an array has to be, of `flags.num`: in C order and aligned
+_PLAIN = 0x1 | 0x100
 
 
 def types_of(arguments: tuple[Any, ...]) -> str | None:
@@ -31,8 +33,8 @@ def types_of(arguments: tuple[Any, ...]) -> str | None:
     letters = []
     for argument in arguments:
         if isinstance(argument, np.ndarray):
-            letter = _LETTERS.get(argument.dtype)
-            if letter is None or not argument.flags.c_contiguous or not argument.flags.aligned:
+            letter = _LETTERS.get(argument.dtype.str)
+            if letter is None or argument.flags.num & _PLAIN != _PLAIN:
                 return None
             letters.append(f"{letter}{argument.ndim}")
         elif isinstance(argument, (bool, np.bool_)):

@@ -105,6 +105,7 @@ def _moving(
     sums[0], sums[1], sums[2] = 0.0, 0.0, 0.0
     for start in range(0, n, RUN):
         held, weight = zero(), zero()
+        single, size = 0.0, 0.0  # of those beside ones that move
         for i in range(start, min(start + RUN, n), lanes()):
             at, cost, push = load(c, i), load(a, i), load(s, i)
             one, other = near * cost, far * cost
@@ -122,10 +123,10 @@ def _moving(
                 which[count] = i + k
                 count += moves
                 spent = (1 - moves) * (a[i + k] * c[i + k])
-                sums[1] += spent
-                sums[2] += abs(spent)
-        sums[1] += total(held)
-        sums[2] += total(weight)
+                single += spent
+                size += abs(spent)
+        sums[1] += total(held) + single
+        sums[2] += total(weight) + size
     for i in range(n, len(c)):
         which[count] = i
         count += 1
