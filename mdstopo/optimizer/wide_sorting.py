@@ -100,7 +100,6 @@ def _moving(
     y: the iterate; sums: of those that rest.
     """
     n = len(c) // lanes() * lanes()
-    every = (1 << lanes()) - 1
     count: int = np.int64(0)  # type: ignore[assignment]  # as in `sort_out`
     sums[0], sums[1], sums[2] = 0.0, 0.0, 0.0
     for start in range(0, n, RUN):
@@ -111,9 +110,9 @@ def _moving(
             one, other = near * cost, far * cost
             most, least = push + larger(one, other), larger(-1.0 * one, -1.0 * other) - push
             store(y, i, at)
-            rising = negative(most) & ~negative(at - load(upper, i))
-            falling = negative(least) & ~negative(load(lower, i) - at)
-            moving = every & ~(rising | falling)
+            # one that rises rests at its upper end, one that falls at its lower: neither of two differences is above 0
+            rising, falling = larger(most, load(upper, i) - at), larger(least, at - load(lower, i))
+            moving = negative(larger(-1.0 * rising, -1.0 * falling))
             if not moving:
                 held += cost * at
                 weight += magnitude(cost * at)
