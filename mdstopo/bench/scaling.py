@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 MEMBERS = (1_000, 10_000, 100_000, 1_000_000)
 BODIES = (2, 10, 30, 100, 300, 1_000)
 #: iterations that are timed, and those of a whole run
-STEPS_TIMED, ITERATIONS = 8, 5
+STEPS_TIMED, ITERATIONS = 24, 5
 #: from so many members on the update of the optimiser shall be small beside an evaluation
 _LARGE = 100_000
 
@@ -86,7 +86,7 @@ def _members(n: int) -> Size:
     optimizer = make_optimizer(case, timed)
     state = optimizer.step(optimizer.start())
     iterations, evaluations = [], []
-    for _ in range(STEPS_TIMED if n >= 10_000 else 3 * STEPS_TIMED):
+    for _ in range(STEPS_TIMED):
         if not state.running:
             break
         began = time.perf_counter()

@@ -12,6 +12,7 @@ import llvmlite.binding as llvm
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.native.entry import DTYPES, PLAIN
 from mdstopo.native.store import CALL, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
@@ -55,6 +56,17 @@ def _format(kind: str) -> str:
     return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
 
 
+#: what numbers may be, by their letters; truths are integers too, and packed as these
+_NUMBERS: dict[str, tuple[type, ...]] = {"f": (float, np.floating), "i": (int, np.integer), "b": (bool, np.bool_)}
+
+
+def _asked(kind: str) -> tuple[Any, int, Any]:
+    """What an argument of a type has to be: class, number of dimensions or of integers or 1 for a truth, and dtype."""
+    if kind[0] in DTYPES:
+        return np.ndarray, int(kind[1:]), DTYPES[kind[0]]
+    return (tuple, int(kind[1:]), None) if kind[0] == "t" else (_NUMBERS[kind], int(kind == "b"), None)
+
+
 class Native:
     """An entry's machine code for one set of types of arguments."""
 
@@ -68,6 +80,7 @@ class Native:
         self._call = _CALL(self._engine.get_function_address(CALL))
         self._name = name
         self._kinds = types.split()
+        self._asked = [_asked(kind) for kind in self._kinds]
         self._single = not code.result.startswith("(")
         result = code.result.strip("()")
         self._unpack = struct.Struct("".join(_SLOTS[letter] for letter in result)).unpack_from if result else None
@@ -78,14 +91,17 @@ class Native:
         self._block = ctypes.c_int64 * (self._after // 8 + len(result) + 1)
 
     def __call__(self, *arguments: Any) -> Any:
-        block = self._block_of(arguments)
+        return self.run(self.block_of(arguments))
+
+    def run(self, block: Any) -> Any:
+        """Call it with a block of numbers."""
         if self._call(block):
             self._fail(block[-1])
         return self._found(block)
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """These arguments as a block, ready to be called; see `Entry.prepare`."""
-        block = self._block_of(arguments)
+        block = self.block_of(arguments)
         number = np.frombuffer(block, dtype=np.float64)
         whole = number.view(np.int64)
         placed = [
@@ -106,19 +122,33 @@ class Native:
 
         return call
 
-    def _block_of(self, arguments: tuple[Any, ...]) -> Any:
-        """The block of numbers for these arguments."""
+    def block_of(self, arguments: tuple[Any, ...]) -> Any:
+        """The block of numbers for these arguments; nothing where they are not of the types of this code."""
+        if len(arguments) != len(self._asked):
+            return None
         numbers: list[Any] = []
-        for kind, argument in zip(self._kinds, arguments, strict=True):
-            if kind in "fi":
-                numbers.append(argument)
-            elif kind[0] in "dq?":
+        for (sort, count, dtype), argument in zip(self._asked, arguments, strict=True):
+            if not isinstance(argument, sort):
+                return None
+            if dtype is not None:
+                own = argument.dtype  # nearly always that very object: to compare them takes five times as long
+                if own is not dtype and own != dtype:
+                    return None
+                shape = argument.shape
+                if len(shape) != count or argument.flags.num & PLAIN != PLAIN:
+                    return None
                 numbers.append(_address(argument))
-                numbers.extend(argument.shape)
-            elif kind[0] == "t":
+                numbers.extend(shape)
+            elif sort is tuple:
+                if len(argument) != count or not all(type(each) is int for each in argument):
+                    return None
                 numbers.extend(argument)
-            else:
+            elif count:
                 numbers.append(int(argument))
+            elif isinstance(argument, bool):
+                return None
+            else:
+                numbers.append(argument)
         block = self._block()
         self._pack(block, 0, *numbers)
         return block

@@ -20,15 +20,11 @@ if TYPE_CHECKING:
     from mdstopo.native.call import Native
     from mdstopo.native.store import Code
 
-_FLOATS, _INTEGERS = np.dtype(np.float64), np.dtype(np.int64)
-#: by an array's kind, the words for its dimensions
-_WORDS = {
-    kind: tuple(f"{letter}{n}" for n in range(8))
-    for kind, letter in ((_FLOATS, "d"), (_INTEGERS, "q"), (np.dtype(np.bool_), "?"))
-}
-_WORDS_OF_FLOATS, _WORDS_OF_INTEGERS = _WORDS[_FLOATS], _WORDS[_INTEGERS]
+#: by letter, the numbers of an array
+DTYPES = {"d": np.dtype(np.float64), "q": np.dtype(np.int64), "?": np.dtype(np.bool_)}
+_LETTERS = {dtype: letter for letter, dtype in DTYPES.items()}
 #: what an array has to be, of `flags.num`: in C order and aligned
-_PLAIN = 0x1 | 0x100
+PLAIN = 0x1 | 0x100
 
 
 def types_of(arguments: tuple[Any, ...]) -> str | None:
@@ -39,16 +35,10 @@ def types_of(arguments: tuple[Any, ...]) -> str | None:
     letters = []
     for argument in arguments:
         if isinstance(argument, np.ndarray):
-            kind = argument.dtype
-            if kind is _FLOATS:  # nearly always that very object: it is looked up in a fifth of the time
-                words = _WORDS_OF_FLOATS
-            elif kind is _INTEGERS:
-                words = _WORDS_OF_INTEGERS
-            else:
-                words = _WORDS.get(kind, ())
-            if argument.ndim >= len(words) or argument.flags.num & _PLAIN != _PLAIN:
+            letter = _LETTERS.get(argument.dtype)
+            if letter is None or argument.flags.num & PLAIN != PLAIN:
                 return None
-            letters.append(words[argument.ndim])
+            letters.append(f"{letter}{argument.ndim}")
         elif isinstance(argument, (bool, np.bool_)):
             letters.append("b")
         elif isinstance(argument, (int, np.integer)):
@@ -70,11 +60,19 @@ class Entry(Kernel):
     def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
         super().__init__(function, fastmath)
         self._native: dict[str, Native | None] = {}
+        self._last: Native | None = None
         self._callable: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
+        last = self._last
+        block = None if last is None else last.block_of(arguments)
+        if last is not None and block is not None:  # nearly always they are of the types that they were last time
+            return last.run(block)
         native = self._for(arguments)
-        return self._by_numba(*arguments) if native is None else native(*arguments)
+        if native is None:
+            return self._by_numba(*arguments)
+        self._last = native
+        return native(*arguments)
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """The entry with these arguments, to be called again and again with other numbers by their position.

@@ -88,6 +88,15 @@ def largest(vector: Floats) -> float:
     return float(vector.max())
 
 
+def unmarked(vector: Floats, bits: int) -> Floats:
+    """The numbers in lanes whose bits are clear, 0 in the others."""
+    return np.where((bits >> np.arange(len(vector))) & 1, 0.0, vector)
+
+
+def fetch(array: AnyFloats, i: int) -> None:
+    """Have what lies at array[i] brought near, because it will be asked for; i may be behind the end."""
+
+
 def negative(vector: Floats) -> int:
     """Bit k is set where the number in lane k is below zero."""
     return int(((vector < 0.0) << np.arange(len(vector))).sum())

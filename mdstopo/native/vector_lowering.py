@@ -144,6 +144,15 @@ def _store(build: Any, kinds: Any, arguments: Any) -> None:
     build.store(value, place).align = kind.number.bitwidth // 8
 
 
+def _fetch(build: Any, _kinds: Any, arguments: Any) -> None:
+    data, i = arguments
+    byte, flag = ir.IntType(8).as_pointer(), ir.IntType(32)
+    form = ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
+    call = cgutils.get_or_insert_function(build.module, form, "llvm.prefetch.p0")
+    to_be_read, often, numbers = (ir.Constant(flag, value) for value in (0, 3, 1))
+    build.call(call, [build.bitcast(build.gep(data, [i]), byte), to_be_read, often, numbers])
+
+
 def _folded(join: Callable[[Any, Any, Any], Any]) -> Lower:
     """One number of all: halves are joined until one is left."""
 
@@ -181,6 +190,13 @@ def _negative(build: Any, kinds: Any, arguments: Any) -> Any:
     kind = kinds[0]
     bits = build.bitcast(build.fcmp_ordered("<", arguments[0], _constant(kind, 0.0)), ir.IntType(kind.count))
     return build.zext(bits, ir.IntType(64))
+
+
+def _unmarked(build: Any, kinds: Any, arguments: Any) -> Any:
+    kind = kinds[0]
+    vector_of, bits = arguments
+    marked = build.bitcast(build.trunc(bits, ir.IntType(kind.count)), ir.VectorType(ir.IntType(1), kind.count))
+    return build.select(marked, _constant(kind, 0.0), vector_of)
 
 
 def _inverse_root(build: Any, kinds: Any, arguments: Any) -> Any:
@@ -243,6 +259,7 @@ _implement(vector.zero, (), lambda: VECTOR, lambda _build, _kinds, _none: _const
 _implement(vector.zero_of, (types.Array,), _of, lambda _build, kinds, _given: _constant(_of(*kinds), 0.0))
 _implement(vector.load, (types.Array, types.Integer), _of, _load)
 _implement(vector.store, (types.Array, types.Integer, VectorType), _stored, _store)
+_implement(vector.fetch, (types.Array, types.Integer), lambda _array, _i: types.none, _fetch)
 _implement(vector.total, (VectorType,), lambda _whole: types.float64, _folded(_sum_of))
 _implement(vector.largest, (VectorType,), lambda _whole: types.float64, _folded(_larger_of))
 _implement(vector.larger, (VectorType, VectorType), _common, lambda build, _kinds, both: _larger_of(build, *both))
@@ -257,3 +274,4 @@ _implement(
     _where_larger,
 )
 _implement(vector.negative, (VectorType,), lambda _vector: types.int64, _negative)
+_implement(vector.unmarked, (VectorType, types.Integer), lambda vector, _bits: vector, _unmarked)

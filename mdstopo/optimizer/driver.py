@@ -39,7 +39,7 @@ from mdstopo.optimizer.safeguards import (
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import History, State, Step
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Measures, Space, is_wide, next_wide_shift, propose, ranges, shift_rule
+from mdstopo.optimizer.wide import WIDE, Measures, ShiftRule, Space, is_wide, next_wide_shift, propose, ranges
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -67,7 +67,7 @@ class Gsao:
         self.range = ranges(self.lower, self.upper)
         self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
-        self._rule = shift_rule(settings)
+        self._rule = ShiftRule.of(settings)
         self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
 
     def start(self, initial: Floats | None = None) -> State:

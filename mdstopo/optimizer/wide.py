@@ -11,6 +11,7 @@ rows lie below it there and the limits hold.
 """
 
 from collections.abc import Callable
+from functools import cache
 from math import gcd, inf, isfinite
 from mmap import mmap
 from typing import Generic, NamedTuple, TypeVar
@@ -94,12 +95,13 @@ class Kept(Generic[T]):
 
     def __init__(self, function: Callable[..., T]) -> None:
         self._function = function
-        self._kept: list[tuple[tuple[Floats, ...], T]] = []
+        self._kept: list[tuple[tuple[int, ...], tuple[Floats, ...], T]] = []
 
     def __call__(self, *arrays: Floats) -> T:
         """What the function gives for these arrays, the same objects."""
-        for known, result in self._kept:
-            if all(one is other for one, other in zip(known, arrays, strict=True)):
+        these = tuple(map(id, arrays))  # of arrays that are held, which no others can have
+        for known, _, result in self._kept:
+            if known == these:
                 return result
         result = self._function(*arrays)
         self.tell(result, *arrays)
@@ -107,30 +109,32 @@ class Kept(Generic[T]):
 
     def tell(self, result: T, *arrays: Floats) -> None:
         """What the function gives for these arrays is known."""
-        self._kept = [(arrays, result), *self._kept[:1]]
+        self._kept = [(tuple(map(id, arrays)), arrays, result), *self._kept[:1]]
 
 
 class Room:
     """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
 
-    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,); signs (N/32,), for `wide_shift_few`. made: the step
-    of which found and counts tell who moves; signed: that of which signs tell. None where they tell of none.
+    slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,). made: the step of which found and counts tell who
+    moves, or None; moving: how many these are. signs: two of (N/32,), for `wide_shift_few`; signed: the step of which
+    the first tell, or None.
     """
 
     def __init__(self) -> None:
         self._n = -1
         self.made: Step | None = None
+        self.moving = 0
         self.signed: Step | None = None
 
-    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats, Ints]:
+    def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
         """Room for n variables; what it holds is of no account but for what is said above."""
         if n != self._n:
             self._n, self.made, self.signed = n, None, None
-            counts, signs = np.empty((2, -(-n // PIECE)), dtype=np.int64), np.empty(-(-n // 32), dtype=np.int64)
-            self._who = _thin(n), counts, signs
+            self._who = _thin(n), np.empty((2, -(-n // PIECE)), dtype=np.int64)
+            self.signs = np.empty(-(-n // 32), dtype=np.int64), np.empty(-(-n // 32), dtype=np.int64)
             self._take()
-        (slots, place, x), (found, counts, signs) = self._slots, self._who
-        return slots, place, found, counts, x, signs
+        (slots, place, x), (found, counts) = self._slots, self._who
+        return slots, place, found, counts, x
 
     def used(self, count: int) -> None:
         """So many slots were: where that is much memory it is let go of."""
@@ -187,27 +191,29 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     lower, upper, linear, (cost,), _ = measures.space
     slope, bound = np.ascontiguousarray(state.gradients[row]), float(linear.b[0])
     sizes = measures.steepest(state.gradients)
-    own, steepest = float(sizes[row]), float(sizes[chosen].max())
+    own = float(sizes[row])
+    steepest = own if len(chosen) == 1 else float(sizes[chosen].max())
     if own == 0.0 or not isfinite(steepest):
         return None
     power = settings.number("power")
     share = inf if power == 1.0 else 1.0 - settings.number("shift_margin")
     limits = np.array([power, settings.number("move_limit"), state.trust, share, state.convex * steepest])
     left = float(measures.excess(alpha)[0])
-    measures.room.made = None
-    trial, (slots, place, found, counts, x, _) = np.empty(n), measures.room.of(n)
-    multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
+    room = measures.room
+    room.made = None
+    trial, (slots, place, found, counts, x) = np.empty(n), room.of(n)
+    multiplier, miss, size, change, residual, plain, scaled, count, room.moving = wide_minimum(
         alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
         _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, counts, x,
     )  # fmt: skip
-    measures.room.used(count)
+    room.used(count)
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
         return None
     if miss > ROUNDING * size or (linear.equal[0] and miss < -ROUNDING * size):
         trial = _touched_up(trial, slots[:, :count], place[:count], measures, ROUNDING * size)
     else:
         measures.change.tell((plain, scaled), trial, alpha)
-        measures.room.made = Step(trial, alpha)
+        room.made = Step(trial, alpha)
     if not _decides(state, chosen, trial, lower, upper, power):
         return None
     slack = 0.0 if linear.equal[0] else abs(multiplier * left) / own
@@ -233,28 +239,40 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
     return bool(objective.max() <= objective[0] and cuts.max(initial=-inf) <= objective[0] and not (limits > 0.0).any())
 
 
-def shift_rule(settings: Settings) -> Floats:
-    """How shifts follow steps: factors where these agree and oppose each other, smallest and largest shift."""
-    return np.array([settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")])
+class ShiftRule(NamedTuple):
+    """How shifts follow steps: factors where these agree and oppose each other, smallest and largest shift (4,); and
+    the last two by themselves."""
+
+    numbers: Floats
+    within: tuple[float, float]
+
+    @classmethod
+    def of(cls, settings: Settings) -> "ShiftRule":
+        """That of settings."""
+        grow, shrink, least, most = (settings.number(f"shift_{name}") for name in _SHIFTS)
+        return cls(np.array([grow, shrink, least, most]), (least, most))
 
 
-def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: Floats, room: Room) -> Shifts:
+_SHIFTS = ("grow", "shrink", "minimum", "maximum")
+
+
+def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room: Room) -> Shifts:
     """As `safeguards.next_shift`. Of a step that was made in the room, and of the one before, it is known who moved."""
-    within = (float(rule[2]), float(rule[3]))
     made, n = room.made == step, len(step.to)
-    known = made and room.signed == last and shift.within == within
-    _, _, moves, counts, _, signs = room.of(n)
+    known = made and room.signed == last and shift.within == rule.within
+    _, _, moves, counts, _ = room.of(n)
     if known:
-        shifts, array, places, before, count = shift.following(int(counts[1].sum()))
+        shifts, array, places, before, count = shift.following(room.moving)
     else:
         array, places, before = np.empty(n), np.empty(0, dtype=np.int64), np.empty(0)
-        shifts, count = Shifts(array, within), np.zeros(1, dtype=np.int64)
+        shifts, count = Shifts(array, rule.within), np.zeros(1, dtype=np.int64)
         threads = _threads(n, LIGHT)
-        wide_shift(shift.array(), last.to, last.origin, step.to, step.origin, rule, threads, array)
+        wide_shift(shift.array(), last.to, last.origin, step.to, step.origin, rule.numbers, threads, array)
     room.signed = None
     if made:
-        wide_shift_few(array, moves, counts, signs, known, rule, places, before, count)
-        room.signed = step
+        earlier, signs = room.signs
+        wide_shift_few(array, moves, counts, earlier, signs, known, rule.numbers, places, before, count)
+        room.signs, room.signed = (signs, earlier), step
     return shifts
 
 
@@ -314,6 +332,7 @@ def _touched_up(trial: Floats, slots: Floats, place: Ints, measures: Measures, r
     return repair(trial, lower, upper, space.linear)
 
 
+@cache
 def _stride(n: int) -> int:
     """Every how many variables one is in the sample; with no common factor, so that no grid's rhythm is met."""
     stride = max(1, n // min(SAMPLE, max(_LEAST_SAMPLE, n // 64)))

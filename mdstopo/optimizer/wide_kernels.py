@@ -9,15 +9,18 @@ Sums are added in a fixed order, so that results do not depend on the number of 
 import numpy as np
 
 from mdstopo.jit import member_kernel, vector_entry
+from mdstopo.native.vector import fetch
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
-from mdstopo.optimizer.wide_passes import part
+from mdstopo.optimizer.wide_passes import SOON, part
 from mdstopo.optimizer.wide_slots import (
     BEYOND,
     BLOCK,
     COST,
     ITERATE,
     ROOM,
+    ROW,
+    TINY,
     WHOLE,
     box,
     bracket_slots,
@@ -31,6 +34,12 @@ from mdstopo.optimizer.wide_sorting import measure, one, sort_out
 #: variables of the sample from which the first bracket comes, and its half width in standard deviations
 SAMPLE = 4096
 SPREAD = 3.0
+#: what may be left of the row there, relative to what the variables can move, and to the half width
+ENOUGH, ENOUGH_OF_SPREAD = 1e-3, 0.1
+#: a sample of which so many are every so many-th is looked at after these
+FEWEST, COARSER = 128, 8
+#: what is added to its bracket, relative to the multiplier
+WIDER = 0.15
 #: brackets that are tried, the last of them without ends
 ATTEMPTS = 6
 #: what may be left of the row where it is solved, and after it is settled, relative to the size of its sums
@@ -40,35 +49,49 @@ SOLVED, SETTLED = 1e-9, 1e-15
 @member_kernel
 def _estimate(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
-    gap: float, least: float, stride: int, slots: Floats, place: Ints, x: Floats, room: Floats, whole: Ints,
+    gap: float, near: float, guess: float, far: float, stride: int, slots: Floats, place: Ints, x: Floats, room: Floats,
+    whole: Ints,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """A bracket that probably holds the multiplier, the likeliest in its middle, from every stride-th variable.
+    """A bracket within [near, far] that probably holds the multiplier, the likeliest in its middle, from every
+    stride-th variable.
 
-    gap: b - a x at the iterate.
+    gap: b - a x at the iterate. Of variables that rest for all multipliers in [near, far] nothing more is asked.
     """
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
     N = len(alpha)
     n: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
-    goal = 0.0
+    part_of = (N + stride - 1) // stride
+    goal, extent = gap * part_of / N, 0.0
     for i in range(0, N, stride):
-        a = one(cost, N, i)
-        low, high, reach, span = box(alpha[i], one(lower, N, i), one(upper, N, i), shift[i], move, trust, share)
-        enter_slot(slots, place, n, i, alpha[i], slope[i], a, low, high, reach, convex / span)
-        goal += a * alpha[i]
+        later = min(i + SOON * stride, N - 1)
+        fetch(alpha, later)
+        fetch(slope, later)
+        fetch(shift, later)
+        at, push, a, end, other = alpha[i], slope[i], one(cost, N, i), one(lower, N, i), one(upper, N, i)
+        most, least = push + max(near * a, far * a), push + min(near * a, far * a)
+        if ((at >= other) & (most <= 0.0)) | ((at <= end) & (least >= 0.0)):
+            continue
+        low, high, reach, span = box(at, end, other, shift[i], move, trust, share)
+        enter_slot(slots, place, n, i, at, push, a, low, high, reach, convex / span)
+        goal += a * at
+        extent += abs(a) * (high - low)
         n += 1
+    if n == 0:
+        return near, guess, far
     ends = bracket_slots(slots, n, power, room, whole)
-    goal += gap * n / N
-    rounding = 1e-6 * abs(goal)
-    guess, _, _ = root(slots, n, ends, x, goal, least, BEYOND, BEYOND, power, rounding, bool(0), room, whole)
+    enough = ENOUGH * extent
+    guess, _, _, rate = root(slots, n, ends, x, goal, near, guess, far, power, enough, bool(0), room, whole)
     mean, square = 0.0, 0.0
     for k in range(n):
         moved = slots[COST, k] * (x[k] - slots[ITERATE, k])
-        mean += moved / n
+        mean += moved / part_of
         square += moved * moved
-    spread = SPREAD * np.sqrt(max(square - n * mean * mean, 0.0))
-    near, _, _ = root(slots, n, ends, x, goal + spread, least, guess, BEYOND, power, rounding, bool(0), room, whole)
-    far, _, _ = root(slots, n, ends, x, goal - spread, least, guess, BEYOND, power, rounding, bool(0), room, whole)
-    return near, guess, far
+    spread = SPREAD * np.sqrt(max(square - part_of * mean * mean, 0.0))
+    enough, way = max(enough, ENOUGH_OF_SPREAD * spread), spread / min(rate, -TINY)
+    more, less = goal + spread, goal - spread
+    first = root(slots, n, ends, x, more, near, guess + way, far, power, enough, bool(0), room, whole)[0]
+    last = root(slots, n, ends, x, less, near, guess - way, far, power, enough, bool(0), room, whole)[0]
+    return first, guess, last
 
 
 @vector_entry
@@ -76,20 +99,28 @@ def wide_minimum(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     bound: float, at_iterate: float, equal: bool, steepest: float, stride: int, rounding: float, threads: int,
     out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints, x: Floats,
-) -> tuple[float, float, float, float, float, float, float, int]:  # fmt: skip
+) -> tuple[float, float, float, float, float, float, float, int, int]:  # fmt: skip
     """Minimise one row in its box under a x <= bound or = bound.
 
     limits: power, move limit, trust, share of the shifts' distance, convex term over the range's unit. at_iterate: a x
     of the iterate. steepest: the unit of the residual. out (N,): the minimiser. slots, place, found, x: room for N;
     counts (2, pieces). Returns the multiplier, what is left of the row, the size of its sums, the change of the model,
-    what `measure` finds, and how many columns of `slots` and `place` hold variables that may still be touched up.
+    what `measure` finds, how many columns of `slots` and `place` hold variables that may still be touched up, and how
+    many variables may have moved.
     """
     power = limits[0]
-    room, whole = np.empty((ROOM, BLOCK)), np.empty((WHOLE, BLOCK), dtype=np.int64)
+    room, whole = np.empty((ROOM, ROW)), np.empty((WHOLE, ROW), dtype=np.int64)
     least = -BEYOND if equal else 0.0
-    near, guess, far = _estimate(
-        alpha, slope, cost, shift, lower, upper, limits, bound - at_iterate, least, stride, slots, place, x, room, whole
-    )
+    near, guess, far = least, 0.0, BEYOND
+    for step in (COARSER * stride + 1, stride):
+        if step == stride or len(alpha) >= FEWEST * step:
+            near, guess, far = _estimate(
+                alpha, slope, cost, shift, lower, upper, limits, bound - at_iterate, near, guess, far, step, slots,
+                place, x, room, whole,
+            )  # fmt: skip
+        if step > stride:  # few of many move, and so few of these: what is widely off costs little, what is lost much
+            most = 0.5 * (far - near) + WIDER * abs(guess)
+            near, far = max(least, near - most), min(BEYOND, far + most)
     multiplier, miss, total, size, change, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for attempt in range(ATTEMPTS):
         if attempt == ATTEMPTS - 1:
@@ -99,8 +130,10 @@ def wide_minimum(
         )
         ends = bracket_slots(slots, n, power, room, whole)
         goal = bound - total
-        guess, _, _ = root(slots, n, ends, x, goal, near, guess, far, power, 1e-6 * abs(bound), bool(0), room, whole)
-        multiplier, miss, way = root(slots, n, ends, x, goal, near, guess, far, power, rounding, bool(1), room, whole)
+        guess = root(slots, n, ends, x, goal, near, guess, far, power, 1e-6 * abs(bound), bool(0), room, whole)[0]
+        multiplier, miss, way = root(
+            slots, n, ends, x, goal, near, guess, far, power, rounding, bool(1), room, whole
+        )[:3]  # fmt: skip
         # something is left at an end of the bracket: the sample has misled
         width = far - near + 1e-3 * abs(far)
         if way > 0:
@@ -118,10 +151,10 @@ def wide_minimum(
     for k in range(n):
         out[place[k]] = x[k]
     change += promise(slots, n, x, power, room, whole)
-    residual, plain, scaled = measure(
+    residual, plain, scaled, moving = measure(
         alpha, slope, cost, lower, upper, multiplier, steepest, threads, out, found, counts
     )
-    return multiplier, miss, size, change, residual, plain, scaled, n
+    return multiplier, miss, size, change, residual, plain, scaled, n, moving
 
 
 @vector_entry
@@ -129,7 +162,7 @@ def wide_rows(
     slopes: Floats, alpha: Floats, trial: Floats, shift: Floats, lower: Floats, upper: Floats, power: float, out: Floats
 ) -> None:
     """out (R,): what the approximations of rows with these slopes (R, N) change from alpha to the trial."""
-    room, whole = np.empty((4, BLOCK)), np.empty((3, BLOCK), dtype=np.int64)
+    room, whole = np.empty((4, ROW)), np.empty((3, ROW), dtype=np.int64)
     reach, z, falling, rising = room[0], room[1], room[2], room[3]
     for start in range(0, len(alpha), BLOCK):
         stop = min(start + BLOCK, len(alpha))

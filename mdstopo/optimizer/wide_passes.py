@@ -7,13 +7,16 @@ import numpy as np
 
 from mdstopo.jit import kernel, member_kernel, vector_entry
 from mdstopo.native.threads import shared, taken
-from mdstopo.native.vector import lanes, load, total, zero
+from mdstopo.native.vector import fetch, lanes, load, total, zero
 from mdstopo.optimizer.powers import largest
 from mdstopo.optimizer.problem import Floats, Ints
 
 #: variables that a thread takes at once, and how many are summed in vectors before these are: long sums of like terms
 #: are all rounded to one side
 PIECE, RUN = 8192, 512
+
+#: how far ahead of a loop over some of them their numbers are fetched
+SOON = 32
 
 
 @kernel
@@ -61,33 +64,33 @@ def _shifted(
 
 @vector_entry
 def wide_shift_few(
-    shift: Floats, moves: Ints, counts: Ints, signs: Ints, known: bool, rule: Floats, places: Ints, before: Floats,
-    count: Ints,
+    shift: Floats, moves: Ints, counts: Ints, last: Ints, signs: Ints, known: bool, rule: Floats, places: Ints,
+    before: Floats, count: Ints,
 ) -> None:  # fmt: skip
     """As `wide_shift` in place, from who has moved alone, if `known`; and the signs of this step for the next.
 
-    moves, counts: who has moved and where to, as `wide_minimum` tells it. signs (N/32,): two bits a variable, as in
-    moves; if `known` those of the last step. places, before, count: as in `Shifts.following`.
+    moves, counts: who has moved and where to, as `wide_minimum` tells it. last, signs (N/32,): two bits a variable, as
+    in moves, of the last step, if `known`, and of this one. places, before, count: as in `Shifts.following`.
     """
     grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
-    pieces_of = counts.shape[1]
-    for piece in range(pieces_of if known else 0):
-        for k in range(piece * PIECE, piece * PIECE + counts[1, piece]):
-            i, now = moves[k] >> 2, moves[k] & 3
-            last = (signs[i >> 5] >> (2 * (i & 31))) & 3
-            if now != 0 and last != 0:
-                was = shift[i]
-                found = min(max(was * (grow if now == last else shrink), least), most)
-                if found != was:
-                    n = count[0]
-                    places[n], before[n] = i, was
-                    count[0] = n + 1
-                    shift[i] = found
     signs[:] = 0
-    for piece in range(pieces_of):
-        for k in range(piece * PIECE, piece * PIECE + counts[1, piece]):
-            i = moves[k] >> 2
-            signs[i >> 5] |= (moves[k] & 3) << (2 * (i & 31))
+    n = count[0]
+    for piece in range(counts.shape[1]):
+        begin, end = piece * PIECE, piece * PIECE + counts[1, piece]
+        for k in range(begin, end):
+            i, sign = moves[k] >> 2, moves[k] & 3
+            word, bit = i >> 5, 2 * (i & 31)
+            signs[word] |= sign << bit
+            if known:
+                fetch(shift, moves[min(k + SOON, end - 1)] >> 2)
+                was, other = shift[i], (last[word] >> bit) & 3
+                found = min(max(was * (grow if sign == other else shrink), least), most)
+                found = found if (sign != 0) & (other != 0) else was
+                # written in any case, and counted if it is a change: a jump on what is still far off would wait for it
+                places[n], before[n], count[0] = i, was, n + 1
+                shift[i] = found
+                n += 1 if found != was else 0
+    count[0] = n
 
 
 @vector_entry

@@ -2,10 +2,10 @@
 
 Arrays, one column for each such variable:
 
-    slots (9, n)  coefficient in the row, ends of the box, iterate, slope, distance of the shifts, kappa, and the
-                  multipliers between which the variable is inside its box; ends[:, k]
-    place (n,)    which variable it is
-    x (n,)        where it is
+    slots (10, n)  coefficient in the row, ends of the box, iterate, slope, distance of the shifts, kappa, the
+                   multipliers between which the variable is inside its box, and how fast it falls with the multiplier
+    place (n,)     which variable it is
+    x (n,)         where it is
 """
 
 import numpy as np
@@ -17,13 +17,19 @@ from mdstopo.optimizer.powers import largest, primitives
 from mdstopo.optimizer.problem import Floats, Ints
 
 BLOCK = 1024
-SLOTS = 9
-COST, LOW, HIGH, ITERATE, SLOPE, REACH, KAPPA, FIRST, LAST = range(SLOTS)
-#: rows of the rooms that the passes below need, each of `BLOCK` numbers
+#: how long rows of room are: rows that begin at like places of pages stand in each other's way
+ROW = BLOCK + 40
+SLOTS = 10
+COST, LOW, HIGH, ITERATE, SLOPE, REACH, KAPPA, FIRST, LAST, RATE = range(SLOTS)
+#: rows of the rooms that the passes below need, each of `ROW` numbers
 ROOM, WHOLE = 13, 4
 #: larger than any multiplier, small enough to be multiplied
 BEYOND = 1e200
 MAX_STEPS = 200
+#: the last step of Newton's iteration, in the variable's box: what the next would correct is that, squared
+CLOSE = 3e-7
+#: and where no more is asked than where to begin
+ROUGH = 0.03
 #: smaller than any width that counts
 TINY = 1e-300
 
@@ -110,114 +116,170 @@ def bracket_slots(slots: Floats, n: int, power: float, room: Floats, whole: Ints
 
 
 @member_kernel
-def _between(slots: Floats, start: int, stop: int, multiplier: float, stay: bool, share: Floats, x: Floats) -> None:
-    """Where the variables are for a multiplier if they moved evenly from one end of their box to the other; the share
-    of the way. Inside they stay where they are if `stay`."""
-    a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
-    first, last = slots[FIRST, start:stop], slots[LAST, start:stop]
-    n = stop - start
-    for i in range(n):
-        share[i] = min(max((multiplier - first[i]) / max(last[i] - first[i], TINY), 0.0), 1.0)
-    for i in range(n):
-        p, q = low[i], high[i]
-        up = share[i] if a[i] < 0.0 else 1.0 - share[i]
-        between = x[i] if stay else p + up * (q - p)
-        x[i] = q if up >= 1.0 else (p if up <= 0.0 else between)
-
-
-@member_kernel
-def _solved(
-    slots: Floats, start: int, multiplier: float, power: float, x: Floats, inside: Ints, count: int, room: Floats,
-    whole: Ints,
-) -> float:  # fmt: skip
-    """Where the multiplier sends those of a block's variables x that are inside their boxes, from where they are.
-
-    inside: which they are, in whole vectors. Returns the slope of their sum of a x.
-    """
-    first, z, g, h, a, low = room[1], room[2], room[3], room[4], room[5], room[6]
-    high, c, s, d, k, y = room[7], room[8], room[9], room[10], room[11], room[12]
-    n = whole_vectors(count)
-    for i in range(n):
-        at = start + inside[i]
-        a[i], low[i], high[i], c[i] = slots[COST, at], slots[LOW, at], slots[HIGH, at], slots[ITERATE, at]
-        s[i], d[i], k[i], y[i] = slots[SLOPE, at], slots[REACH, at], slots[KAPPA, at], x[inside[i]]
-    # the derivative is convex or concave: Newton's iteration ends on one side, or in the box's corner
-    for _ in range(MAX_STEPS):
-        _derivative(y[:n], c[:n], s[:n], d[:n], k[:n], power, first, z, g, whole)
-        for i in range(n):
-            h[i] = k[i] + abs(s[i]) * (1.0 - power) * first[i] / ((1.0 + z[i]) * d[i])
-        for i in range(n):
-            z[i] = min(max(y[i] - (g[i] + multiplier * a[i]) / h[i], low[i]), high[i]) - y[i]
-        for i in range(n):
-            y[i] += z[i]
-        for i in range(n):
-            z[i] /= max(high[i] - low[i], TINY)
-        if not largest(z[:n]) > 1e-8:  # what the next step would correct is that, squared
-            break
-    slope = 0.0
-    for i in range(count):
-        slope -= a[i] * a[i] / h[i]
-    for i in range(n):
-        x[inside[i]] = y[i]
-    return slope
-
-
-@member_kernel
-def _total(
-    slots: Floats, n: int, x: Floats, multiplier: float, power: float, exact: bool, room: Floats, whole: Ints
-) -> tuple[float, float]:
-    """Sum of a x over the slots for a multiplier, and its slope; fills x.
-
-    Exact from an x that is near; otherwise as if they moved evenly.
-    """
+def _evenly(slots: Floats, n: int, x: Floats, multiplier: float, room: Floats) -> tuple[float, float]:
+    """Sum of a x over the slots for a multiplier, and its slope, as if variables moved evenly from one end of their box
+    to the other; fills x."""
     total, slope = 0.0, 0.0
-    share, mark, inside = room[0], room[1], whole[3]
     for start in range(0, n, BLOCK):
         stop = min(start + BLOCK, n)
-        m = stop - start
         a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
-        y = x[start:stop]
-        _between(slots, start, stop, multiplier, exact, share, y)
-        if not exact:
-            begin, end = slots[FIRST, start:stop], slots[LAST, start:stop]
-            for i in range(m):
-                within = share[i] * (1.0 - share[i]) > 0.0
-                slope -= abs(a[i]) * (high[i] - low[i]) / max(end[i] - begin[i], TINY) if within else 0.0
-        else:
-            for i in range(m):
-                mark[i] = -share[i] * (1.0 - share[i])
-            count = chosen(mark, m, inside)
-            if count:
-                slope += _solved(slots, start, multiplier, power, y, inside, count, room, whole)
+        first, last, y, share = slots[FIRST, start:stop], slots[LAST, start:stop], x[start:stop], room[0]
+        m = stop - start
+        for i in range(m):
+            share[i] = min(max((multiplier - first[i]) / max(last[i] - first[i], TINY), 0.0), 1.0)
+        for i in range(m):
+            up = share[i] if a[i] < 0.0 else 1.0 - share[i]
+            y[i] = high[i] if up >= 1.0 else (low[i] if up <= 0.0 else low[i] + up * (high[i] - low[i]))
+        for i in range(m):
+            within = share[i] * (1.0 - share[i]) > 0.0
+            slope -= abs(a[i]) * (high[i] - low[i]) / max(last[i] - first[i], TINY) if within else 0.0
         for i in range(m):
             total += a[i] * y[i]
     return total, slope
 
 
 @member_kernel
+def _exactly(
+    slots: Floats, n: int, x: Floats, multiplier: float, power: float, enough: float, room: Floats, whole: Ints
+) -> tuple[float, float]:
+    """Sum of a x over the slots for a multiplier, and its slope, from an x that is near; fills x and the rates.
+
+    enough: as in `_solved`.
+    """
+    total, slope = 0.0, 0.0
+    mark, inside = room[0], whole[3]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
+        first, last, y, rate = slots[FIRST, start:stop], slots[LAST, start:stop], x[start:stop], slots[RATE, start:stop]
+        m = stop - start
+        for i in range(m):
+            mark[i] = max(first[i] - multiplier, multiplier - last[i])
+        for i in range(m):
+            p, q, between = low[i], high[i], y[i]
+            before, rises = multiplier <= first[i], a[i] >= 0.0
+            end = q if before == rises else p
+            y[i] = between if mark[i] < 0.0 else end
+        for i in range(m):
+            rate[i] = 0.0
+        count = chosen(mark, m, inside)
+        if count:
+            slope += _solved(slots, start, multiplier, power, enough, y, inside, count, room, whole)
+        for i in range(m):
+            total += a[i] * y[i]
+    return total, slope
+
+
+@member_kernel
+def _solved(
+    slots: Floats, start: int, multiplier: float, power: float, enough: float, x: Floats, inside: Ints, count: int,
+    room: Floats, whole: Ints,
+) -> float:  # fmt: skip
+    """Where the multiplier sends those of a block's variables x that are inside their boxes, from where they are, and
+    the rates.
+
+    inside: which they are, in whole vectors. enough: the last step that leaves it good enough, in the box. Returns the
+    slope of their sum of a x.
+    """
+    width, bend, z, g, h, a = room[0], room[1], room[2], room[3], room[4], room[5]
+    low, high, c, s, unit, k, y = room[6], room[7], room[8], room[9], room[10], room[11], room[12]
+    n = whole_vectors(count)
+    for i in range(n):
+        at = start + inside[i]
+        a[i], low[i], high[i], c[i] = slots[COST, at], slots[LOW, at], slots[HIGH, at], slots[ITERATE, at]
+        s[i], unit[i], k[i], y[i] = slots[SLOPE, at], slots[REACH, at], slots[KAPPA, at], x[inside[i]]
+    for i in range(n):
+        width[i] = 1.0 / max(high[i] - low[i], TINY)
+    for i in range(n):
+        unit[i] = (1.0 if s[i] < 0.0 else -1.0) / unit[i]
+    for i in range(n):
+        bend[i] = abs(s[i] * unit[i]) * (1.0 - power)
+    # the derivative is convex or concave: Newton's iteration ends on one side, or in the box's corner
+    for _ in range(MAX_STEPS):
+        for i in range(n):
+            z[i] = (y[i] - c[i]) * unit[i]
+        primitives(z[:n], power, g[:n], whole)
+        for i in range(n):
+            z[i] = 1.0 / (1.0 + z[i])
+        for i in range(n):
+            g[i] = (1.0 + power * g[i]) * z[i]
+        for i in range(n):
+            h[i] = k[i] + bend[i] * g[i] * z[i]
+        for i in range(n):
+            gradient = s[i] * g[i] + k[i] * (y[i] - c[i]) + multiplier * a[i]
+            z[i] = min(max(y[i] - gradient / h[i], low[i]), high[i]) - y[i]
+        for i in range(n):
+            y[i] += z[i]
+        for i in range(n):
+            z[i] *= width[i]
+        if not largest(z[:n]) > enough:
+            break
+    slope = 0.0
+    for i in range(n):
+        h[i] = a[i] / h[i]
+    for i in range(count):
+        slope -= a[i] * h[i]
+    for i in range(n):
+        x[inside[i]] = y[i]
+        slots[RATE, start + inside[i]] = h[i]
+    return slope
+
+
+@member_kernel
+def _followed(slots: Floats, n: int, x: Floats, change: float, room: Floats) -> tuple[float, float]:
+    """Where variables go, at their rates, with a change of the multiplier; the largest step in a box, and the sum of
+    a x."""
+    total, most = 0.0, 0.0
+    step = room[0]
+    for start in range(0, n, BLOCK):
+        stop = min(start + BLOCK, n)
+        a, low, high = slots[COST, start:stop], slots[LOW, start:stop], slots[HIGH, start:stop]
+        rate, y = slots[RATE, start:stop], x[start:stop]
+        m = stop - start
+        for i in range(m):
+            step[i] = rate[i] * change / max(high[i] - low[i], TINY)
+        for i in range(m):
+            y[i] = min(max(y[i] - rate[i] * change, low[i]), high[i])
+        for i in range(m):
+            total += a[i] * y[i]
+        most = max(most, largest(step[:m]))
+    return most, total
+
+
+@member_kernel
 def root(
     slots: Floats, n: int, ends: tuple[float, float], x: Floats, goal: float, near: float, guess: float, far: float,
     power: float, rounding: float, exact: bool, room: Floats, whole: Ints,
-) -> tuple[float, float, int]:  # fmt: skip
+) -> tuple[float, float, int, float]:  # fmt: skip
     """The multiplier in [near, far] for which the sum of a x is `goal`, or an end that comes as near as any.
 
-    ends: what `bracket_slots` found. Returns it with what is left of the difference, and whether the root must lie
-    further on (1) or back (-1); x is filled for it. The sum falls with the multiplier.
+    ends: what `bracket_slots` found. exact: from an x that is near; otherwise as if variables moved evenly. Returns it
+    with what is left of the difference, whether the root must lie further on (1) or back (-1), and the slope of the
+    sum, which falls with the multiplier; x is filled for it.
     """
     first, last = ends
     near, far = max(near, min(first, far)), min(far, max(last, near))
     multiplier = guess if near <= guess <= far else 0.5 * (near + far)
+    if exact:  # a rough look first, from which nothing is concluded but where to begin
+        total, slope = _exactly(slots, n, x, multiplier, power, ROUGH, room, whole)
+        if slope < 0.0:
+            following = min(max(multiplier - (total - goal) / slope, near), far)
+            _followed(slots, n, x, following - multiplier, room)
+            multiplier = following
     near_tried, far_tried = False, False
-    miss, width = 0.0, far - near
+    miss, slope, width = 0.0, 0.0, far - near
     for step in range(MAX_STEPS):
-        total, slope = _total(slots, n, x, multiplier, power, exact, room, whole)
+        if exact:
+            total, slope = _exactly(slots, n, x, multiplier, power, CLOSE, room, whole)
+        else:
+            total, slope = _evenly(slots, n, x, multiplier, room)
         miss = total - goal
         if abs(miss) <= rounding:
             break
         if miss > 0.0 and multiplier >= far:
-            return multiplier, miss, 1
+            return multiplier, miss, 1, slope
         if miss < 0.0 and multiplier <= near:
-            return multiplier, miss, -1
+            return multiplier, miss, -1, slope
         if miss > 0.0:
             near, near_tried = multiplier, True
         else:
@@ -232,8 +294,12 @@ def root(
         else:
             following = min(max(following, near), far)
         width = far - near if step % 3 == 2 else width
+        if exact:
+            moved, total = _followed(slots, n, x, following - multiplier, room)
+            if moved <= CLOSE and abs(total - goal) <= rounding:  # to look again would move them by that, squared
+                return following, total - goal, 0, slope
         multiplier = following
-    return multiplier, miss, 0
+    return multiplier, miss, 0, slope
 
 
 @member_kernel

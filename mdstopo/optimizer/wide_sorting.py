@@ -12,15 +12,17 @@ import numpy as np
 from mdstopo.jit import inline, kernel, member_kernel
 from mdstopo.native.padding import whole_vectors
 from mdstopo.native.threads import shared, taken
-from mdstopo.native.vector import lanes, larger, load, magnitude, negative, store, total, zero
+from mdstopo.native.vector import fetch, lanes, larger, load, magnitude, negative, store, total, unmarked, zero
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.wide_passes import PIECE, RUN, part, pieces
-from mdstopo.optimizer.wide_slots import BLOCK, WHOLE, box, enter_slot
+from mdstopo.optimizer.wide_slots import BLOCK, ROW, WHOLE, box, enter_slot
 
 #: variables that move and from which on threads share what is done with them
 CROWD = 50_000
-#: rows of room, each of `BLOCK` numbers
+#: how far ahead of a pass its numbers are fetched
+AHEAD = 256
+#: rows of room, each of `ROW` numbers
 _ROOM = 9
 
 
@@ -71,7 +73,7 @@ def _sort_pieces(
     limits: Floats, near: float, far: float, out: Floats, found: Ints, sums: Floats, counts: Ints,
 ) -> None:  # fmt: skip
     """What `sort_out` does with the pieces that are taken; sums: (pieces, 3) change, a x, |a x|."""
-    room, whole = np.empty((_ROOM, BLOCK)), np.empty((WHOLE, BLOCK), dtype=np.int64)
+    room, whole = np.empty((_ROOM, ROW)), np.empty((WHOLE, ROW), dtype=np.int64)
     which = np.empty(PIECE + BLOCK, dtype=np.int64)
     N = len(alpha)
     piece = taken(counter)
@@ -79,7 +81,7 @@ def _sort_pieces(
         start, stop = piece * PIECE, min((piece + 1) * PIECE, N)
         c, s, a, y = alpha[start:stop], slope[start:stop], part(cost, N, start, stop), out[start:stop]
         low, high = part(lower, N, start, stop), part(upper, N, start, stop)
-        moving = _moving(c, s, a, low, high, near, far, y, which, sums[piece])
+        moving = _moving(c, s, a, shift[start:stop], low, high, near, far, y, which, sums[piece])
         places = np.array([0, moving])
         for k in range(0, moving, BLOCK):
             _sort_block(
@@ -92,8 +94,8 @@ def _sort_pieces(
 
 @member_kernel
 def _moving(
-    c: Floats, s: Floats, a: Floats, lower: Floats, upper: Floats, near: float, far: float, y: Floats, which: Ints,
-    sums: Floats,
+    c: Floats, s: Floats, a: Floats, shift: Floats, lower: Floats, upper: Floats, near: float, far: float, y: Floats,
+    which: Ints, sums: Floats,
 ) -> int:  # fmt: skip
     """Which variables of a piece do not rest, and those beyond its last whole vector; how many.
 
@@ -104,8 +106,10 @@ def _moving(
     sums[0], sums[1], sums[2] = 0.0, 0.0, 0.0
     for start in range(0, n, RUN):
         held, weight = zero(), zero()
-        single, size = 0.0, 0.0  # of those beside ones that move
         for i in range(start, min(start + RUN, n), lanes()):
+            fetch(c, i + AHEAD)
+            fetch(s, i + AHEAD)
+            fetch(y, i + AHEAD)
             at, cost, push = load(c, i), load(a, i), load(s, i)
             one, other = near * cost, far * cost
             most, least = push + larger(one, other), larger(-1.0 * one, -1.0 * other) - push
@@ -113,19 +117,17 @@ def _moving(
             # one that rises rests at its upper end, one that falls at its lower: neither of two differences is above 0
             rising, falling = larger(most, load(upper, i) - at), larger(least, at - load(lower, i))
             moving = negative(larger(-1.0 * rising, -1.0 * falling))
-            if not moving:
-                held += cost * at
-                weight += magnitude(cost * at)
-                continue
-            for k in range(lanes()):
-                moves = (moving >> k) & 1
-                which[count] = i + k
-                count += moves
-                spent = (1 - moves) * (a[i + k] * c[i + k])
-                single += spent
-                size += abs(spent)
-        sums[1] += total(held) + single
-        sums[2] += total(weight) + size
+            spent = cost * at
+            if moving:
+                spent = unmarked(spent, moving)
+                fetch(shift, i)
+                for k in range(lanes()):
+                    which[count] = i + k
+                    count += (moving >> k) & 1
+            held += spent
+            weight += magnitude(spent)
+        sums[1] += total(held)
+        sums[2] += total(weight)
     for i in range(n, len(c)):
         which[count] = i
         count += 1
@@ -175,12 +177,10 @@ def _sort_block(
     for k in range(moving):
         i = which[k]
         y[i] = end[k]
-        if known[k] == 0.0:
-            found[doubt] = start + i
-            doubt += 1
-        else:
-            others -= 1
-            found[others] = start + i
+        # at both ends, between which there is room for it: which one it is for nobody could foresee
+        found[doubt], found[others - 1] = start + i, start + i
+        doubt += 1 if known[k] == 0.0 else 0
+        others -= 0 if known[k] == 0.0 else 1
     places[0], places[1] = doubt, others
     sums[0] += change
     sums[1] += held
@@ -209,9 +209,10 @@ def _slot_pieces(
 def measure(
     alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float, steepest: float,
     threads: int, out: Floats, found: Ints, counts: Ints,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, int]:  # fmt: skip
     """Of the variables that do not rest, which are all that can tell: max |x - clip(x - (slope + multiplier
-    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range.
+    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range;
+    and how many there are.
 
     found: becomes four times who that is, and 1 for one that rises, 2 for one that falls.
     """
@@ -229,7 +230,7 @@ def measure(
     for piece in range(count):
         residual = max(residual, most[piece, 0])
         plain, scaled = max(plain, most[piece, 1]), max(scaled, most[piece, 2])
-    return residual, plain, scaled
+    return residual, plain, scaled, moving
 
 
 @kernel

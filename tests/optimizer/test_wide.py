@@ -204,7 +204,7 @@ def test_shifts_are_those_of_the_plain_rule():
     state = states(Many(6, True), 5)[-1]
     step = Step(state.trial, state.alpha)
     assert np.array_equal(step.array(), state.trial - state.alpha)
-    shifts = wide.next_wide_shift(state.shift, state.step, step, wide.shift_rule(chosen), wide.Room())
+    shifts = wide.next_wide_shift(state.shift, state.step, step, wide.ShiftRule.of(chosen), wide.Room())
     assert np.array_equal(shifts.array(), next_shift(state.shift.array(), state.step, step, chosen))
     assert len(np.unique(shifts.array())) > 2
 
@@ -212,7 +212,7 @@ def test_shifts_are_those_of_the_plain_rule():
 @pytest.mark.parametrize("start", [2.0, 0.02, 30.0])
 def test_shifts_follow_the_plain_rule_where_only_those_who_moved_are_looked_at(start, monkeypatch):
     known, plain = [], wide.wide_shift_few
-    monkeypatch.setattr(wide, "wide_shift_few", lambda *given: (known.append(given[4]), plain(*given)))
+    monkeypatch.setattr(wide, "wide_shift_few", lambda *given: (known.append(given[5]), plain(*given)))
     options = {"shift_start": start, "shift_minimum": 0.05, "shift_maximum": 10.0}
     found = states(resting(11, True, N), 15, **options)
     for before, after in pairwise(found):
