@@ -7,6 +7,7 @@ numbers which `native.call` fills into those, and what the code expects of Numba
 import ctypes
 from typing import Any
 
+from mdstopo.native.entry import OBJECT
 from mdstopo.native.runtime import PROVIDED, add_runtime
 from mdstopo.native.store import CALL, Code
 
@@ -108,7 +109,11 @@ def _glue(module: Any, function: Any, kinds: list[str], result: str) -> None:
     passed: list[Any] = []
     for kind in kinds:
         if kind[0] in "dq?":
-            address, lengths = given(), [given() for _ in range(int(kind[1:]))]
+            # the object begins as every object does; then its numbers' address, how many lengths it has, where they are
+            start = build.inttoptr(given(), word.as_pointer())
+            address, lengths_at = (build.load(build.gep(start, [word(OBJECT + k)])) for k in (0, 2))
+            where = build.inttoptr(lengths_at, word.as_pointer())
+            lengths = [build.load(build.gep(where, [word(k)])) for k in range(int(kind[1:]))]
             size = word(1 if kind[0] == "?" else 8)
             items, strides = word(1), [size]
             for length in lengths:

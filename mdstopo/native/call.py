@@ -10,14 +10,12 @@ from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
-from numpy.typing import NDArray
 
-from mdstopo.native.entry import DTYPES, PLAIN
+from mdstopo.native.entry import DTYPES, OBJECT, PLAIN
 from mdstopo.native.store import CALL, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
-_first_byte: Callable[[Any], Any] = ctypes.c_char.from_buffer
 
 #: the eight bytes of a result, by its letter
 _SLOTS = {"f": "d", "i": "q", "b": "?7x"}
@@ -41,18 +39,18 @@ def _target() -> Any:
     return llvm.Target.from_default_triple()
 
 
-def _address(array: NDArray[Any]) -> int:
-    """Where an array's numbers are."""
-    try:
-        return ctypes.addressof(_first_byte(array))
-    except (TypeError, ValueError):  # what is read only or empty is asked, which takes five times as long
-        return int(array.__array_interface__["data"][0])
+@functools.cache
+def arrays_are_known() -> bool:
+    """Whether the fields of array objects are where `native.build` has machine code look for them."""
+    array = np.zeros((2, 3))
+    fields = (ctypes.c_int64 * 3).from_address(id(array) + 8 * OBJECT)
+    if fields[0] != array.__array_interface__["data"][0]:
+        return False
+    return tuple((ctypes.c_int64 * 2).from_address(fields[2])) == array.shape
 
 
 def _format(kind: str) -> str:
     """How an argument is packed, by its letters in `native.entry.types_of`."""
-    if kind[0] in "dq?":
-        return "q" * (1 + int(kind[1:]))
     return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
 
 
@@ -111,7 +109,7 @@ class Native:
         address = ctypes.c_void_p(ctypes.addressof(block))
         function, found = self._call, self._found
 
-        # `kept`: the block holds addresses only, and the arrays have to live as long as the call
+        # `kept`: the block only tells where arrays are, and these have to live as long as the call
         def call(*changes: tuple[int, Any], kept: Any = arguments) -> Any:
             for which, value in changes:
                 view, place = placed[which]
@@ -134,11 +132,9 @@ class Native:
                 own = argument.dtype  # nearly always that very object: to compare them takes five times as long
                 if own is not dtype and own != dtype:
                     return None
-                shape = argument.shape
-                if len(shape) != count or argument.flags.num & PLAIN != PLAIN:
+                if argument.ndim != count or argument.flags.num & PLAIN != PLAIN:
                     return None
-                numbers.append(_address(argument))
-                numbers.extend(shape)
+                numbers.append(id(argument))  # where the object is: the machine code finds its numbers there
             elif sort is tuple:
                 if len(argument) != count or not all(type(each) is int for each in argument):
                     return None

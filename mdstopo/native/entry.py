@@ -1,7 +1,7 @@
 """A compiled function that Python calls.
 
-Its machine code takes one block of eight-byte numbers: for an array the address of its data and its lengths, for a
-number the number. What it returns comes after them.
+Its machine code takes one block of eight-byte numbers: for an array where its object is, for a number the number. What
+it returns comes after them.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ DTYPES = {"d": np.dtype(np.float64), "q": np.dtype(np.int64), "?": np.dtype(np.b
 _LETTERS = {dtype: letter for letter, dtype in DTYPES.items()}
 #: what an array has to be, of `flags.num`: in C order and aligned
 PLAIN = 0x1 | 0x100
+#: words of which the part that all objects have consists: an array's fields follow (NumPy's ndarraytypes.h)
+OBJECT = object.__basicsize__ // 8
 
 
 def types_of(arguments: tuple[Any, ...]) -> str | None:
@@ -108,8 +110,10 @@ class Entry(Kernel):
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
             return None
         from mdstopo.native import store
-        from mdstopo.native.call import Native
+        from mdstopo.native.call import Native, arrays_are_known
 
+        if not arrays_are_known():
+            return None
         path = store.path_of(self.py_func.__module__, self.py_func.__qualname__, types)
         code = store.read(path)
         if code is None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mdstopo.jit import entry, kernel
-from mdstopo.native import build, store
+from mdstopo.native import build, call, store
 from mdstopo.native.call import Native
 from mdstopo.native.entry import types_of
 
@@ -76,6 +76,12 @@ def listed(times):
 
 
 @entry
+def _first_and_size(x):
+    """The first number, and how many there are."""
+    return x.flat[0], x.size
+
+
+@entry
 def nothing(x):
     """Returns nothing."""
     x[0] = 3.0
@@ -103,6 +109,37 @@ def test_a_prepared_call_takes_other_numbers_and_sees_what_arrays_hold_now():
     assert np.array_equal(arguments[-1], np.full(3, 13.0))
     assert size == pytest.approx(13.0 * np.sqrt(3.0), rel=1e-15)
     assert (count, both) == (4, False)
+
+
+def test_arguments_of_other_types_than_last_time_go_to_their_own_code():
+    @entry
+    def doubled(x):
+        return 2 * x
+
+    for given in (1, 2.5, True, np.float64(0.5), np.int64(3), False, np.bool_(True), 1, 0.25):
+        found = doubled(given)
+        assert found == 2 * int(given) if isinstance(given, np.bool_) else found == 2 * given
+        assert type(found) is (float if isinstance(given, float) else int)
+    assert sorted(doubled._native) == ["b", "f", "i"]
+    with pytest.raises(TypeError):
+        doubled(1, 2)
+    for given in (np.arange(3.0), np.arange(3), np.ones((1, 3)), np.arange(3.0), np.arange(6.0)[::2]):
+        assert _first_and_size(given) == (given.flat[0], given.size)
+
+
+def test_where_array_objects_are_laid_out_otherwise_numba_calls(monkeypatch):
+    monkeypatch.setattr(call, "arrays_are_known", lambda: False)
+    other = entry(mixed.py_func)
+    assert other(*_arguments()) == mixed(*_arguments())
+    assert list(other._native.values()) == [None]
+
+
+def test_arrays_whose_shape_is_changed_are_seen_as_they_are():
+    x = np.arange(6.0)
+    assert _first_and_size(x) == (0.0, 6)
+    x.resize(4, refcheck=False)
+    x.shape = (2, 2)
+    assert _first_and_size(x) == (0.0, 4)
 
 
 def test_arrays_that_are_read_only_or_empty_are_found_too():

@@ -13,6 +13,7 @@ from mdstopo.native.kernel import numba as with_vectors
 from mdstopo.native.vector import (
     NARROW,
     WIDE,
+    fetch,
     inverse_root,
     lanes,
     lanes_of,
@@ -23,6 +24,7 @@ from mdstopo.native.vector import (
     negative,
     store,
     total,
+    unmarked,
     where_larger,
     zero,
     zero_of,
@@ -75,6 +77,13 @@ def _mixed(x, y, out):
 @numba.njit
 def _signs(x):
     return negative(load(x, 0))
+
+
+@numba.njit
+def _spared(x, bits, out):
+    fetch(x, 0)
+    fetch(out, len(out))  # behind the end, where there may be nothing
+    store(out, 0, unmarked(load(x, 0), bits))
 
 
 @numba.njit
@@ -153,6 +162,16 @@ def test_bits_tell_which_lanes_are_below_zero():
     assert _signs(np.full(width, -np.inf)) == (1 << width) - 1
 
 
+def test_marked_lanes_become_zero_whatever_they_hold():
+    width = _width()
+    x = np.where(np.arange(width) % 3 == 1, np.nan, np.arange(width) + 1.0)
+    for bits in range(1 << width):
+        out = np.empty(width)
+        _spared(x, bits, out)
+        assert np.array_equal(out, unmarked(x, bits), equal_nan=True)
+        assert np.array_equal(out == 0.0, (bits >> np.arange(width)) & 1 == 1)
+
+
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_vectors_are_of_their_array_s_precision(kind):
     rng = np.random.default_rng(6)
@@ -195,6 +214,7 @@ def test_processors_without_the_widest_vectors_get_the_same_numbers():
         "own.test_values_are_those_of_arrays_where_there_is_more_than_the_floor()\n"
         "own.test_numbers_are_shortened_into_an_array_of_single_precision()\n"
         "own.test_operators_are_those_of_arrays()\n"
+        "own.test_marked_lanes_become_zero_whatever_they_hold()\n"
         "own.test_vectors_are_of_their_array_s_precision(np.float32)\n"
         "own.test_a_number_lost_anywhere_is_seen(np.nan)\n"
     )

@@ -122,6 +122,34 @@ def test_of_variables_that_rest_nothing_changes_what_the_others_do(n, equal):
         assert new.kkt == pytest.approx(kkt, rel=1e-9)
 
 
+@pytest.mark.parametrize("power", [-1.0, -2.5, 0.5])
+@pytest.mark.parametrize("seed", [20, 21])
+def test_one_multiplier_explains_where_each_of_very_many_goes(seed, power):
+    """So many that a sample of the sample is looked at first."""
+    n = 70_001
+    problem, chosen = resting(seed, False, n), settings("default", {"power": power})
+    cost = problem.linear.A[0]
+    for state in states(problem, 6, power=power)[1:]:
+        x, c, slope = state.trial, state.alpha, state.gradients[0]
+        span = wide.ranges(problem.lower, problem.upper)
+        reach, kappa = state.shift.array() * span, state.convex * np.abs(slope).max() / span
+        most = np.minimum(np.minimum(chosen.number("move_limit"), state.trust * span), 0.9 * reach)
+        low, high = np.maximum(problem.lower, c - most), np.minimum(problem.upper, c + most)
+        t = 1.0 + np.where(slope < 0.0, x - c, c - x) / reach
+        derivative = slope * t ** (power - 1.0) + kappa * (x - c)
+        inside = (x > low) & (x < high) & (cost > 0.0)
+        assert inside.sum() > 20
+        multipliers = -derivative[inside] / cost[inside]
+        multiplier = float(np.median(multipliers))
+        rounding = 1e-11 * (np.abs(derivative) + kappa * span)
+        rises = derivative + multiplier * cost
+        assert (np.abs(rises) < rounding)[inside].all()
+        assert (rises >= -rounding)[(x == low) & (low < high)].all()
+        assert (rises <= rounding)[(x == high) & (low < high)].all()
+        assert multiplier > 0.0
+        assert abs(float(cost @ x) - problem.linear.b[0]) < 1e-13 * problem.linear.b[0]
+
+
 @pytest.mark.parametrize("n", SIZES)
 @pytest.mark.parametrize("equal", [False, True])
 def test_the_row_holds_to_rounding_and_the_box_is_kept(n, equal, monkeypatch):
