@@ -94,7 +94,9 @@ class StructureProblem:
         peaks = evaluation.peaks[objective.name]
         chosen = peaks if evaluation.all_compete or competes(objective, sign) else peaks[:1]
         values = sign * np.array([peak.value for peak in chosen])
-        slopes = [sign * self.space.pull(peak.gradient) for peak in chosen if peak.gradient is not None]
+        slopes = [_signed(sign, self.space.pull(peak.gradient)) for peak in chosen if peak.gradient is not None]
+        if len(slopes) == 1:  # of very many members a copy takes as long as a few steps of the motion
+            return values, slopes[0][None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
 
     def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats]:
@@ -115,6 +117,10 @@ class StructureProblem:
                     if peak.gradient is not None:
                         slopes.append(sign * self.space.pull(peak.gradient) / scale)
         return np.array(rows), np.array(slopes).reshape(len(slopes), len(self.initial))
+
+
+def _signed(sign: float, slope: Floats) -> Floats:
+    return slope if sign > 0.0 else -slope
 
 
 def sign_of(objective: Objective) -> float:
