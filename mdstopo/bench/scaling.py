@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 MEMBERS = (1_000, 10_000, 100_000, 1_000_000)
 BODIES = (2, 10, 30, 100, 300, 1_000)
-#: iterations that are timed, and those of a whole run
+#: iterations that are timed at most, after the first, and those of a whole run
 STEPS_TIMED, ITERATIONS = 24, 5
 #: from so many members on the update of the optimiser shall be small beside an evaluation
 _LARGE = 100_000
@@ -164,7 +164,8 @@ def _member_table(found: Sequence[Size]) -> Table:
             rows.append([f"exponent, {title}", *fits])
     notes = [
         "Times in ms, that of the run in s, sizes in MB.",
-        "Medians of iterations of the optimiser, of the evaluations with gradient in them, the rest being the update.",
+        f"Medians of up to {STEPS_TIMED} iterations of the optimiser after the first, of the evaluations with gradient "
+        "in them, and of the rest, which is the update.",
         f"A run is `mdstopo run` with {ITERATIONS} iterations in a process of its own, from YAML to HDF5.",
         *_bars(found),
     ]

@@ -7,7 +7,7 @@ numbers which `native.call` fills into those, and what the code expects of Numba
 import ctypes
 from typing import Any
 
-from mdstopo.native.entry import OBJECT
+from mdstopo.native.entry import LENGTHS, NUMBERS
 from mdstopo.native.runtime import PROVIDED, add_runtime
 from mdstopo.native.store import CALL, Code
 
@@ -109,9 +109,8 @@ def _glue(module: Any, function: Any, kinds: list[str], result: str) -> None:
     passed: list[Any] = []
     for kind in kinds:
         if kind[0] in "dq?":
-            # the object begins as every object does; then its numbers' address, how many lengths it has, where they are
             start = build.inttoptr(given(), word.as_pointer())
-            address, lengths_at = (build.load(build.gep(start, [word(OBJECT + k)])) for k in (0, 2))
+            address, lengths_at = (build.load(build.gep(start, [word(k)])) for k in (NUMBERS, LENGTHS))
             where = build.inttoptr(lengths_at, word.as_pointer())
             lengths = [build.load(build.gep(where, [word(k)])) for k in range(int(kind[1:]))]
             size = word(1 if kind[0] == "?" else 8)

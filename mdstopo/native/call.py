@@ -11,7 +11,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from mdstopo.native.entry import DTYPES, OBJECT, PLAIN
+from mdstopo.native.entry import DIMENSIONS, DTYPES, LENGTHS, NUMBERS, PLAIN
 from mdstopo.native.store import CALL, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
@@ -43,10 +43,11 @@ def _target() -> Any:
 def arrays_are_known() -> bool:
     """Whether the fields of array objects are where `native.build` has machine code look for them."""
     array = np.zeros((2, 3))
-    fields = (ctypes.c_int64 * 3).from_address(id(array) + 8 * OBJECT)
-    if fields[0] != array.__array_interface__["data"][0]:
+    words = (ctypes.c_int64 * (LENGTHS + 1)).from_address(id(array))
+    dimensions = ctypes.c_int32.from_address(id(array) + 8 * DIMENSIONS).value
+    if words[NUMBERS] != array.__array_interface__["data"][0] or dimensions != array.ndim:
         return False
-    return tuple((ctypes.c_int64 * 2).from_address(fields[2])) == array.shape
+    return tuple((ctypes.c_int64 * 2).from_address(words[LENGTHS])) == array.shape
 
 
 def _format(kind: str) -> str:
@@ -54,15 +55,17 @@ def _format(kind: str) -> str:
     return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
 
 
-#: what numbers may be, by their letters; truths are integers too, and packed as these
-_NUMBERS: dict[str, tuple[type, ...]] = {"f": (float, np.floating), "i": (int, np.integer), "b": (bool, np.bool_)}
+#: what numbers may be, by their letters; a bool is an int as well, `block_of` tells them apart
+_CLASSES: dict[str, tuple[type, ...]] = {"f": (float, np.floating), "i": (int, np.integer), "b": (bool, np.bool_)}
 
 
-def _asked(kind: str) -> tuple[Any, int, Any]:
-    """What an argument of a type has to be: class, number of dimensions or of integers or 1 for a truth, and dtype."""
-    if kind[0] in DTYPES:
-        return np.ndarray, int(kind[1:]), DTYPES[kind[0]]
-    return (tuple, int(kind[1:]), None) if kind[0] == "t" else (_NUMBERS[kind], int(kind == "b"), None)
+def _asked(kind: str) -> tuple[str, Any, int, Any]:
+    """What an argument of a type has to be: its letter, its class, dimensions or integers it has, and an array's
+    numbers."""
+    letter, count = kind[0], int(kind[1:] or 0)
+    if letter in DTYPES:
+        return letter, np.ndarray, count, DTYPES[letter]
+    return letter, tuple if letter == "t" else _CLASSES[letter], count, None
 
 
 class Native:
@@ -89,7 +92,7 @@ class Native:
         self._block = ctypes.c_int64 * (self._after // 8 + len(result) + 1)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.run(self.block_of(arguments))
+        return self.run(self._filled(arguments))
 
     def run(self, block: Any) -> Any:
         """Call it with a block of numbers."""
@@ -99,7 +102,7 @@ class Native:
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """These arguments as a block, ready to be called; see `Entry.prepare`."""
-        block = self.block_of(arguments)
+        block = self._filled(arguments)
         number = np.frombuffer(block, dtype=np.float64)
         whole = number.view(np.int64)
         placed = [
@@ -121,11 +124,14 @@ class Native:
         return call
 
     def block_of(self, arguments: tuple[Any, ...]) -> Any:
-        """The block of numbers for these arguments; nothing where they are not of the types of this code."""
+        """The block of numbers for these arguments; nothing where they are not of the types of this code.
+
+        It tells where arrays are, and is good only as long as they live.
+        """
         if len(arguments) != len(self._asked):
             return None
         numbers: list[Any] = []
-        for (sort, count, dtype), argument in zip(self._asked, arguments, strict=True):
+        for (letter, sort, count, dtype), argument in zip(self._asked, arguments, strict=True):
             if not isinstance(argument, sort):
                 return None
             if dtype is not None:
@@ -135,11 +141,11 @@ class Native:
                 if argument.ndim != count or argument.flags.num & PLAIN != PLAIN:
                     return None
                 numbers.append(id(argument))  # where the object is: the machine code finds its numbers there
-            elif sort is tuple:
-                if len(argument) != count or not all(type(each) is int for each in argument):
+            elif letter == "t":
+                if type(argument) is not tuple or len(argument) != count or any(type(k) is not int for k in argument):
                     return None
                 numbers.extend(argument)
-            elif count:
+            elif letter == "b":
                 numbers.append(int(argument))
             elif isinstance(argument, bool):
                 return None
@@ -147,6 +153,13 @@ class Native:
                 numbers.append(argument)
         block = self._block()
         self._pack(block, 0, *numbers)
+        return block
+
+    def _filled(self, arguments: tuple[Any, ...]) -> Any:
+        """The block for arguments that must be of the types of this code."""
+        block = self.block_of(arguments)
+        if block is None:
+            raise TypeError(f"the compiled {self._name} takes arguments of other types")
         return block
 
     def _found(self, block: Any) -> Any:

@@ -25,8 +25,9 @@ DTYPES = {"d": np.dtype(np.float64), "q": np.dtype(np.int64), "?": np.dtype(np.b
 _LETTERS = {dtype: letter for letter, dtype in DTYPES.items()}
 #: what an array has to be, of `flags.num`: in C order and aligned
 PLAIN = 0x1 | 0x100
-#: words of which the part that all objects have consists: an array's fields follow (NumPy's ndarraytypes.h)
-OBJECT = object.__basicsize__ // 8
+#: of an array object's words, behind those that all objects have: where its numbers are, how many dimensions it has,
+#: and where its lengths are (NumPy's ndarraytypes.h)
+NUMBERS, DIMENSIONS, LENGTHS = (object.__basicsize__ // 8 + k for k in range(3))
 
 
 def types_of(arguments: tuple[Any, ...]) -> str | None:
@@ -79,7 +80,8 @@ class Entry(Kernel):
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """The entry with these arguments, to be called again and again with other numbers by their position.
 
-        Arrays stay these arrays, wherever their contents change.
+        Arrays stay these arrays, wherever their contents change; their number of dimensions, which is not looked at
+        again, must stay too.
         """
         native = self._for(arguments)
         if native is not None:

@@ -1,10 +1,11 @@
 """The step of a problem with many variables and one volume row, where one function row decides it.
 
 The interior point goes through a score of arrays of N numbers some fifteen times; a million variables then cost six
-evaluations. Here the multiplier of the volume row is the only unknown: a sample of the variables gives a narrow bracket
-for it, one pass finds the variables that every multiplier in the bracket sends to the same end of their box, and the
-root is sought among the others, a few per cent. Nothing but that pass, which computes shifts, box and convex term as
-it goes, touches N numbers. It is the same subproblem, solved to rounding.
+evaluations. Here the multiplier of the volume row is the only unknown: a sample of the variables, of very many a coarse
+one before it, gives a narrow bracket for it, one pass finds the variables that every multiplier in the bracket sends to
+the same end of their box, and the root is sought among the others, a few per cent. Nothing but that pass, which
+computes shifts, box and convex term as it goes, touches N numbers. It is the same subproblem, the row solved to
+rounding and the variables to some 1e-12 of their boxes.
 
 Where several rows compete, the highest often decides alone: its minimiser is found, and is the solution if the other
 rows lie below it there and the limits hold.
@@ -99,7 +100,7 @@ class Kept(Generic[T]):
 
     def __call__(self, *arrays: Floats) -> T:
         """What the function gives for these arrays, the same objects."""
-        these = tuple(map(id, arrays))  # of arrays that are held, which no others can have
+        these = tuple(map(id, arrays))  # known arrays are held, so no others can have their ids
         for known, _, result in self._kept:
             if known == these:
                 return result
@@ -116,14 +117,13 @@ class Room:
     """Memory for `wide_minimum`, kept from one step to the next: to be given new pages takes longer than to fill them.
 
     slots (SLOTS, N), place, found (N,), counts (2, pieces), x (N,). made: the step of which found and counts tell who
-    moves, or None; moving: how many these are. signs: two of (N/32,), for `wide_shift_few`; signed: the step of which
-    the first tell, or None.
+    may have moved, or None. signs: two of (N/32,), because `wide_shift_few` reads the last step's while it writes this
+    one's; signed: the step of which the first tell, or None.
     """
 
     def __init__(self) -> None:
         self._n = -1
         self.made: Step | None = None
-        self.moving = 0
         self.signed: Step | None = None
 
     def of(self, n: int) -> tuple[Floats, Ints, Ints, Ints, Floats]:
@@ -202,7 +202,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     room = measures.room
     room.made = None
     trial, (slots, place, found, counts, x) = np.empty(n), room.of(n)
-    multiplier, miss, size, change, residual, plain, scaled, count, room.moving = wide_minimum(
+    multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
         alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
         _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, counts, x,
     )  # fmt: skip
@@ -240,8 +240,8 @@ def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper:
 
 
 class ShiftRule(NamedTuple):
-    """How shifts follow steps: factors where these agree and oppose each other, smallest and largest shift (4,); and
-    the last two by themselves."""
+    """How shifts follow steps: numbers (4,), factors where these agree and oppose each other, smallest and largest
+    shift; within, the last two as `Shifts.within` has them."""
 
     numbers: Floats
     within: tuple[float, float]
@@ -249,20 +249,17 @@ class ShiftRule(NamedTuple):
     @classmethod
     def of(cls, settings: Settings) -> "ShiftRule":
         """That of settings."""
-        grow, shrink, least, most = (settings.number(f"shift_{name}") for name in _SHIFTS)
-        return cls(np.array([grow, shrink, least, most]), (least, most))
-
-
-_SHIFTS = ("grow", "shrink", "minimum", "maximum")
+        numbers = [settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")]
+        return cls(np.array(numbers), (numbers[2], numbers[3]))
 
 
 def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room: Room) -> Shifts:
     """As `safeguards.next_shift`. Of a step that was made in the room, and of the one before, it is known who moved."""
     made, n = room.made == step, len(step.to)
     known = made and room.signed == last and shift.within == rule.within
-    _, _, moves, counts, _ = room.of(n)
+    _, _, moves, counts, _ = room.of(n)  # what was found has become what moves in `measure`
     if known:
-        shifts, array, places, before, count = shift.following(room.moving)
+        shifts, array, places, before, count = shift.following(int(counts[1].sum()))
     else:
         array, places, before = np.empty(n), np.empty(0, dtype=np.int64), np.empty(0)
         shifts, count = Shifts(array, rule.within), np.zeros(1, dtype=np.int64)
@@ -270,9 +267,9 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
         wide_shift(shift.array(), last.to, last.origin, step.to, step.origin, rule.numbers, threads, array)
     room.signed = None
     if made:
-        earlier, signs = room.signs
-        wide_shift_few(array, moves, counts, earlier, signs, known, rule.numbers, places, before, count)
-        room.signs, room.signed = (signs, earlier), step
+        signs_before, signs = room.signs
+        wide_shift_few(array, moves, counts, signs_before, signs, known, rule.numbers, places, before, count)
+        room.signs, room.signed = (signs, signs_before), step
     return shifts
 
 

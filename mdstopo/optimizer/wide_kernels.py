@@ -1,7 +1,8 @@
 """Compiled passes of `wide.py`: one row, one volume row, very many variables.
 
-A sample brackets the volume row's multiplier, `wide_sorting` decides what the bracket decides, `wide_slots` has the
-others. Costs and bounds whose numbers are all alike may be given as the first few of them (`wide_passes`).
+A sample, and of very many a coarser one before it, brackets the volume row's multiplier, `wide_sorting` decides what
+the bracket decides, `wide_slots` has the others. Costs and bounds whose numbers are all alike may be given as the first
+few of them (`wide_passes`).
 
 Sums are added in a fixed order, so that results do not depend on the number of threads.
 """
@@ -34,11 +35,11 @@ from mdstopo.optimizer.wide_sorting import measure, one, sort_out
 #: variables of the sample from which the first bracket comes, and its half width in standard deviations
 SAMPLE = 4096
 SPREAD = 3.0
-#: what may be left of the row there, relative to what the variables can move, and to the half width
+#: what may be left of a sample's row, relative to what its variables can move, and to the half width
 ENOUGH, ENOUGH_OF_SPREAD = 1e-3, 0.1
-#: a sample of which so many are every so many-th is looked at after these
+#: a sample that takes about every COARSER-th of those is looked at first, where it has at least FEWEST variables
 FEWEST, COARSER = 128, 8
-#: what is added to its bracket, relative to the multiplier
+#: by how much its bracket is widened, relative to the multiplier
 WIDER = 0.15
 #: brackets that are tried, the last of them without ends
 ATTEMPTS = 6
@@ -60,10 +61,10 @@ def _estimate(
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
     N = len(alpha)
     n: int = np.int64(0)  # type: ignore[assignment]  # a 0 as written has its callees compiled once more, for that type
-    part_of = (N + stride - 1) // stride
-    goal, extent = gap * part_of / N, 0.0
+    sampled = (N + stride - 1) // stride
+    goal, extent = gap * sampled / N, 0.0
     for i in range(0, N, stride):
-        later = min(i + SOON * stride, N - 1)
+        later = i + SOON * stride
         fetch(alpha, later)
         fetch(slope, later)
         fetch(shift, later)
@@ -80,17 +81,17 @@ def _estimate(
         return near, guess, far
     ends = bracket_slots(slots, n, power, room, whole)
     enough = ENOUGH * extent
-    guess, _, _, rate = root(slots, n, ends, x, goal, near, guess, far, power, enough, bool(0), room, whole)
+    guess, _, _, falling = root(slots, n, ends, x, goal, near, guess, far, power, enough, bool(0), room, whole)
     mean, square = 0.0, 0.0
     for k in range(n):
         moved = slots[COST, k] * (x[k] - slots[ITERATE, k])
-        mean += moved / part_of
+        mean += moved / sampled
         square += moved * moved
-    spread = SPREAD * np.sqrt(max(square - part_of * mean * mean, 0.0))
-    enough, way = max(enough, ENOUGH_OF_SPREAD * spread), spread / min(rate, -TINY)
+    spread = SPREAD * np.sqrt(max(square - sampled * mean * mean, 0.0))
+    enough, apart = max(enough, ENOUGH_OF_SPREAD * spread), spread / max(-falling, TINY)
     more, less = goal + spread, goal - spread
-    first = root(slots, n, ends, x, more, near, guess + way, far, power, enough, bool(0), room, whole)[0]
-    last = root(slots, n, ends, x, less, near, guess - way, far, power, enough, bool(0), room, whole)[0]
+    first = root(slots, n, ends, x, more, near, guess - apart, far, power, enough, bool(0), room, whole)[0]
+    last = root(slots, n, ends, x, less, near, guess + apart, far, power, enough, bool(0), room, whole)[0]
     return first, guess, last
 
 
@@ -99,28 +100,28 @@ def wide_minimum(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     bound: float, at_iterate: float, equal: bool, steepest: float, stride: int, rounding: float, threads: int,
     out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints, x: Floats,
-) -> tuple[float, float, float, float, float, float, float, int, int]:  # fmt: skip
+) -> tuple[float, float, float, float, float, float, float, int]:  # fmt: skip
     """Minimise one row in its box under a x <= bound or = bound.
 
     limits: power, move limit, trust, share of the shifts' distance, convex term over the range's unit. at_iterate: a x
     of the iterate. steepest: the unit of the residual. out (N,): the minimiser. slots, place, found, x: room for N;
     counts (2, pieces). Returns the multiplier, what is left of the row, the size of its sums, the change of the model,
-    what `measure` finds, how many columns of `slots` and `place` hold variables that may still be touched up, and how
-    many variables may have moved.
+    what `measure` finds, and how many columns of `slots` and `place` hold variables that may still be touched up.
     """
     power = limits[0]
     room, whole = np.empty((ROOM, ROW)), np.empty((WHOLE, ROW), dtype=np.int64)
     least = -BEYOND if equal else 0.0
-    near, guess, far = least, 0.0, BEYOND
-    for step in (COARSER * stride + 1, stride):
-        if step == stride or len(alpha) >= FEWEST * step:
-            near, guess, far = _estimate(
-                alpha, slope, cost, shift, lower, upper, limits, bound - at_iterate, near, guess, far, step, slots,
-                place, x, room, whole,
-            )  # fmt: skip
-        if step > stride:  # few of many move, and so few of these: what is widely off costs little, what is lost much
-            most = 0.5 * (far - near) + WIDER * abs(guess)
-            near, far = max(least, near - most), min(BEYOND, far + most)
+    near, guess, far, gap, coarse = least, 0.0, BEYOND, bound - at_iterate, COARSER * stride + 1
+    if len(alpha) >= FEWEST * coarse:
+        near, guess, far = _estimate(
+            alpha, slope, cost, shift, lower, upper, limits, gap, near, guess, far, coarse, slots, place, x, room, whole
+        )
+        # of so few very few move: a bracket that is too wide costs less than a wrong one
+        wider = 0.5 * (far - near) + WIDER * abs(guess)
+        near, far = max(least, near - wider), min(BEYOND, far + wider)
+    near, guess, far = _estimate(
+        alpha, slope, cost, shift, lower, upper, limits, gap, near, guess, far, stride, slots, place, x, room, whole
+    )
     multiplier, miss, total, size, change, n = 0.0, 0.0, 0.0, 0.0, 0.0, 0
     for attempt in range(ATTEMPTS):
         if attempt == ATTEMPTS - 1:
@@ -151,10 +152,10 @@ def wide_minimum(
     for k in range(n):
         out[place[k]] = x[k]
     change += promise(slots, n, x, power, room, whole)
-    residual, plain, scaled, moving = measure(
+    residual, plain, scaled = measure(
         alpha, slope, cost, lower, upper, multiplier, steepest, threads, out, found, counts
     )
-    return multiplier, miss, size, change, residual, plain, scaled, n, moving
+    return multiplier, miss, size, change, residual, plain, scaled, n
 
 
 @vector_entry

@@ -15,7 +15,7 @@ from mdstopo.optimizer.problem import Floats, Ints
 #: are all rounded to one side
 PIECE, RUN = 8192, 512
 
-#: how far ahead of a loop over some of them their numbers are fetched
+#: how many variables ahead of a loop over some of them their numbers are fetched
 SOON = 32
 
 
@@ -64,13 +64,14 @@ def _shifted(
 
 @vector_entry
 def wide_shift_few(
-    shift: Floats, moves: Ints, counts: Ints, last: Ints, signs: Ints, known: bool, rule: Floats, places: Ints,
+    shift: Floats, moves: Ints, counts: Ints, signs_before: Ints, signs: Ints, known: bool, rule: Floats, places: Ints,
     before: Floats, count: Ints,
 ) -> None:  # fmt: skip
     """As `wide_shift` in place, from who has moved alone, if `known`; and the signs of this step for the next.
 
-    moves, counts: who has moved and where to, as `wide_minimum` tells it. last, signs (N/32,): two bits a variable, as
-    in moves, of the last step, if `known`, and of this one. places, before, count: as in `Shifts.following`.
+    moves, counts: who has moved and where to, as `wide_minimum` tells it. signs_before, signs (N/32,): two bits a
+    variable, as in moves, of the last step, if `known`, and of this one. places, before, count: as in
+    `Shifts.following`.
     """
     grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
     signs[:] = 0
@@ -83,10 +84,10 @@ def wide_shift_few(
             signs[word] |= sign << bit
             if known:
                 fetch(shift, moves[min(k + SOON, end - 1)] >> 2)
-                was, other = shift[i], (last[word] >> bit) & 3
+                was, other = shift[i], (signs_before[word] >> bit) & 3
                 found = min(max(was * (grow if sign == other else shrink), least), most)
                 found = found if (sign != 0) & (other != 0) else was
-                # written in any case, and counted if it is a change: a jump on what is still far off would wait for it
+                # written always, and counted if it is a change: a branch would wait for memory
                 places[n], before[n], count[0] = i, was, n + 1
                 shift[i] = found
                 n += 1 if found != was else 0

@@ -3,7 +3,8 @@
 Arrays, one column for each such variable:
 
     slots (10, n)  coefficient in the row, ends of the box, iterate, slope, distance of the shifts, kappa, the
-                   multipliers between which the variable is inside its box, and how fast it falls with the multiplier
+                   multipliers between which the variable is inside its box, and, once `_exactly` has found it, how
+                   fast it falls with the multiplier
     place (n,)     which variable it is
     x (n,)         where it is
 """
@@ -17,7 +18,7 @@ from mdstopo.optimizer.powers import largest, primitives
 from mdstopo.optimizer.problem import Floats, Ints
 
 BLOCK = 1024
-#: how long rows of room are: rows that begin at like places of pages stand in each other's way
+#: how long rows of room are, in whole vectors: rows that begin at like places of pages stand in each other's way
 ROW = BLOCK + 40
 SLOTS = 10
 COST, LOW, HIGH, ITERATE, SLOPE, REACH, KAPPA, FIRST, LAST, RATE = range(SLOTS)
@@ -26,10 +27,9 @@ ROOM, WHOLE = 13, 4
 #: larger than any multiplier, small enough to be multiplied
 BEYOND = 1e200
 MAX_STEPS = 200
-#: the last step of Newton's iteration, in the variable's box: what the next would correct is that, squared
-CLOSE = 3e-7
-#: and where no more is asked than where to begin
-ROUGH = 0.03
+#: the last step of Newton's iteration, relative to the width of the variable's box: what the next would correct is
+#: about its square; and the same where the result only tells where to begin
+CLOSE, ROUGH = 3e-7, 0.03
 #: smaller than any width that counts
 TINY = 1e-300
 
@@ -81,7 +81,8 @@ def _derivative(
     x: Floats, iterate: Floats, slope: Floats, reach: Floats, kappa: Floats, power: float, first: Floats, z: Floats,
     out: Floats, whole: Ints,
 ) -> None:  # fmt: skip
-    """The model's derivative by each variable; first: t^(power - 1), z = t - 1, where t is how far it is stretched."""
+    """The model's derivative by each variable. first, z: room, for t^(power - 1) and t - 1, where t is how far it is
+    stretched."""
     n = len(x)
     for i in range(n):
         step = x[i] - iterate[i]
@@ -179,7 +180,8 @@ def _solved(
     the rates.
 
     inside: which they are, in whole vectors. enough: the last step that leaves it good enough, in the box. Returns the
-    slope of their sum of a x.
+    slope of their sum of a x. The derivative is that of `_derivative`, with its divisions taken out of the iteration;
+    all of the room is free.
     """
     width, bend, z, g, h, a = room[0], room[1], room[2], room[3], room[4], room[5]
     low, high, c, s, unit, k, y = room[6], room[7], room[8], room[9], room[10], room[11], room[12]
@@ -227,8 +229,8 @@ def _solved(
 
 @member_kernel
 def _followed(slots: Floats, n: int, x: Floats, change: float, room: Floats) -> tuple[float, float]:
-    """Where variables go, at their rates, with a change of the multiplier; the largest step in a box, and the sum of
-    a x."""
+    """Where variables go, at the rates of `_exactly`, with a change of the multiplier; the largest step in a box, and
+    the sum of a x."""
     total, most = 0.0, 0.0
     step = room[0]
     for start in range(0, n, BLOCK):
@@ -244,6 +246,16 @@ def _followed(slots: Floats, n: int, x: Floats, change: float, room: Floats) -> 
             total += a[i] * y[i]
         most = max(most, largest(step[:m]))
     return most, total
+
+
+@member_kernel
+def _passed(slots: Floats, n: int, one: float, other: float) -> bool:
+    """Whether a variable comes to an end of its box, or leaves one, between two multipliers."""
+    least, most, passed = min(one, other), max(one, other), 0
+    for k in range(n):
+        first, last = slots[FIRST, k], slots[LAST, k]
+        passed += 1 if ((first >= least) & (first <= most)) | ((last >= least) & (last <= most)) else 0
+    return passed > 0
 
 
 @member_kernel
@@ -296,7 +308,8 @@ def root(
         width = far - near if step % 3 == 2 else width
         if exact:
             moved, total = _followed(slots, n, x, following - multiplier, room)
-            if moved <= CLOSE and abs(total - goal) <= rounding:  # to look again would move them by that, squared
+            close = moved <= CLOSE and abs(total - goal) <= rounding
+            if close and not _passed(slots, n, multiplier, following):  # to look again would move them by that, squared
                 return following, total - goal, 0, slope
         multiplier = following
     return multiplier, miss, 0, slope

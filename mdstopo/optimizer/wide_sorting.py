@@ -20,7 +20,7 @@ from mdstopo.optimizer.wide_slots import BLOCK, ROW, WHOLE, box, enter_slot
 
 #: variables that move and from which on threads share what is done with them
 CROWD = 50_000
-#: how far ahead of a pass its numbers are fetched
+#: how many variables ahead of a pass their numbers are fetched
 AHEAD = 256
 #: rows of room, each of `ROW` numbers
 _ROOM = 9
@@ -99,7 +99,7 @@ def _moving(
 ) -> int:  # fmt: skip
     """Which variables of a piece do not rest, and those beyond its last whole vector; how many.
 
-    y: the iterate; sums: of those that rest.
+    shift: fetched for those, because `_sort_block` asks for it next. y: the iterate; sums: of those that rest.
     """
     n = len(c) // lanes() * lanes()
     count: int = np.int64(0)  # type: ignore[assignment]  # as in `sort_out`
@@ -177,7 +177,7 @@ def _sort_block(
     for k in range(moving):
         i = which[k]
         y[i] = end[k]
-        # at both ends, between which there is room for it: which one it is for nobody could foresee
+        # written at both ends, of which one is kept: a branch here would often be taken wrongly
         found[doubt], found[others - 1] = start + i, start + i
         doubt += 1 if known[k] == 0.0 else 0
         others -= 0 if known[k] == 0.0 else 1
@@ -209,10 +209,9 @@ def _slot_pieces(
 def measure(
     alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float, steepest: float,
     threads: int, out: Floats, found: Ints, counts: Ints,
-) -> tuple[float, float, float, int]:  # fmt: skip
+) -> tuple[float, float, float]:  # fmt: skip
     """Of the variables that do not rest, which are all that can tell: max |x - clip(x - (slope + multiplier
-    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range;
-    and how many there are.
+    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range.
 
     found: becomes four times who that is, and 1 for one that rises, 2 for one that falls.
     """
@@ -230,7 +229,7 @@ def measure(
     for piece in range(count):
         residual = max(residual, most[piece, 0])
         plain, scaled = max(plain, most[piece, 1]), max(scaled, most[piece, 2])
-    return residual, plain, scaled, moving
+    return residual, plain, scaled
 
 
 @kernel

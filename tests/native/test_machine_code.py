@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 import threading
+from collections import namedtuple
 from pathlib import Path
 
 import numpy as np
@@ -103,9 +104,9 @@ def test_machine_code_gives_to_the_bit_what_numba_gives():
 
 def test_a_prepared_call_takes_other_numbers_and_sees_what_arrays_hold_now():
     arguments = _arguments()
-    call = mixed.prepare(*arguments)
+    prepared = mixed.prepare(*arguments)
     arguments[1][:] = 5.0
-    size, count, both = call((4, 2), (5, 0.5), (6, False))
+    size, count, both = prepared((4, 2), (5, 0.5), (6, False))
     assert np.array_equal(arguments[-1], np.full(3, 13.0))
     assert size == pytest.approx(13.0 * np.sqrt(3.0), rel=1e-15)
     assert (count, both) == (4, False)
@@ -127,6 +128,16 @@ def test_arguments_of_other_types_than_last_time_go_to_their_own_code():
         assert _first_and_size(given) == (given.flat[0], given.size)
 
 
+def test_tuples_of_other_kinds_and_lengths_are_told_apart():
+    pair = namedtuple("pair", "one other")
+    for given in (pair(0, 7), (0, 7), pair(0, 7), (0, 7, 5), (0, 7), (0, True)):
+        size, count, both = mixed(given, *_arguments()[1:])
+        assert (size, both) == (mixed(*_arguments())[0], mixed(*_arguments())[2]) if given[1] == 7 else size > 0.0
+        assert count == 4 + len(given)
+    with pytest.raises(TypeError, match="mixed"):
+        mixed._native["t2 d1 d2 ?1 i f b d1"](*_arguments()[:-1], np.zeros(3, dtype=np.float32))
+
+
 def test_where_array_objects_are_laid_out_otherwise_numba_calls(monkeypatch):
     monkeypatch.setattr(call, "arrays_are_known", lambda: False)
     other = entry(mixed.py_func)
@@ -134,12 +145,13 @@ def test_where_array_objects_are_laid_out_otherwise_numba_calls(monkeypatch):
     assert list(other._native.values()) == [None]
 
 
-def test_arrays_whose_shape_is_changed_are_seen_as_they_are():
+def test_a_prepared_call_sees_an_array_that_was_resized_as_it_is():
     x = np.arange(6.0)
-    assert _first_and_size(x) == (0.0, 6)
-    x.resize(4, refcheck=False)
-    x.shape = (2, 2)
-    assert _first_and_size(x) == (0.0, 4)
+    prepared = _first_and_size.prepare(x)
+    assert prepared() == (0.0, 6)
+    x.resize(100_000, refcheck=False)
+    x[0] = 5.0
+    assert prepared() == (5.0, 100_000)
 
 
 def test_arrays_that_are_read_only_or_empty_are_found_too():
