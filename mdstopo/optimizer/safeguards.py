@@ -81,7 +81,9 @@ def cuts_of(state: State, sample: Sample) -> tuple[Floats, Floats, bool]:
 
 def cuts_from(state: State, trial: Floats, objective: float) -> tuple[Floats, Floats]:
     """The cuts (K,) that are near enough to matter, and their gradients (K, N), seen from an accepted trial."""
-    if not len(state.cuts) or state.trust > KEPT_TRUST:
+    if not len(state.cuts):
+        return state.cuts, state.cut_gradients
+    if state.trust > KEPT_TRUST:
         return no_cuts(len(trial))
     seen = state.cuts + np.einsum("ri,i->r", state.cut_gradients, trial - state.alpha)
     near = seen >= objective - KEPT_WINDOW * abs(objective)

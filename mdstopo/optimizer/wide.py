@@ -167,7 +167,7 @@ class Measures:
         if len(x) >= WIDE and gradients.shape == (1, len(x)) and gradients.flags.c_contiguous and len(rows) == 1:
             most, total = wide_look(gradients[0], rows[0], x, _threads(len(x), LIGHT))
             self.steepest.tell(np.array([most]), gradients)
-            self.excess.tell(np.array([total]) - self.space.linear.b, x)
+            self.excess.tell(total - self.space.linear.b, x)
 
 
 def is_wide(state: State, linear: LinearRows, settings: Settings) -> bool:

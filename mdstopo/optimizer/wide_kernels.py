@@ -32,9 +32,9 @@ from mdstopo.optimizer.wide_slots import (
 )
 from mdstopo.optimizer.wide_sorting import measure, one, sort_out
 
-#: variables of the sample from which the first bracket comes, and its half width in standard deviations
-SAMPLE = 4096
-SPREAD = 3.0
+#: variables of the sample from which the first bracket comes, and its half width in standard deviations: a wider one
+#: leaves more in doubt, a narrower one misses more often
+SAMPLE, SPREAD = 4096, 2.2
 #: what may be left of a sample's row, relative to what its variables can move, and to the half width
 ENOUGH, ENOUGH_OF_SPREAD = 1e-3, 0.1
 #: a sample that takes about every COARSER-th of those is looked at first, where it has at least FEWEST variables
