@@ -77,9 +77,9 @@ def _estimate(
         goal += a * at
         extent += abs(a) * (high - low)
         n += 1
-    if n == 0:
-        return near, guess, far
     ends = bracket_slots(slots, n, power, room, whole)
+    if ends[0] > ends[1]:  # none that the multiplier moves
+        return near, guess, far
     enough = ENOUGH * extent
     guess, _, _, falling = root(slots, n, ends, x, goal, near, guess, far, power, enough, bool(0), room, whole)
     mean, square = 0.0, 0.0

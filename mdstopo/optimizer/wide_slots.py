@@ -38,9 +38,13 @@ TINY = 1e-300
 def box(
     alpha: float, lower: float, upper: float, shift: float, move: float, trust: float, share: float
 ) -> tuple[float, float, float, float]:
-    """Ends of the box, distance of the shifts, range."""
+    """Ends of the box, distance of the shifts, range.
+
+    share: of that distance, how far a step may go; infinite where terms are linear. Those do without shifts, which are
+    put out of reach then: nothing is to be divided by what is left to one.
+    """
     span = upper - lower if upper > lower else 1.0
-    reach = shift * span
+    reach = shift * span if share <= 1.0 else 2.0 * span
     most = min(min(move, trust * span), share * reach)
     return max(lower, alpha - most), min(upper, alpha + most), reach, span
 
@@ -270,6 +274,8 @@ def root(
     sum, which falls with the multiplier; x is filled for it.
     """
     first, last = ends
+    if first > last:  # no multiplier moves any of them: the least that the others allow
+        near = far = min(max(0.0, near), far)
     near, far = max(near, min(first, far)), min(far, max(last, near))
     multiplier = guess if near <= guess <= far else 0.5 * (near + far)
     if exact:  # a rough look first, from which nothing is concluded but where to begin

@@ -138,6 +138,16 @@ def test_tuples_of_other_kinds_and_lengths_are_told_apart():
         mixed._native["t2 d1 d2 ?1 i f b d1"](*_arguments()[:-1], np.zeros(3, dtype=np.float32))
 
 
+def test_what_only_looks_like_an_array_is_none():
+    class Likeness:
+        __class__ = np.ndarray
+        dtype, ndim, flags = np.dtype(np.float64), 1, np.zeros(1).flags
+
+    assert _first_and_size(np.full(3, 2.0)) == (2.0, 3)
+    with pytest.raises(TypeError):
+        _first_and_size(Likeness())
+
+
 def test_where_array_objects_are_laid_out_otherwise_numba_calls(monkeypatch):
     monkeypatch.setattr(call, "arrays_are_known", lambda: False)
     other = entry(mixed.py_func)

@@ -124,19 +124,20 @@ def test_of_variables_that_rest_nothing_changes_what_the_others_do(n, equal):
         assert new.kkt == pytest.approx(kkt, rel=1e-9)
 
 
-@pytest.mark.parametrize("power", [-1.0, -2.5, 0.5])
+@pytest.mark.parametrize("options", [{}, {"power": -2.5}, {"power": 0.5}, {"power": 1.0}])
 @pytest.mark.parametrize("seed", [20, 21])
-def test_one_multiplier_explains_where_each_of_very_many_goes(seed, power):
+def test_one_multiplier_explains_where_each_of_very_many_goes(seed, options):
     """So many that a coarser sample is looked at first."""
     n = 70_001
     assert n >= FEWEST * (COARSER * wide._stride(n) + 1)
-    problem, chosen = resting(seed, False, n), settings("default", {"power": power})
-    cost = problem.linear.A[0]
-    for state in states(problem, 6, power=power)[1:]:
+    problem, chosen = resting(seed, False, n), settings("default", options)
+    cost, power = problem.linear.A[0], chosen.number("power")
+    share = np.inf if power == 1.0 else 0.9
+    for state in states(problem, 6, **options)[1:]:
         x, c, slope = state.trial, state.alpha, state.gradients[0]
         span = wide.ranges(problem.lower, problem.upper)
         reach, kappa = state.shift.array() * span, state.convex * np.abs(slope).max() / span
-        most = np.minimum(np.minimum(chosen.number("move_limit"), state.trust * span), 0.9 * reach)
+        most = np.minimum(np.minimum(chosen.number("move_limit"), state.trust * span), share * reach)
         low, high = np.maximum(problem.lower, c - most), np.minimum(problem.upper, c + most)
         t = 1.0 + np.where(slope < 0.0, x - c, c - x) / reach
         derivative = slope * t ** (power - 1.0) + kappa * (x - c)
@@ -151,6 +152,32 @@ def test_one_multiplier_explains_where_each_of_very_many_goes(seed, power):
         assert (rises <= rounding)[(x == high) & (low < high)].all()
         assert multiplier > 0.0
         assert -3e-12 * problem.linear.b[0] < float(cost @ x) - problem.linear.b[0] < 1e-14 * problem.linear.b[0]
+
+
+@pytest.mark.parametrize("n", SIZES)
+@pytest.mark.parametrize("shift", [2.0, 0.2, 0.05])
+def test_linear_terms_take_steps_of_any_length_beside_their_shifts(n, shift):
+    problem = Many(2, True, n)
+    options = {"power": 1.0, "shift_start": shift, "shift_minimum": 0.05, "trust_start": 0.2}
+    cost, least, most = problem.linear.A[0], problem.lower, problem.upper
+    for state in states(problem, 12, **options):
+        state.cuts, state.cut_gradients = state.cuts[:0], state.cut_gradients[:0]
+        slope, reach = state.gradients[0], state.trust * wide.ranges(least, most)
+        kappa = state.convex * np.abs(slope).max() / wide.ranges(least, most)
+        low, high = np.maximum(least, state.alpha - reach), np.minimum(most, state.alpha + reach)
+
+        def at(multiplier, state=state, slope=slope, kappa=kappa, low=low, high=high):
+            return np.clip(state.alpha - (slope + multiplier * cost) / kappa, low, high)
+
+        near, far = -1e6, 1e6
+        for _ in range(100):
+            middle = 0.5 * (near + far)
+            near, far = (middle, far) if cost @ at(middle) > problem.linear.b[0] else (near, middle)
+        step = at(near) - state.alpha
+        promised = float(slope @ step + 0.5 * (kappa * step) @ step)
+        new = wide.propose(state, np.array([0]), measures_of(problem), settings("default", options))
+        assert np.abs(new.trial - at(near)).max() < 1e-9
+        assert new.promised - state.objective == pytest.approx(promised, rel=1e-9, abs=1e-12 * abs(state.objective))
 
 
 @vector_entry
@@ -419,6 +446,25 @@ def test_bounds_and_costs_that_are_alike_are_not_read_and_change_no_bit():
         one, other = (wide.propose(state, np.array([0]), wide.Measures(each), settings()) for each in (space, whole))
         assert np.array_equal(one.trial, other.trial)
         assert one[1:] == other[1:]
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_where_the_row_moves_nobody_its_multiplier_is_zero(n):
+    """What it costs is on its lower bound and would go lower; what it does not cost moves."""
+    rng = np.random.default_rng(0)
+    problem = Many(1, False, n)
+    free = rng.random(n) < 0.3
+    problem.lower, problem.upper = np.full(n, 1e-3), np.ones(n)
+    problem.initial = np.where(free, 0.5, problem.lower)
+    problem.falling, problem.rising = np.where(free, problem.falling, 0.0), rng.uniform(0.1, 3.0, n)
+    cost = np.where(free, 0.0, rng.uniform(0.5, 2.0, n))
+    for bound in (cost @ problem.lower, np.nextafter(cost @ problem.lower, 1.0), 0.2 * n):
+        problem.linear = LinearRows(cost[None], np.array([bound]), np.array([False]))
+        for state in states(problem, 3):
+            new = wide.propose(state, np.array([0]), measures_of(problem), settings())
+            assert np.array_equal(new.trial[~free], problem.lower[~free])
+            slope, x = state.gradients[0] / np.abs(state.gradients[0]).max(), state.alpha
+            assert new.kkt == pytest.approx(np.abs(x - np.clip(x - slope, problem.lower, 1.0)).max(), rel=1e-12)
 
 
 @pytest.mark.parametrize(("n", "which"), [(2_000, "fine"), (70_001, "coarse"), (70_001, "both")])
