@@ -9,7 +9,7 @@ from typing import Any
 
 from mdstopo.native.entry import LENGTHS, NUMBERS
 from mdstopo.native.runtime import PROVIDED, add_runtime
-from mdstopo.native.store import CALL, Code
+from mdstopo.native.store import CALL, PREPARED, Code
 
 
 def build(dispatcher: Any, types: str) -> Code | None:
@@ -32,7 +32,9 @@ def build(dispatcher: Any, types: str) -> Code | None:
     module = ir.Module("mdstopo")
     module.triple = library._final_module.triple
     module.data_layout = library._final_module.data_layout
-    _glue(module, ir.Function(module, signature, compiled.fndesc.llvm_func_name), types.split(), result)
+    function = ir.Function(module, signature, compiled.fndesc.llvm_func_name)
+    for name in (CALL, PREPARED):
+        _glue(module, function, types.split(), result, name)
     add_runtime(module)
     checked = llvm.parse_assembly(str(module))
     checked.verify()
@@ -72,8 +74,11 @@ def _missing(module: Any) -> list[str]:
     return [name for name in names if name not in PROVIDED and not hasattr(process, name)]
 
 
-def _glue(module: Any, function: Any, kinds: list[str], result: str) -> None:
-    """`int32 call(block)`: unfold the block, call the function, put what it returns and its excuse behind.
+def _glue(module: Any, function: Any, kinds: list[str], result: str, name: str) -> None:
+    """`int32 name(block)`: unfold the block, call the function, put what it returns and its excuse behind.
+
+    An array is in the block of `CALL` as the place of its object, in that of `PREPARED` as address and lengths: to ask
+    some forty objects for theirs takes a microsecond, which is much where a call is made again and again.
 
     Numba unfolds an array into two pointers to its owner, the number of items, their size, the address, lengths and
     strides.
@@ -81,7 +86,7 @@ def _glue(module: Any, function: Any, kinds: list[str], result: str) -> None:
     from llvmlite import ir
 
     word = ir.IntType(64)
-    call = ir.Function(module, ir.FunctionType(ir.IntType(32), [word.as_pointer()]), CALL)
+    call = ir.Function(module, ir.FunctionType(ir.IntType(32), [word.as_pointer()]), name)
     build = ir.IRBuilder(call.append_basic_block())
     block = call.args[0]
     wanted = list(function.function_type.args)
@@ -109,10 +114,14 @@ def _glue(module: Any, function: Any, kinds: list[str], result: str) -> None:
     passed: list[Any] = []
     for kind in kinds:
         if kind[0] in "dq?":
-            start = build.inttoptr(given(), word.as_pointer())
-            address, lengths_at = (build.load(build.gep(start, [word(k)])) for k in (NUMBERS, LENGTHS))
-            where = build.inttoptr(lengths_at, word.as_pointer())
-            lengths = [build.load(build.gep(where, [word(k)])) for k in range(int(kind[1:]))]
+            dimensions = range(int(kind[1:]))
+            if name == CALL:
+                start = build.inttoptr(given(), word.as_pointer())
+                address, lengths_at = (build.load(build.gep(start, [word(k)])) for k in (NUMBERS, LENGTHS))
+                where = build.inttoptr(lengths_at, word.as_pointer())
+                lengths = [build.load(build.gep(where, [word(k)])) for k in dimensions]
+            else:
+                address, lengths = given(), [given() for _ in dimensions]
             size = word(1 if kind[0] == "?" else 8)
             items, strides = word(1), [size]
             for length in lengths:

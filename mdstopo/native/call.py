@@ -12,7 +12,7 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from mdstopo.native.entry import DIMENSIONS, DTYPES, LENGTHS, NUMBERS, PLAIN
-from mdstopo.native.store import CALL, Code
+from mdstopo.native.store import CALL, PREPARED, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
@@ -55,6 +55,12 @@ def _format(kind: str) -> str:
     return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
 
 
+def _width(kind: str) -> int:
+    """How many words an argument takes where a call is prepared."""
+    count = int(kind[1:] or 1)
+    return 1 + count if kind[0] in DTYPES else count
+
+
 #: what numbers may be, by their letters; a bool is an int as well, `block_of` tells them apart
 _CLASSES: dict[str, tuple[type, ...]] = {"f": (float, np.floating), "i": (int, np.integer), "b": (bool, np.bool_)}
 
@@ -78,18 +84,18 @@ class Native:
         for part in (code.body, code.glue):
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(part))
         self._engine.finalize_object()
-        self._call = _CALL(self._engine.get_function_address(CALL))
+        self._call, self._prepared = (_CALL(self._engine.get_function_address(each)) for each in (CALL, PREPARED))
         self._name = name
         self._kinds = types.split()
         self._asked = [_asked(kind) for kind in self._kinds]
         self._single = not code.result.startswith("(")
         result = code.result.strip("()")
         self._unpack = struct.Struct("".join(_SLOTS[letter] for letter in result)).unpack_from if result else None
-        formats = [_format(kind) for kind in self._kinds]
-        self._pack = struct.Struct("".join(formats)).pack_into
-        #: where in the block each argument begins, and what they return
-        *self._places, self._after = (8 * n for n in accumulate(map(len, formats), initial=0))
-        self._block = ctypes.c_int64 * (self._after // 8 + len(result) + 1)
+        form = "".join(_format(kind) for kind in self._kinds)
+        self._pack = struct.Struct(form).pack_into
+        #: words of what a call returns, with the excuse; of all in a block
+        self._behind = len(result) + 1
+        self._block = ctypes.c_int64 * (len(form) + self._behind)
 
     def __call__(self, *arguments: Any) -> Any:
         return self.run(self._filled(arguments))
@@ -102,15 +108,19 @@ class Native:
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """These arguments as a block, ready to be called; see `Entry.prepare`."""
-        block = self._filled(arguments)
+        self._filled(arguments)  # for its refusals
+        *places, words = accumulate(map(_width, self._kinds), initial=0)
+        block: Any = (ctypes.c_int64 * (words + self._behind))()
         number = np.frombuffer(block, dtype=np.float64)
         whole = number.view(np.int64)
-        placed = [
-            (number if kind == "f" else whole, place // 8)
-            for kind, place in zip(self._kinds, self._places, strict=True)
-        ]
+        placed = [(number if kind == "f" else whole, place) for kind, place in zip(self._kinds, places, strict=True)]
+        for (view, place), argument in zip(placed, arguments, strict=True):
+            if isinstance(argument, np.ndarray):
+                view[place : place + 1 + argument.ndim] = argument.__array_interface__["data"][0], *argument.shape
+            else:
+                view[place : place + np.size(argument)] = argument
         address = ctypes.c_void_p(ctypes.addressof(block))
-        function, found = self._call, self._found
+        function, found = self._prepared, self._found
 
         # `kept`: the block only tells where arrays are, and these have to live as long as the call
         def call(*changes: tuple[int, Any], kept: Any = arguments) -> Any:
@@ -166,7 +176,7 @@ class Native:
         """What the call has left behind the arguments."""
         if self._unpack is None:
             return None
-        results = self._unpack(block, self._after)
+        results = self._unpack(block, 8 * (len(block) - self._behind))
         return results[0] if self._single else results
 
     def _fail(self, address: int) -> None:

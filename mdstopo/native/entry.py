@@ -1,7 +1,7 @@
 """A compiled function that Python calls.
 
-Its machine code takes one block of eight-byte numbers: for an array where its object is, for a number the number. What
-it returns comes after them.
+Its machine code takes one block of eight-byte numbers: for an array where its object is, or, prepared, the address of
+its data and its lengths; for a number the number. What it returns comes after them.
 """
 
 from __future__ import annotations
@@ -80,8 +80,7 @@ class Entry(Kernel):
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """The entry with these arguments, to be called again and again with other numbers by their position.
 
-        Arrays stay these arrays, wherever their contents change; their number of dimensions, which is not looked at
-        again, must stay too.
+        Arrays stay these arrays, wherever their contents change; they must not be resized.
         """
         native = self._for(arguments)
         if native is not None:

@@ -20,7 +20,7 @@ _SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_
 _MAGIC = b"mdstopo code 1\n"
 
 #: the function in the glue that Python calls
-CALL = "mdstopo_call"
+CALL, PREPARED = "mdstopo_call", "mdstopo_prepared"
 
 
 class Code(NamedTuple):

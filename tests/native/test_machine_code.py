@@ -155,15 +155,6 @@ def test_where_array_objects_are_laid_out_otherwise_numba_calls(monkeypatch):
     assert list(other._native.values()) == [None]
 
 
-def test_a_prepared_call_sees_an_array_that_was_resized_as_it_is():
-    x = np.arange(6.0)
-    prepared = _first_and_size.prepare(x)
-    assert prepared() == (0.0, 6)
-    x.resize(100_000, refcheck=False)
-    x[0] = 5.0
-    assert prepared() == (5.0, 100_000)
-
-
 def test_arrays_that_are_read_only_or_empty_are_found_too():
     arguments, others = list(_arguments()), _arguments()
     arguments[1].setflags(write=False)
