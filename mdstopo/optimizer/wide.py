@@ -259,7 +259,7 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
     known = made and room.signed == last and shift.within == rule.within
     _, _, moves, counts, _ = room.of(n)  # what was found has become what moves in `measure`
     if known:
-        # NumPy's sums have to come from memory themselves, which takes longer than all that is done with this one
+        # NumPy's sum takes several times as long after an evaluation, which has displaced its code from the caches
         shifts, array, places, before, count = shift.following(sum(counts[1].tolist()))
     else:
         array, places, before = np.empty(n), np.empty(0, dtype=np.int64), np.empty(0)
