@@ -98,7 +98,10 @@ class Native:
         self._block = ctypes.c_int64 * (len(form) + self._behind)
 
     def __call__(self, *arguments: Any) -> Any:
-        return self.run(self._filled(arguments))
+        block = self.block_of(arguments)
+        if block is None:
+            raise TypeError(f"the compiled {self._name} takes arguments of other types")
+        return self.run(block)
 
     def run(self, block: Any) -> Any:
         """Call it with a block of numbers."""
@@ -108,7 +111,6 @@ class Native:
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
         """These arguments as a block, ready to be called; see `Entry.prepare`."""
-        self._filled(arguments)  # for its refusals
         *places, words = accumulate(map(_width, self._kinds), initial=0)
         block: Any = (ctypes.c_int64 * (words + self._behind))()
         number = np.frombuffer(block, dtype=np.float64)
@@ -142,7 +144,7 @@ class Native:
             return None
         numbers: list[Any] = []
         for (letter, sort, count, dtype), argument in zip(self._asked, arguments, strict=True):
-            if not issubclass(type(argument), sort):  # its `__class__` may lie, its memory does not
+            if not issubclass(type(argument), sort):  # as in `types_of`
                 return None
             if dtype is not None:
                 own = argument.dtype  # nearly always that very object: to compare them takes five times as long
@@ -163,13 +165,6 @@ class Native:
                 numbers.append(argument)
         block = self._block()
         self._pack(block, 0, *numbers)
-        return block
-
-    def _filled(self, arguments: tuple[Any, ...]) -> Any:
-        """The block for arguments that must be of the types of this code."""
-        block = self.block_of(arguments)
-        if block is None:
-            raise TypeError(f"the compiled {self._name} takes arguments of other types")
         return block
 
     def _found(self, block: Any) -> Any:

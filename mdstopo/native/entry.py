@@ -37,7 +37,7 @@ def types_of(arguments: tuple[Any, ...]) -> str | None:
     """
     letters = []
     for argument in arguments:
-        if isinstance(argument, np.ndarray):
+        if issubclass(type(argument), np.ndarray):  # its `__class__` may lie, its memory does not
             letter = _LETTERS.get(argument.dtype)
             if letter is None or argument.flags.num & PLAIN != PLAIN:
                 return None
@@ -68,9 +68,10 @@ class Entry(Kernel):
 
     def __call__(self, *arguments: Any) -> Any:
         last = self._last
-        block = None if last is None else last.block_of(arguments)
-        if last is not None and block is not None:  # nearly always they are of the types that they were last time
-            return last.run(block)
+        if last is not None:  # nearly always they are of the types that they were last time
+            block = last.block_of(arguments)
+            if block is not None:
+                return last.run(block)
         native = self._for(arguments)
         if native is None:
             return self._by_numba(*arguments)

@@ -19,7 +19,7 @@ _COMPILER = ("numba", "llvmlite", "numpy")
 _SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
 _MAGIC = b"mdstopo code 1\n"
 
-#: the function in the glue that Python calls
+#: the functions in the glue that Python calls: with what `Native.block_of` fills, and with what is prepared
 CALL, PREPARED = "mdstopo_call", "mdstopo_prepared"
 
 

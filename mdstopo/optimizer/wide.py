@@ -15,6 +15,7 @@ from collections.abc import Callable
 from functools import cache
 from math import gcd, inf, isfinite
 from mmap import mmap
+from operator import is_
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
@@ -96,13 +97,12 @@ class Kept(Generic[T]):
 
     def __init__(self, function: Callable[..., T]) -> None:
         self._function = function
-        self._kept: list[tuple[tuple[int, ...], tuple[Floats, ...], T]] = []
+        self._kept: list[tuple[tuple[Floats, ...], T]] = []
 
     def __call__(self, *arrays: Floats) -> T:
         """What the function gives for these arrays, the same objects."""
-        these = tuple(map(id, arrays))  # known arrays are held, so no others can have their ids
-        for known, _, result in self._kept:
-            if known == these:
+        for known, result in self._kept:
+            if all(map(is_, known, arrays)):
                 return result
         result = self._function(*arrays)
         self.tell(result, *arrays)
@@ -110,7 +110,7 @@ class Kept(Generic[T]):
 
     def tell(self, result: T, *arrays: Floats) -> None:
         """What the function gives for these arrays is known."""
-        self._kept = [(tuple(map(id, arrays)), arrays, result), *self._kept[:1]]
+        self._kept = [(arrays, result), *self._kept[:1]]
 
 
 class Room:
