@@ -39,6 +39,7 @@ class RunStatus(enum.StrEnum):
 
     RUNNING = "running"
     CONVERGED = "converged"
+    STALLED = "stalled"
     MAX_ITERATIONS = "max_iterations"
     INTERRUPTED = "interrupted"
     FAILED = "failed"
@@ -51,4 +52,7 @@ def together(ends: Sequence[RunStatus], noun: str) -> tuple[RunStatus, str]:
     reason = f"{len(ends)} {noun}: {words}"
     if set(counts) == {RunStatus.FAILED}:
         return RunStatus.FAILED, reason
-    return (RunStatus.MAX_ITERATIONS if RunStatus.MAX_ITERATIONS in counts else RunStatus.CONVERGED), reason
+    for worst in (RunStatus.STALLED, RunStatus.MAX_ITERATIONS):
+        if worst in counts:
+            return worst, reason
+    return RunStatus.CONVERGED, reason

@@ -118,7 +118,7 @@ class OptimizerSettings(Value):
 
     name: str = "gsao"
     preset: str = "default"
-    max_iterations: int = 50
+    max_iterations: int = 200
     tolerance: float = 1e-6
     starts: int = 1
     seed: int = 0

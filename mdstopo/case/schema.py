@@ -273,7 +273,7 @@ OPTIMIZER = Record(
             "max_iterations",
             Number(minimum=0, maximum=10**9, whole=True),
             "evaluations after the first one, for each start",
-            default=50,
+            default=200,
         ),
         Key(
             "tolerance",

@@ -20,7 +20,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 FILE = click.Path(path_type=Path)
 #: exit statuses of what runs, by how it ended
-EXIT = {"converged": 0, "max_iterations": 0, "failed": 1, "interrupted": 3}
+EXIT = {"converged": 0, "max_iterations": 0, "stalled": 0, "failed": 1, "interrupted": 3}
 CASE_FILE = FileOf((".yaml", ".yml"))
 RESULT_FILE = FileOf((".h5",))
 DESIGN_FILE = FileOf((".npy", ".txt", ".h5"))

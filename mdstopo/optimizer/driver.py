@@ -12,10 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.bundle_method import FORGETS, FRESH_TRUST, PATIENCE, SMALLER, BundleMethod
 from mdstopo.optimizer.interior import Optimum
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.optimizer.projection import project
+from mdstopo.optimizer.rows import DEAREST, NOTHING
+from mdstopo.optimizer.rows import Space as BundleSpace
 from mdstopo.optimizer.safeguards import (
     CUT_SHRINK,
     PRICE_CEILING,
@@ -37,7 +41,7 @@ from mdstopo.optimizer.safeguards import (
     verdict,
 )
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import History, State, Step
+from mdstopo.optimizer.state import History, Shape, State, Step
 from mdstopo.optimizer.subproblem import solve
 from mdstopo.optimizer.wide import WIDE, Measures, ShiftRule, Space, is_wide, next_wide_shift, propose, ranges
 from mdstopo.status import RunStatus
@@ -67,6 +71,11 @@ class Gsao:
         self.range = ranges(self.lower, self.upper)
         self.competitors: int | None = getattr(problem, "competitors", None)
         self.trusted = settings.flag("trust_region")
+        #: whether rows compete from the start; else the separable model begins
+        self.competes = bool(getattr(problem, "competes", False))
+        space = BundleSpace(self.lower, self.upper, problem.linear, self.range)
+        most = len(self.lower) < WIDE and settings.flag("bundle")
+        self.bundle = BundleMethod(space, settings) if most else None
         self._rule = ShiftRule.of(settings)
         self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
 
@@ -100,6 +109,15 @@ class Gsao:
             convex=self.settings.number("convex_start"),
             price=price,
             charge=price,
+            shape=Shape.of(sample),
+            bundle=Bundle.empty(n),
+            multipliers=np.zeros(0),
+            steps=np.zeros((0, n)),
+            changes=np.zeros((0, n)),
+            competing=False,
+            restoring=False,
+            forgets=0,
+            bend=np.zeros(1),
             iteration=0,
             evaluations=1,
             small=0,
@@ -117,6 +135,8 @@ class Gsao:
             state.status = RunStatus.FAILED
             state.reason = f"the initial design cannot be evaluated: {wrong}"
         else:
+            if self.bundle is not None and self.competes:
+                self._begin_bundle(state)
             self._propose(state)
         return self._finish(state, sample, alpha, 0.0, not wrong, began)
 
@@ -142,13 +162,14 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
+            self._change_piece(state)
         change, _ = self._measures.change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
 
     def reopen(self, state: State) -> State:
         """The state under the present limits: a run that a moved limit or tolerance ended goes on."""
         state = state.copy()
-        state.status, state.reason = verdict(state, self._move(state), self.settings)
+        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
         return state
 
     # The steps of the loop.
@@ -156,6 +177,17 @@ class Gsao:
     def _judge(self, state: State, sample: Sample) -> bool:
         """Accept or reject the evaluated trial and adapt what depends on that; whether it was accepted."""
         settings = self.settings
+        violation, plain = scaled_violation(sample), plain_violation(sample)
+        if better(sample.objective, violation, plain, state, settings.tolerance):
+            state.best_alpha, state.best_objective = state.trial, sample.objective
+            state.best_violation, state.best_plain = violation, plain
+        state.failed = 0
+        if state.competing:
+            assert self.bundle is not None
+            accepted = self.bundle.judge(state, sample)
+            if accepted:
+                self._take(state, sample)
+            return accepted
         before = merit(state.objective, state.constraint_rows, state.charge)
         after = merit(sample.objective, sample.constraint_rows, state.charge)
         actual = before - after
@@ -164,16 +196,10 @@ class Gsao:
         negligible = settings.number("decrease_tolerance") * abs(state.objective)
         small = abs(actual) <= negligible and abs(state.predicted) <= negligible
         state.small = state.small + 1 if small else 0
-        state.failed = 0
-        violation = scaled_violation(sample)
         accepted = not self.trusted or ratio >= settings.number("accept_ratio")
         trust, convex = state.trust, state.convex
         state.convex = next_convex(state.convex, ratio, actual < state.predicted, settings)
         state.trust = next_trust(state.trust, ratio, settings) if self.trusted else 1.0
-        plain = plain_violation(sample)
-        if better(sample.objective, violation, plain, state, settings.tolerance):
-            state.best_alpha, state.best_objective = state.trial, sample.objective
-            state.best_violation, state.best_plain = violation, plain
         if accepted:
             state.cuts, state.cut_gradients = cuts_from(state, state.trial, sample.objective)
             last, state.step = state.step, Step(state.trial, state.alpha)
@@ -181,11 +207,7 @@ class Gsao:
                 state.shift = next_wide_shift(state.shift, last, state.step, self._rule, self._measures.room)
             else:
                 state.shift = Shifts(next_shift(state.shift.array(), last, state.step, settings))
-            state.alpha = state.trial
-            state.objective, state.violation = sample.objective, violation
-            state.rows, state.gradients = sample.rows, sample.gradients
-            state.constraint_rows = sample.constraint_rows
-            state.constraint_gradients = sample.constraint_gradients
+            self._take(state, sample)
         elif len(state.alpha) < WIDE and settings.number("peaks") > 1:
             state.cuts, state.cut_gradients, told = cuts_of(state, sample)
             if told:
@@ -194,6 +216,61 @@ class Gsao:
             state.cuts, state.cut_gradients = no_cuts(len(state.alpha))
             state.forgotten, state.small = state.objective, 0
         return accepted
+
+    def _take(self, state: State, sample: Sample) -> None:
+        """The trial becomes the iterate."""
+        state.alpha = state.trial
+        state.objective, state.violation = sample.objective, scaled_violation(sample)
+        state.rows, state.gradients = sample.rows, sample.gradients
+        state.constraint_rows, state.constraint_gradients = sample.constraint_rows, sample.constraint_gradients
+        state.shape = Shape.of(sample)
+
+    def _begin_bundle(self, state: State, trust: float | None = None, price: Floats | None = None) -> None:
+        """The bundle method goes on from the iterate."""
+        assert self.bundle is not None
+        state.competing, state.small = True, 0
+        if trust is not None:
+            state.trust = trust
+        self.bundle.begin(state, price)
+
+    def _change_piece(self, state: State) -> None:
+        """Where the piece at work gets no further: another one, or the same without what it knows from elsewhere."""
+        if self.bundle is None or state.status is not RunStatus.RUNNING:
+            return
+        tolerance = self.settings.tolerance
+        done = state.kkt <= tolerance
+        stuck = self._is_stuck(state)
+        if not state.competing:
+            if stuck and not (done and state.violation <= tolerance):
+                self._begin_bundle(state, max(state.trust, FRESH_TRUST))
+                self._propose(state)
+            return
+        if state.restoring:
+            if plain_violation(state.sample) <= NOTHING * tolerance:
+                state.restoring = False
+                self._begin_bundle(state, max(state.trust, 1e-3))
+                self._propose(state)
+            return
+        resists = len(state.price) > 0 and state.violation > tolerance
+        dear = resists and bool((state.price > DEAREST * self.bundle.first_price(state.bundle)).any())
+        if resists and (stuck or done or dear):
+            state.restoring = True
+            self._begin_bundle(state, max(state.trust, FRESH_TRUST))
+            self._propose(state)
+        elif stuck and not done and state.forgets < FORGETS:
+            # rows from elsewhere may forbid what is possible; without them the model falls wherever U does
+            trust = FRESH_TRUST * SMALLER**state.forgets
+            self._begin_bundle(state, min(trust, max(state.trust, 1e-2 * trust)), state.price)
+            state.forgets += 1
+            self._propose(state)
+
+    def _is_stuck(self, state: State) -> bool:
+        """Whether the next step would change next to nothing, or the last ones have."""
+        if self._move(state) <= self.settings.number("change_tolerance"):
+            return True
+        if state.competing:
+            return state.small >= PATIENCE or not state.predicted > 1e-13 * abs(state.objective)
+        return state.small >= 2 and state.violation <= self.settings.tolerance
 
     def _retreat(self, state: State, wrong: str) -> None:
         """After a failed evaluation: a smaller box around the iterate, or the end after too many in a row."""
@@ -210,6 +287,10 @@ class Gsao:
 
     def _propose(self, state: State) -> None:
         """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
+        if state.competing:
+            assert self.bundle is not None
+            self.bundle.propose(state)
+            return
         chosen = self._competing(state)
         if is_wide(state, self.problem.linear, self.settings):
             found = propose(state, chosen, self._measures, self.settings)
@@ -327,7 +408,7 @@ class Gsao:
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
     ) -> State:
         """Look at the stops and write the history's row."""
-        state.status, state.reason = verdict(state, self._move(state), self.settings)
+        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
         state.seconds += self.clock() - began
         state.history = state.history.extended(
             sample,

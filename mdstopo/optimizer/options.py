@@ -70,6 +70,13 @@ OPTIONS: dict[str, Option] = {
         0.15,
         "how far below the highest a peak may lie to become a row, relative to the highest",
     ),
+    "bundle": Option(
+        bool,
+        None,
+        None,
+        True,
+        "use every row that trials have shown, and curvature, where rows compete (limits on responses, several peaks)",
+    ),
     "elastic": Option(
         float,
         1.0,

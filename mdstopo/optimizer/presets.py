@@ -16,6 +16,7 @@ from mdstopo.optimizer.options import OPTIONS, Value
 PRESETS: dict[str, dict[str, Value]] = {
     "default": {},
     "oc": {
+        "bundle": False,
         "power": -1.0,
         "zero_shift": True,
         "sign_rule": True,
@@ -25,6 +26,7 @@ PRESETS: dict[str, dict[str, Value]] = {
         "trust_region": False,
     },
     "mma": {
+        "bundle": False,
         "power": -1.0,
         "shift_start": 1.0,
         "shift_grow": 1.0 / 0.7,
@@ -33,13 +35,14 @@ PRESETS: dict[str, dict[str, Value]] = {
         "trust_region": False,
     },
     "conlin": {
+        "bundle": False,
         "power": -1.0,
         "zero_shift": True,
         "sign_rule": True,
         "convex_start": 0.0,
         "trust_region": False,
     },
-    "slp": {"power": 1.0, "convex_start": 0.0},
+    "slp": {"bundle": False, "power": 1.0, "convex_start": 0.0},
 }
 
 
@@ -51,7 +54,7 @@ class Settings:
     to the largest |dU/dalpha|. options: every name of `OPTIONS`; build it with `resolve`.
     """
 
-    max_iterations: int = 50
+    max_iterations: int = 200
     tolerance: float = 1e-6
     options: Mapping[str, Value] = field(default_factory=lambda: resolve("default", {}))
 
@@ -107,7 +110,7 @@ def settings(
     preset: str = "default",
     overrides: Mapping[str, object] | None = None,
     *,
-    max_iterations: int = 50,
+    max_iterations: int = 200,
     tolerance: float = 1e-6,
 ) -> Settings:
     """`Settings` from a preset and single settings. Raises ValueError as `resolve` does, and for a count

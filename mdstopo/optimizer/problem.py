@@ -55,6 +55,10 @@ def _no_gradients() -> Floats:
     return np.zeros((0, 0))
 
 
+def _no_groups() -> Ints:
+    return np.zeros(0, dtype=np.int64)
+
+
 @dataclass(frozen=True, slots=True)
 class Sample:
     """One design, evaluated.
@@ -62,6 +66,11 @@ class Sample:
     objective: U, the number to be minimised, equal to rows[0].
     rows (R,), gradients (R, N): the competing pieces of U, highest first.
     constraint_rows (C,), constraint_gradients (C, N): nonlinear constraints, feasible where <= 0.
+    constraint_groups (C,): which constraint each is a piece of, 0 ... J - 1 in order; none: each is one of its own.
+    excess (R,), across (R, N), constraint_excess, constraint_across: where a row is the norm of a two-vector less an
+        excess, that (NaN where it is not), and the gradient of the vector's component across its direction; the row's
+        own gradient is that of the component along it. Nothing where no row is a norm. An absolute value is a norm
+        whose `across` is zero.
     status: anything but `Status.OK` means the evaluation failed; values may then be missing.
     message: what a failure was about (the member, the time), in words; may be empty.
     info: what the driver should record with the iterate, number or array by name (`objectives`, `peak_time`).
@@ -74,9 +83,23 @@ class Sample:
     gradients: Floats = field(default_factory=_no_gradients)
     constraint_rows: Floats = field(default_factory=_no_rows)
     constraint_gradients: Floats = field(default_factory=_no_gradients)
+    constraint_groups: Ints = field(default_factory=_no_groups)
+    excess: Floats = field(default_factory=_no_rows)
+    across: Floats = field(default_factory=_no_gradients)
+    constraint_excess: Floats = field(default_factory=_no_rows)
+    constraint_across: Floats = field(default_factory=_no_gradients)
     status: Status = Status.OK
     message: str = ""
     info: Mapping[str, Floats | float] = field(default_factory=dict)
+
+    @property
+    def constraint_levels(self) -> Floats:
+        """The largest row of each constraint (J,)."""
+        if not len(self.constraint_groups):
+            return self.constraint_rows
+        levels = np.full(int(self.constraint_groups[-1]) + 1, -np.inf)
+        np.maximum.at(levels, self.constraint_groups, self.constraint_rows)
+        return levels
 
 
 class Problem(Protocol):

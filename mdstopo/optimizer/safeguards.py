@@ -175,28 +175,32 @@ def next_shift(shift: Floats, last: Step, step: Step, settings: Settings) -> Flo
     return np.clip(shift * factor, settings.number("shift_minimum"), settings.number("shift_maximum"))
 
 
-def verdict(state: State, move: float, settings: Settings) -> tuple[RunStatus, str]:
+def verdict(state: State, stuck: bool, settings: Settings) -> tuple[RunStatus, str]:
     """Whether to go on, and if not, why: a function of the state alone, so that a resumed run decides alike.
 
-    move: the largest change that the next step would make, in ranges.
+    stuck: whether the next step would change next to nothing, or the last ones have.
     """
     if state.status is RunStatus.FAILED:
         return state.status, state.reason
-    if state.kkt <= settings.tolerance and state.violation <= settings.tolerance:
+    holds = state.violation <= settings.tolerance
+    if state.kkt <= settings.tolerance and holds and not state.restoring:
         return RunStatus.CONVERGED, (
             f"the projected KKT residual, {state.kkt:.2g} of the largest gradient entry, "
             f"is within the tolerance {settings.tolerance:.2g}"
         )
-    if state.small >= 2 and state.violation <= settings.tolerance:
-        share = settings.number("decrease_tolerance")
-        return RunStatus.CONVERGED, (
-            f"actual and predicted decrease were both below {share:.2g} of the objective twice running, "
+    if state.restoring and (state.kkt <= settings.tolerance or stuck):
+        return RunStatus.FAILED, (
+            "no design near this one keeps the limits: the largest violation, "
+            f"{plain_violation(state.sample):.3g} of its bound, cannot be made smaller (KKT residual {state.kkt:.2g})"
+        )
+    if stuck:
+        return RunStatus.STALLED, (
+            f"no step is found that lowers the objective, at a projected KKT residual of {state.kkt:.2g} "
+            f"where {settings.tolerance:.2g} was asked for"
+        )
+    if state.iteration >= settings.max_iterations:
+        return RunStatus.MAX_ITERATIONS, (
+            f"the limit of {settings.max_iterations} iterations was reached "
             f"at a projected KKT residual of {state.kkt:.2g}"
         )
-    if move <= settings.number("change_tolerance"):
-        if move == 0.0:
-            return RunStatus.CONVERGED, "no step is left that would change a variable"
-        return RunStatus.CONVERGED, (f"the next step would change no variable by more than {move:.2g} of its range")
-    if state.iteration >= settings.max_iterations:
-        return RunStatus.MAX_ITERATIONS, f"the limit of {settings.max_iterations} iterations was reached"
     return RunStatus.RUNNING, ""

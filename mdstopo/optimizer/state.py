@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.optimizer.problem import Floats, Sample
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.problem import Floats, Ints, Sample
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.status import RunStatus, Status
 
@@ -24,7 +25,8 @@ class History:
     """One row per evaluated design, row 0 the start; K + 1 rows after K iterations.
 
     objective (K+1,): U, NaN where the evaluation failed. info: what the samples report, each (K+1, ...).
-    constraints (K+1, m): A x - b. nonlinear (K+1, C): c. change (K+1,): largest |change of alpha| against the
+    constraints (K+1, m): A x - b. nonlinear (K+1, J): the largest c of each constraint. change (K+1,): largest
+    |change of alpha| against the
     iterate that the step started from. evaluations (K+1,): so far. seconds (K+1,): wall time so far. kkt
     (K+1,): projected KKT residual of the best iterate so far relative to the largest |dU/dalpha|. accepted
     (K+1,): was the design taken?
@@ -56,7 +58,7 @@ class History:
         """This history and one row more; the receiver stays as it is. Where the sample failed its values are
         NaN."""
         ok = sample.status is Status.OK
-        nonlinear = sample.constraint_rows
+        nonlinear = sample.constraint_levels
         if not ok:
             nonlinear = np.full_like(self.nonlinear[0] if self.nonlinear else nonlinear, np.nan)
         names = self.info if self.info else dict.fromkeys(sample.info)
@@ -126,6 +128,22 @@ class Step:
         return self.to - self.origin
 
 
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """What a sample says of its rows beside values and gradients; see `problem.Sample`."""
+
+    constraint_groups: Ints
+    excess: Floats
+    across: Floats
+    constraint_excess: Floats
+    constraint_across: Floats
+
+    @classmethod
+    def of(cls, sample: Sample) -> "Shape":
+        """That of a sample."""
+        return cls(*(getattr(sample, f.name) for f in fields(cls)))
+
+
 @dataclass(slots=True)
 class State:
     """What the optimiser knows after an iteration.
@@ -137,7 +155,10 @@ class State:
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
     the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
     shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the trust box in
-    ranges, `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge`
+    ranges, `competing` which piece makes the steps: `bundle` with the `multipliers` (K,) of its rows, `steps` and
+    `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
+    objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards;
+    or else `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge`
     (C,) in the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row,
     `seconds`.
     The best so far: `best_alpha` (N,), `best_objective`, `best_violation`, and `best_plain`, its violation
@@ -163,6 +184,15 @@ class State:
     convex: float
     price: Floats
     charge: Floats
+    shape: Shape
+    bundle: Bundle
+    multipliers: Floats
+    steps: Floats
+    changes: Floats
+    competing: bool
+    restoring: bool
+    forgets: int
+    bend: Floats
     iteration: int
     evaluations: int
     small: int
@@ -190,7 +220,11 @@ class State:
             self.gradients,
             self.constraint_rows,
             self.constraint_gradients,
-            Status.OK,
+            self.shape.constraint_groups,
+            self.shape.excess,
+            self.shape.across,
+            self.shape.constraint_excess,
+            self.shape.constraint_across,
         )
 
     def copy(self) -> "State":
@@ -204,6 +238,8 @@ class State:
             value = getattr(self, f.name)
             if isinstance(value, History):
                 out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
+            elif isinstance(value, (Bundle, Shape)):
+                out |= {f"{f.name}/{part.name}": getattr(value, part.name) for part in fields(value)}
             elif isinstance(value, (Step, Shifts)):
                 out[f.name] = value.array().copy()
             elif isinstance(value, str):
@@ -224,6 +260,10 @@ class State:
             if f.name == "history":
                 values[f.name] = History.from_arrays(history)
                 continue
+            if f.name in _PARTS:
+                kind = _PARTS[f.name]
+                values[f.name] = kind(*(np.array(arrays[f"{f.name}/{part.name}"]) for part in fields(kind)))
+                continue
             array = np.asarray(arrays[f.name])
             if f.name in ("status", "reason"):
                 text = array.tobytes().decode()
@@ -236,5 +276,8 @@ class State:
                 values[f.name] = array.item() if array.ndim == 0 else np.array(array)
         return cls(**values)  # type: ignore[arg-type]
 
+
+#: fields that are arrays by name themselves
+_PARTS: dict[str, type[Bundle] | type[Shape]] = {"bundle": Bundle, "shape": Shape}
 
 _values = attrgetter(*(f.name for f in fields(State)))

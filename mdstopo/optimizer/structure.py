@@ -12,7 +12,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Evaluation
-from mdstopo.optimizer.problem import Floats, LinearRows, Sample
+from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
@@ -58,6 +58,10 @@ class StructureProblem:
         self.upper: Floats
         self.lower, self.upper = self.space.bounds(case.lower, case.upper)
         self._responses = [(i, row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
+        #: whether rows compete from the start: limits on responses, several objectives, members, parameters of laws
+        self.competes = bool(self._responses) or not one or self.even > 0 or any(
+            objective.response.kind != "energy" for objective in self._objectives
+        )
         self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], self.space)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
@@ -72,7 +76,7 @@ class StructureProblem:
         if not evaluation.status.usable:
             return Sample(np.inf, status=evaluation.status, message=evaluation.message, info=info)
         parts = [self._part(o, s, evaluation) for o, s in zip(self._objectives, self._signs, strict=True)]
-        limits, slopes = self._limits(evaluation)
+        limits, slopes, groups = self._limits(evaluation)
         if self.scalarisation is None:
             rows, gradients = parts[0]
         else:
@@ -84,11 +88,14 @@ class StructureProblem:
                 return Sample(np.inf, status=Status.NOT_POSITIVE, message=message, info=info)
             if len(self.scalarisation.planes):
                 own, own_slopes = self.scalarisation.limits(parts)
+                first = groups.max(initial=-1) + 1
+                planes = len(self.scalarisation.planes)
+                groups = np.concatenate([groups, first + np.repeat(np.arange(planes), len(own) // planes)])
                 limits = np.concatenate([limits, own])
                 slopes = np.concatenate([slopes.reshape(-1, len(x)), own_slopes.reshape(-1, len(x))])
         if not gradient:
-            return Sample(float(rows[0]), rows, constraint_rows=limits, info=info)
-        return Sample(float(rows[0]), rows, gradients, limits, slopes, info=info)
+            return Sample(float(rows[0]), rows, constraint_rows=limits, constraint_groups=groups, info=info)
+        return Sample(float(rows[0]), rows, gradients, limits, slopes, groups, info=info)
 
     def _part(self, objective: Objective, sign: float, evaluation: Evaluation) -> Part:
         peaks = evaluation.peaks[objective.name]
@@ -99,24 +106,27 @@ class StructureProblem:
             return values, slopes[0][None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
 
-    def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats]:
-        """Rows and gradients of the constraints on responses, feasible where <= 0, relative to their bounds.
+    def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats, Ints]:
+        """Rows, gradients and groups of the constraints on responses, feasible where <= 0, relative to their bounds.
 
-        Every competing peak is a row (bound formulation); a constraint always has as many rows, the last repeated.
+        Every competing peak is a row (bound formulation); an equality makes two groups.
         """
         rows: list[float] = []
         slopes: list[Floats] = []
+        groups: list[int] = []
         for i, row in self._responses:
             peaks = evaluation.constraint_peaks[i]
             scale = abs(row.bound) if row.bound != 0.0 else 1.0
             for sign in SIGNS[row.sense]:
                 compete = evaluation.all_compete or competes(row, sign)
-                for r in range(self._rivals):
-                    peak = peaks[min(r, len(peaks) - 1) if compete else 0]
+                group = groups[-1] + 1 if groups else 0
+                for peak in peaks if compete else peaks[:1]:
+                    groups.append(group)
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
                         slopes.append(sign * self.space.pull(peak.gradient) / scale)
-        return np.array(rows), np.array(slopes).reshape(len(slopes), len(self.initial))
+        matrix = np.array(slopes).reshape(len(slopes), len(self.initial))
+        return np.array(rows), matrix, np.array(groups, dtype=np.int64)
 
 
 def _signed(sign: float, slope: Floats) -> Floats:

@@ -14,7 +14,7 @@ from mdstopo.store.errors import DamagedError, StoreError
 
 Array = NDArray[np.generic]
 
-_STATUS = {"running", "converged", "max_iterations", "interrupted", "failed"}
+_STATUS = {"running", "converged", "max_iterations", "stalled", "interrupted", "failed"}
 _UNFINISHED = {"running", "interrupted"}
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _TROUBLE = (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError, UnicodeError, MemoryError)

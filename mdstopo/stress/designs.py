@@ -48,7 +48,7 @@ def _optimized(case: "Case") -> float:
     import mdstopo
 
     result = mdstopo.optimize(case)
-    if result.status not in ("converged", "max_iterations"):
+    if result.status not in ("converged", "max_iterations", "stalled"):
         raise Refused(f"{result.status}: {result.reason}")
     return error(result.alpha, [1.0, 0.5]) if np.all(np.isfinite(result.alpha)) else float("nan")
 
@@ -134,7 +134,7 @@ def _nothing_to_optimize(case: "Case") -> float:
     import mdstopo
 
     result = mdstopo.optimize(case)
-    if result.status not in ("converged", "max_iterations"):
+    if result.status not in ("converged", "max_iterations", "stalled"):
         raise Refused(f"{result.status}: {result.reason}")
     return max(abs(result.objectives[name]) if name == "G" else 0.0 for name in result.objectives)
 
@@ -158,7 +158,7 @@ def _beside_something(case: "Case") -> float:
     import mdstopo
 
     result = mdstopo.optimize(case)
-    if result.status not in ("converged", "max_iterations"):
+    if result.status not in ("converged", "max_iterations", "stalled"):
         raise Refused(f"{result.status}: {result.reason}")
     return max(abs(result.objectives["G"]), error(result.objectives["H"], 2.0 * PULL**2 / 125.0))
 

@@ -290,8 +290,8 @@ def test_a_row_that_is_far_from_its_limit_has_no_price():
 def test_a_run_ends_where_the_interior_point_ends(monkeypatch):
     monkeypatch.setattr("mdstopo.optimizer.safeguards.CUT_TRUST", 0.0)  # with so many variables there are no cuts
     problem = Many(5, True)
-    new = states(problem, 100)[-1]
-    old = states(problem, 100, monkeypatch)[-1]
+    new = states(problem, 100, bundle=False)[-1]
+    old = states(problem, 100, monkeypatch, bundle=False)[-1]
     assert new.status == old.status
     assert new.best_objective == pytest.approx(old.best_objective, rel=1e-6)
 

@@ -1,0 +1,187 @@
+"""The rows that a bundle method knows: of the iterate and of trials near it, accepted or rejected, all seen from the
+iterate.
+
+A row belongs to the objective (group 0) or to a constraint (1, 2, ...) and is a line, or the norm of a two-vector less
+an excess (`conic`). No row may say more of the iterate than the largest of its group there: of a function that is not
+convex a row from elsewhere would, and is lowered, the more the farther it comes from and the more the function was seen
+to bend downwards (C. Lemarechal, 1975; K. C. Kiwiel, "Methods of descent for nondifferentiable optimization", 1985).
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from mdstopo.optimizer.conic import Lines, Norms
+from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample
+
+#: numbers that the rows may take, and rows that are kept at least and at most
+ROOM, LEAST, MOST = 2e7, 8, 120
+#: a row within this of another of its group, in slope and in value relative to the steepest, is the same
+SAME = 1e-9
+
+
+@dataclass(slots=True)
+class Bundle:
+    """Rows by columns: vector (K, 2), of a line its value and 0; slope (K, N) of the first and across (K, N) of the
+    second component (no columns where no row is a norm); excess (K,), NaN of a line; group (K,); own (K,): whether it
+    is the iterate's; idle (K,): for how many subproblems it has had no multiplier; far (K,): the way from where it was
+    seen to the iterate, in ranges."""
+
+    vector: Floats
+    slope: Floats
+    across: Floats
+    excess: Floats
+    group: Ints
+    own: Bools
+    idle: Ints
+    far: Floats
+
+    @classmethod
+    def empty(cls, n: int) -> "Bundle":
+        """No rows, of n variables."""
+        none, ints = np.zeros((0, n)), np.zeros(0, dtype=np.int64)
+        floats, truths = np.zeros(0), np.zeros(0, dtype=np.bool_)
+        return cls(np.zeros((0, 2)), none, np.zeros((0, 0)), floats, ints, truths, ints, floats)
+
+    @classmethod
+    def of(cls, sample: Sample, rows: Ints) -> "Bundle":
+        """The rows of a sample, seen from there: of the objective those at the places `rows`, of constraints all."""
+        n, many = sample.gradients.shape[1], len(sample.constraint_rows)
+        value = np.concatenate([sample.rows[rows], sample.constraint_rows])
+        slope = np.concatenate([sample.gradients[rows], sample.constraint_gradients.reshape(-1, n)])
+        lines = np.full(len(sample.rows), np.nan), np.full(many, np.nan)
+        excess = np.concatenate(
+            [(sample.excess if len(sample.excess) else lines[0])[rows],
+             sample.constraint_excess if len(sample.constraint_excess) else lines[1]]
+        )  # fmt: skip
+        norm = ~np.isnan(excess)
+        across = np.zeros((len(value), n if norm.any() else 0))
+        if across.size:
+            across[: len(rows)] = sample.across[rows] if sample.across.size else 0.0
+            if many and sample.constraint_across.size:
+                across[len(rows) :] = sample.constraint_across
+        vector = np.stack([np.where(norm, value + excess, value), np.zeros(len(value))], axis=1)
+        groups = sample.constraint_groups if len(sample.constraint_groups) else np.arange(many)
+        group = np.concatenate([np.zeros(len(rows), dtype=np.int64), 1 + groups.astype(np.int64)])
+        own = np.ones(len(value), dtype=np.bool_)
+        return cls(vector, slope, across, excess, group, own, np.zeros(len(value), dtype=np.int64),
+                   np.zeros(len(value)))  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.group)
+
+    @property
+    def norm(self) -> Bools:
+        """Which rows are norms, (K,)."""
+        return ~np.isnan(self.excess)
+
+    def vectors_at(self, d: Floats) -> Floats:
+        """The vectors (K, 2) after a step d (N,)."""
+        out = self.vector.copy()
+        out[:, 0] += self.slope @ d
+        if self.across.shape[1]:
+            out[:, 1] += self.across @ d
+        return out
+
+    def values_at(self, d: Floats) -> Floats:
+        """The rows' values (K,) after a step d (N,)."""
+        return _values(self.vectors_at(d), self.excess)
+
+    def values(self) -> Floats:
+        """The rows' values (K,) at the iterate."""
+        return _values(self.vector, self.excess)
+
+    def slopes_at(self, d: Floats) -> Floats:
+        """The rows' gradients (K, N) after a step d (N,)."""
+        if not self.across.shape[1]:
+            return self.slope
+        vector = self.vectors_at(d)
+        size = np.sqrt(vector[:, 0] ** 2 + vector[:, 1] ** 2)
+        known = self.norm & (size > 0.0)
+        unit = np.where(known[:, None], vector / np.where(known, size, 1.0)[:, None], [1.0, 0.0])
+        return np.asarray(unit[:, :1] * self.slope + unit[:, 1:] * self.across)
+
+    def levels(self, groups: int) -> Floats:
+        """The largest value of each group (groups,) at the iterate, -inf of one without rows."""
+        return highest(self.values(), self.group, groups)
+
+    def moved(self, d: Floats, way: float) -> "Bundle":
+        """The same rows seen from another iterate, d (N,) away, in ranges by `way`; none is its own."""
+        return self._with(vector=self.vectors_at(d), own=np.zeros(len(self), dtype=np.bool_), far=self.far + way)
+
+    def lowered(self, levels: Floats, bend: Floats) -> "Bundle":
+        """No row above the levels (groups,), rows from elsewhere below them by bend (groups,) times the way squared."""
+        caps = levels[self.group] - np.where(self.own, 0.0, bend[self.group] * self.far**2)
+        beyond = np.maximum(self.values() - caps, 0.0)
+        vector = self.vector.copy()
+        vector[:, 0] -= np.where(self.norm, 0.0, beyond)
+        return self._with(vector=vector, excess=self.excess + beyond)
+
+    def of_places(self, places: Ints | Bools) -> "Bundle":
+        """Some of the rows."""
+        return Bundle(*(getattr(self, f.name)[places] for f in fields(Bundle)))
+
+    def joined(self, other: "Bundle") -> "Bundle":
+        """These rows, then the others."""
+        width = max(self.across.shape[1], other.across.shape[1])
+        wide = [np.zeros((len(b), width)) if b.across.shape[1] < width else b.across for b in (self, other)]
+        columns = [np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(Bundle)
+                   if f.name != "across"]  # fmt: skip
+        vector, slope, excess, group, own, idle, far = columns
+        return Bundle(vector, slope, np.concatenate(wide), excess, group, own, idle, far)
+
+    def without_repeats(self) -> "Bundle":
+        """Of rows that say the same one each, the last."""
+        if len(self) < 2:
+            return self
+        steepest = np.abs(self.slope).max(axis=1)
+        values, kept = self.values(), np.ones(len(self), dtype=np.bool_)
+        for i in range(len(self) - 1):
+            near = np.flatnonzero(
+                (self.group[i + 1 :] == self.group[i])
+                & (np.abs(values[i + 1 :] - values[i]) <= SAME * max(steepest[i], 1e-300))
+            )
+            for k in (near + i + 1).tolist():
+                if np.abs(self.slope[k] - self.slope[i]).max() <= SAME * steepest[i]:
+                    kept[i] = False
+                    break
+        return self if kept.all() else self.of_places(kept)
+
+    def thinned(self) -> "Bundle":
+        """At most as many rows as there is room for: the iterate's own, those that were used last, the newest."""
+        n = max(self.slope.shape[1], 1)
+        most = int(min(max(ROOM / n, LEAST), MOST))
+        if len(self) <= most:
+            return self
+        order = np.lexsort((-np.arange(len(self)), self.idle, ~self.own))
+        return self.of_places(np.sort(order[: max(most, int(self.own.sum()))]))
+
+    def used(self, multipliers: Floats, enough: Floats) -> "Bundle":
+        """The same after a subproblem with multipliers (K,); enough (groups,): the least that counts."""
+        return self._with(idle=np.where(multipliers > enough[self.group], 0, self.idle + 1))
+
+    def lines(self) -> tuple[Ints, Lines]:
+        """The rows that are lines: their places and themselves."""
+        at = np.flatnonzero(~self.norm)
+        return at, Lines(self.vector[at, 0], self.slope[at], self.group[at])
+
+    def norms(self) -> tuple[Ints, Norms]:
+        """The rows that are norms: their places and themselves."""
+        at = np.flatnonzero(self.norm)
+        across = self.across[at] if self.across.shape[1] else np.zeros((len(at), self.slope.shape[1]))
+        return at, Norms(self.vector[at], self.slope[at], across, self.excess[at], self.group[at])
+
+    def _with(self, **columns: Floats | Ints | Bools) -> "Bundle":
+        return Bundle(*(columns.get(f.name, getattr(self, f.name)) for f in fields(Bundle)))
+
+
+def highest(values: Floats, group: Ints, groups: int) -> Floats:
+    """The largest value of each group (groups,); -inf of one without rows."""
+    out = np.full(groups, -np.inf)
+    np.maximum.at(out, group, values)
+    return out
+
+
+def _values(vector: Floats, excess: Floats) -> Floats:
+    size = np.sqrt(vector[:, 0] ** 2 + vector[:, 1] ** 2)
+    return np.where(np.isnan(excess), vector[:, 0], size - excess)

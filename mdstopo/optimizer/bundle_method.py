@@ -1,0 +1,210 @@
+"""The optimiser's piece for rows that compete, as steps of the driver: begin at an iterate, judge a trial, propose one.
+
+Everything between two steps is in `State`. What is solved, and how, is in `rows`.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mdstopo.optimizer.bundle import Bundle, highest
+from mdstopo.optimizer.curvature import FEW, Curvature
+from mdstopo.optimizer.presets import Settings
+from mdstopo.optimizer.problem import Floats, Sample
+from mdstopo.optimizer.rows import (
+    FEW_STEPS,
+    FLOOR,
+    MARGIN,
+    NOTHING,
+    RAISE,
+    RAISES,
+    STEER,
+    STEPS,
+    TOLD,
+    Space,
+    Trial,
+    changes_of,
+    learnt_from,
+    least_violation,
+    merit,
+    residual,
+    subproblem,
+)
+from mdstopo.optimizer.state import State
+
+#: the box after the rows were forgotten, and when another piece begins, in ranges
+FRESH_TRUST = 0.05
+#: steps in a row without a decrease that counts, before rows from elsewhere are forgotten, or the run ends; and the
+#: residual below which they may stay, because such steps still make it smaller
+PATIENCE, NEAR = 8, 1e-3
+#: how often in a row rows from elsewhere are forgotten, each time with a box so much smaller
+FORGETS, SMALLER = 3, 0.2
+#: share of the row's reach in the box that is rounding of the subproblem; the least price, of the first
+ROUNDING, CHEAPEST = 1e-8, 1e-2
+#: what is left of the bend from trial to trial
+BEND_FALL = 0.9
+#: share of the box below which a step leaves it too wide
+NARROW = 0.1
+
+
+class BundleMethod:
+    """Begin, judge and propose for one problem's space and settings."""
+
+    def __init__(self, space: Space, settings: Settings) -> None:
+        self.space = space
+        self.settings = settings
+
+    def begin(self, state: State, price: Floats | None = None) -> None:
+        """Know the iterate's rows alone."""
+        sample = state.sample
+        rows = self._bundle(sample, state.restoring)
+        state.bundle, state.multipliers = rows, np.zeros(len(rows))
+        n = len(state.alpha)
+        state.steps, state.changes = np.zeros((0, n)), np.zeros((0, n))
+        if price is not None:
+            state.price = price
+        elif state.restoring:
+            state.price = np.zeros(0)
+        else:
+            state.price = self.first_price(rows)
+        state.bend = np.zeros(len(state.price) + 1)
+        state.kkt = float("nan")
+
+    def first_price(self, rows: Bundle) -> Floats:
+        """The price of each constraint (J,): its gradient then weighs as much as the objective's."""
+        groups = int(rows.group.max(initial=0)) + 1
+        steepest = highest(np.abs(rows.slope / 1.0).max(axis=1, initial=0.0), rows.group, groups)
+        steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
+        return np.asarray(MARGIN * steepest[0] / steepest[1:])
+
+    # -- the steps
+
+    def judge(self, state: State, sample: Sample) -> bool:
+        """Accept or reject the evaluated trial; whether it was accepted."""
+        settings, space = self.settings, self.space
+        new = self._bundle(sample, state.restoring)
+        groups = len(state.price) + 1
+        here, there = state.bundle.of_places(state.bundle.own).levels(groups), new.levels(groups)
+        actual = merit(here[0], here[1:], state.price) - merit(there[0], there[1:], state.price)
+        ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
+        d = state.trial - state.alpha
+        self._learn(state, new, d)
+        size = float(np.abs(d / space.range).max(initial=0.0))
+        way = float(np.sqrt(np.einsum("i,i->", d / space.range, d / space.range)))
+        seen, moved = new.moved(-d, way), state.bundle.moved(d, way)
+        self._bend(state, seen, here, moved, there)
+        negligible = settings.number("decrease_tolerance") * abs(here[0])
+        small = abs(actual) <= negligible and abs(state.predicted) <= negligible
+        state.small = state.small + 1 if small else 0
+        accepted = ratio >= settings.number("accept_ratio")
+        if accepted:
+            state.bundle = moved.joined(new)
+            state.kkt = float("nan")
+            if ratio > settings.number("good_ratio") and size > 0.5 * state.trust:
+                state.trust = min(1.0, settings.number("trust_grow") * state.trust)
+            elif ratio < settings.number("poor_ratio"):
+                state.trust = max(0.5 * min(state.trust, size), 1e-12)
+            elif size < NARROW * state.trust:  # a box of the size of the steps is solved to more digits
+                state.trust = max(0.5 * state.trust, size / NARROW)
+            if not small:
+                state.forgets = 0
+        else:
+            above = seen.values() - here[seen.group]
+            decisive = new.values() >= there[new.group] - 1e-12 * np.abs(there[new.group])
+            told = bool((above[decisive] <= 1e-9 * np.abs(here[seen.group][decisive])).all())
+            state.bundle = seen.joined(state.bundle)
+            state.trust = TOLD * state.trust if told else 0.5 * min(state.trust, size)
+        state.bundle = state.bundle.without_repeats().thinned()
+        return accepted
+
+    def propose(self, state: State) -> None:
+        """Solve the model and set the next trial, what it promises, and the KKT residual."""
+        space = self.space
+        own = state.bundle.of_places(state.bundle.own)
+        steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
+        if np.isnan(state.kkt):
+            price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * 1e3
+            state.kkt, _ = residual(own, state.alpha, space, price, steepest)
+        B = learnt_from(state.steps, state.changes, max(steepest, 1e-300), space.range)
+        box = self._box(state)
+
+        here = own.levels(len(state.price) + 1)
+        rows = state.bundle.lowered(here, state.bend)
+
+        def solved(price: Floats) -> Trial:
+            return subproblem(rows, state.alpha, space, box, price, B)
+
+        trial = self._steer(state, rows, solved(state.price), here, box, solved)
+        if not trial.solved:
+            state.bundle = rows = own
+            B = Curvature.diagonal_of(np.full(len(state.alpha), FLOOR * steepest) / space.range**2)
+            trial = self._steer(state, rows, solved(state.price), here, box, solved)
+        self._solved = trial
+        promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.price)
+        state.predicted = merit(here[0], here[1:], state.price) - promised
+        state.trial = trial.x
+        state.multipliers = trial.multipliers
+        enough = 1e-6 * np.concatenate([[1.0], state.price])
+        state.bundle = state.bundle.used(trial.multipliers, enough)
+
+    # -- how
+
+    def _bundle(self, sample: Sample, restoring: bool) -> Bundle:
+        """The sample's rows; while limits are restored, those of all constraints as the objective's."""
+        if not restoring:
+            return Bundle.of(sample, np.arange(len(sample.rows)))
+        rows = Bundle.of(sample, np.zeros(0, dtype=np.int64))
+        rows.group[:] = 0
+        return rows
+
+    def _learn(self, state: State, new: Bundle, d: Floats) -> None:
+        change = changes_of(state.bundle, new, d, state.multipliers)
+        if change is None or not float(np.abs(d).max(initial=0.0)) > 0.0:
+            return
+        most = STEPS if len(d) <= FEW else FEW_STEPS
+        state.steps = np.concatenate([state.steps, d[None]])[-most:]
+        state.changes = np.concatenate([state.changes, change[None]])[-most:]
+
+    def _box(self, state: State) -> tuple[Floats, Floats]:
+        space = self.space
+        reach = np.minimum(self.settings.number("move_limit"), state.trust * space.range)
+        return np.maximum(space.lower, state.alpha - reach), np.minimum(space.upper, state.alpha + reach)
+
+    def _steer(
+        self, state: State, rows: Bundle, trial: Trial, here: Floats, box: tuple[Floats, Floats],
+        solved: Callable[[Floats], Trial],
+    ) -> Trial:  # fmt: skip
+        """Prices that make the step take away enough of what violation can go in the box."""
+        if not len(state.price):
+            return trial
+        limits = rows.group > 0
+        reach = np.abs(rows.slope[limits]) @ (box[1] - box[0])
+        tiny = max(NOTHING * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
+
+        def violation(levels: Floats) -> float:
+            return float(np.maximum(levels[1:], 0.0).sum())
+
+        if violation(trial.levels) > tiny:
+            least = least_violation(rows, state.alpha, self.space, box, np.ones(len(state.price)))
+            low = violation(least.levels)
+            enough = low + (1.0 - STEER) * max(violation(here) - low, 0.0) + tiny
+            for _ in range(RAISES):
+                if violation(trial.levels) <= enough:
+                    break
+                state.price = np.where(trial.levels[1:] > tiny / len(state.price), RAISE * state.price, state.price)
+                trial = solved(state.price)
+        carried = np.bincount(rows.group, weights=trial.multipliers, minlength=len(here))[1:]
+        state.price = np.where(
+            trial.levels[1:] > tiny,
+            state.price,
+            np.maximum(np.maximum(MARGIN * carried, 0.5 * state.price), CHEAPEST * self.first_price(rows)),
+        )
+        return trial
+
+    def _bend(self, state: State, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
+        """How much each group was seen to bend downwards: a row from one end of a step above the value at the other."""
+        state.bend = BEND_FALL * state.bend
+        for rows, levels in ((seen, here), (moved, there)):
+            some = rows.far > 0.0
+            over = (rows.values() - levels[rows.group])[some] / rows.far[some] ** 2
+            np.maximum.at(state.bend, rows.group[some], over)

@@ -1,0 +1,129 @@
+"""The curvature of a subproblem: B, positive semidefinite, as a matrix, or as a diagonal and a few directions.
+
+What rows that are lines or norms leave out of the Lagrangian's curvature is learnt from its gradients: BFGS, damped as
+by M. J. D. Powell (1978), of all steps where the variables are few, else of the last ones in compact form (R. H. Byrd,
+J. Nocedal and R. B. Schnabel, 1994).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mdstopo.optimizer.problem import Bools, Floats
+
+#: variables up to which B is a matrix, and steps that are kept where it is none
+FEW, PAIRS = 250, 12
+#: the least y's over s'B s, before y is bent towards B s
+DAMPING = 0.2
+
+
+@dataclass(frozen=True, slots=True)
+class Curvature:
+    """B = diag(diagonal) + factor diag(weight) factor', or `matrix` where that is given.
+
+    diagonal (N,); factor (N, m); weight (m,), none 0; matrix (N, N) or None.
+    """
+
+    diagonal: Floats
+    factor: Floats
+    weight: Floats
+    matrix: Floats | None = None
+
+    @classmethod
+    def diagonal_of(cls, diagonal: Floats) -> "Curvature":
+        """A diagonal (N,) alone."""
+        return cls(diagonal, np.zeros((len(diagonal), 0)), np.zeros(0))
+
+    def times(self, x: Floats) -> Floats:
+        """B x, (N,)."""
+        if self.matrix is not None:
+            return np.asarray(self.matrix @ x)
+        return np.asarray(self.diagonal * x + self.factor @ (self.weight * (self.factor.T @ x)))
+
+    def dense(self) -> Floats:
+        """B, (N, N)."""
+        if self.matrix is not None:
+            return self.matrix
+        return np.asarray(np.diag(self.diagonal) + (self.factor * self.weight) @ self.factor.T)
+
+    def scaled(self, width: Floats, by: float) -> "Curvature":
+        """That in variables of another width (N,), divided by a number."""
+        if self.matrix is not None:
+            return replace(self, matrix=self.matrix * np.outer(width, width) / by)
+        return Curvature(self.diagonal * width**2 / by, self.factor * width[:, None], self.weight / by)
+
+    def restricted(self, some: Bools) -> "Curvature":
+        """That of some of the variables, by a mask (N,)."""
+        if self.matrix is not None:
+            return replace(self, matrix=self.matrix[np.ix_(some, some)])
+        return Curvature(self.diagonal[some], self.factor[some], self.weight)
+
+
+def learnt(steps: Floats, changes: Floats, floor: float) -> Curvature:
+    """B after steps (m, N), the oldest first, and the changes (m, N) of the Lagrangian's gradient over them.
+
+    floor: the least curvature of B before anything is learnt.
+    """
+    n = steps.shape[1]
+    sigma = _first(steps, changes, floor)
+    B = np.full(n, sigma) if n > FEW else sigma * np.eye(n)
+    if n > FEW:
+        return _compact(steps[-PAIRS:], changes[-PAIRS:], sigma)
+    for s, y in zip(steps, changes, strict=True):
+        Bs = B @ s
+        sBs = float(s @ Bs)
+        if not sBs > 0.0:
+            continue
+        bent = _bent(s, y, Bs, sBs)
+        B = B - np.outer(Bs, Bs) / sBs + np.outer(bent, bent) / float(s @ bent)
+    return Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), 0.5 * (B + B.T))
+
+
+def _first(steps: Floats, changes: Floats, floor: float) -> float:
+    """The curvature of all directions before anything is learnt: that of the last step along itself."""
+    for s, y in zip(steps[::-1], changes[::-1], strict=True):
+        curved = float(s @ y)
+        if curved > 0.0:
+            return max(floor, curved / float(s @ s))
+    return floor
+
+
+def _bent(s: Floats, y: Floats, Bs: Floats, sBs: float) -> Floats:
+    sy = float(s @ y)
+    if sy >= DAMPING * sBs:
+        return y
+    share = (1.0 - DAMPING) * sBs / (sBs - sy)
+    return np.asarray(share * y + (1.0 - share) * Bs)
+
+
+def _compact(steps: Floats, changes: Floats, sigma: float) -> Curvature:
+    """The same of the last steps in compact form, as weights of orthonormal directions."""
+    n = steps.shape[1]
+    S: list[Floats] = []
+    Y: list[Floats] = []
+    found = Curvature.diagonal_of(np.full(n, sigma))
+    for s, y in zip(steps, changes, strict=True):
+        Bs = found.times(s)
+        sBs = float(s @ Bs)
+        if not sBs > 0.0:
+            continue
+        S.append(s)
+        Y.append(_bent(s, y, Bs, sBs))
+        found = _of_pairs(np.array(S).T, np.array(Y).T, sigma)
+    return found
+
+
+def _of_pairs(S: Floats, Y: Floats, sigma: float) -> Curvature:
+    """B = sigma I - [sigma S, Y] M^-1 [sigma S, Y]' with M = [[sigma S'S, L], [L', -D]]."""
+    SY = S.T @ Y
+    L, D = np.tril(SY, -1), np.diag(np.diag(SY))
+    M = np.block([[sigma * (S.T @ S), L], [L.T, -D]])
+    directions, R = np.linalg.qr(np.concatenate([sigma * S, Y], axis=1))
+    try:
+        inner = -R @ np.linalg.solve(M, R.T)
+    except np.linalg.LinAlgError:
+        return Curvature.diagonal_of(np.full(len(S), sigma))
+    weight, turn = np.linalg.eigh(0.5 * (inner + inner.T))
+    weight = np.maximum(weight, -(1.0 - 1e-8) * sigma)
+    used = np.abs(weight) > 1e-12 * max(1.0, float(np.abs(weight).max(initial=0.0)))
+    return Curvature(np.full(len(S), sigma), directions @ turn[:, used], weight[used])
