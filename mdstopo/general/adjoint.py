@@ -15,7 +15,16 @@ from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.parameters import add_event, add_times
-from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response, value_at
+from mdstopo.general.responses import (
+    ENERGY,
+    MEMBER_FORCE,
+    across_rate,
+    across_slopes,
+    kinked,
+    largest_force,
+    response,
+    value_at,
+)
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
 from mdstopo.jit import kernel
@@ -106,17 +115,19 @@ def sweep(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, out, work):  # type: ignore[no-untyped-def]
+def row_gradient(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, j, row, across, desk, start, out, work
+):
     """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu.
 
-    start (n,), or no length: the cotangent of the start's positions comes out.
+    across: as of `row_cotangents`. start (n,), or no length: the cotangent of the start's positions comes out.
     """
     n = model.mass.shape[0]
     bars = np.empty((3, n))
     none = np.empty((0, 3, n))
     no_rows = np.empty((0, model.size[0]))
     bar_set = np.zeros(count_sets(model))
-    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, out, work)
+    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work)
     if w >= 0:
         no_drops = np.empty(0)
         sweep(
@@ -127,11 +138,14 @@ def row_gradient(tag, model, tables, strength, track, count, j, row, desk, start
 
 
 @kernel
-def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, out, work):  # type: ignore[no-untyped-def]
+def row_cotangents(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work
+):
     """What a row pulls on the state where it is read: bars (3, n), q and v (a is used up); and on the members there.
 
-    Returns the step (-1: the start) and its fraction to which the cotangents belong; out (M_padded,) and bar_set
-    (slots,) are set.
+    across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector pulls,
+    the direction held. Returns the step (-1: the start) and its fraction to which the cotangents belong; out
+    (M_padded,) and bar_set (slots,) are set.
     """
     n = model.mass.shape[0]
     n_row = model.size[0]
@@ -155,10 +169,17 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
         w = point_of(tag, model, tables, strength, track, count, k, c, np.bool_(True), desk, q, v, work)
     t = track.t[k] + c * (track.t[k + 1] - track.t[k])
     restore_modes(track, track.index[k, 3], strength)
+    rate = row[4]
+    if across:
+        at_end = c <= 0.0 or c >= 1.0  # elsewhere nobody asks
+        rate = across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam) if at_end else 0.0
     balance(model, strength, segment, t, q, v, np.bool_(True), desk, a, lam)
     work[FORCES] += 1
     who = int(row[6])
-    response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    if across:
+        across_slopes(model, j, q, v, a, lam, bars, row_bar)
+    else:
+        response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
     if bar_set.shape[0] > 0:
         bar_set[:] = 0.0
         add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
@@ -178,19 +199,19 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     if model.varied.shape[0] > 0 and (c <= 0.0 or c >= 1.0):
         # what lies behind the state does nothing to a value before it
         behind = bars[1] if c <= 0.0 or at == count else np.zeros(n)
-        add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, row[4], out)
+        add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, rate, out)
     if c <= 0.0 and k > 0:
         through_events(model, track, k, bars[0], bars[1], bar_set, np.empty(0), strength, out)
     if (c <= 0.0 and k > 0) or c >= 1.0:
         event = _first_event(track, at)
         if event >= 0:
             if model.varied.shape[0] > 0:
-                add_event(model, track, strength, event, row[4], out)
+                add_event(model, track, strength, event, rate, out)
             for d in range(n):
-                bars[0, d] -= row[4] * track.salt[event, 0, d]
-                bars[1, d] -= row[4] * track.salt[event, 1, d]
+                bars[0, d] -= rate * track.salt[event, 0, d]
+                bars[1, d] -= rate * track.salt[event, 1, d]
             if bar_set.shape[0] > 0:
-                time_back(model, track, event, row[4], bar_set)
+                time_back(model, track, event, rate, bar_set)
     return w, (c if w == k else 1.0)
 
 

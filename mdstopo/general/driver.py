@@ -11,6 +11,7 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
+from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
 from mdstopo.general.kinks import landed
@@ -18,6 +19,7 @@ from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.ready import Ready
 from mdstopo.general.rivals import compete, members_peaks
+from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
 from mdstopo.general.variables import Placing
@@ -27,7 +29,7 @@ from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
 
-#: peaks kept of one response
+#: peaks kept of one response, unless told otherwise
 ROWS = 6
 #: of what a reduction takes the peaks: of g, of -g, or of both
 SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
@@ -61,14 +63,15 @@ class GeneralDriver:
         self._values = np.zeros(0)
         self.strength = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
-        self.rows = np.zeros((count, ROWS, COLUMNS))
         self.found = np.zeros(count, dtype=np.int64)
-        self.gradients = np.zeros((count, ROWS, n_design + varied))
+        #: of every response (`evaluation.Peak`)
+        self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
         self.where = np.full(3, -1, dtype=np.int64)
         n = len(model.mass)
         #: what `visit` is given for the end alone, and `pull` for a row
         self._end = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
         self._row, self._pulled = np.zeros(COLUMNS), np.zeros(n_design + varied)
+        self._make_rows(ROWS)
         self._pulled_start = np.zeros(n if case.solver.settle else 0)
         self.events = 0
         #: where the steps of the last evaluation had to end (`landings`)
@@ -107,6 +110,13 @@ class GeneralDriver:
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self._ready = Ready()  # what was prepared with the room as it was would keep it
 
+    def _make_rows(self, most: int) -> None:
+        """Arrays for so many peaks of each response; those of cones when they are first asked for."""
+        count, length = len(self.scene.responses), len(self._pulled)
+        self.rows = np.zeros((count, most, COLUMNS))
+        self.gradients = np.zeros((count, most, length))
+        self.across: FloatArray | None = None
+
     def _fit(self) -> None:
         """Refuse joints that do not fit at the start, or move the start where the case asks for it (CaseError)."""
         model = self.scene.model
@@ -142,8 +152,12 @@ class GeneralDriver:
             self._start = q, v
             self._place()
 
-    def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
+    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> Looked:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
+        if self.rows.shape[1] != (rows.most or ROWS):
+            self._make_rows(rows.most or ROWS)
+        window = CLOSENESS if rows.window is None else rows.window
+        across = self._across() if rows.cones and gradient else None
         code, count, time = self.run(alpha, gradient)
         self.landings = []
         for _ in range(ROUNDS):
@@ -154,8 +168,16 @@ class GeneralDriver:
             code, count, time = self.run(alpha, gradient, self.landings)
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
-                self._look(j, name, count, gradient)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]), self._grazing())
+                self._look(j, name, count, gradient, window, across)
+        grazing, meeting = self._grazing(), int(self.where[1])
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
+
+    def _across(self) -> FloatArray:
+        """(n_resp, R, N): of `evaluation.Peak.across`, zeros."""
+        if self.across is None:
+            self.across = np.zeros_like(self.gradients)
+        self.across[:] = 0.0
+        return self.across
 
     def see(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
         """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
@@ -175,8 +197,11 @@ class GeneralDriver:
                     return int(member)
         return -1
 
-    def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
+    def _look(
+        self, j: int, reduction: str, count: int, gradient: bool, window: float, across: FloatArray | None
+    ) -> None:
         """Rows and gradients of response j, reduced over time."""
+        most = self.rows.shape[1]
         t = self.states()[0][: count + 1]
         rows = self.rows[j]
         if reduction in INTEGRALS:
@@ -188,15 +213,16 @@ class GeneralDriver:
             return
 
         if compete(self.scene.model.response[j, 0], reduction):
-            found = ranked(members_peaks(self, j, t.copy(), reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
+            found = members_peaks(self, j, t.copy(), reduction == "final", window, most)
+            found = ranked(found, window, most, t[-1] - t[0])
         elif reduction == "final":
             value, rate, who = self._see_end(j, count).tolist()
             found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
         else:
             see, t = partial(self.see, j, count), t.copy()
             samples = sample(t, see)
-            found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, CLOSENESS)]
-            found = ranked(found, CLOSENESS, ROWS, t[-1] - t[0])
+            found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, window)]
+            found = ranked(found, window, most, t[-1] - t[0])
         self.found[j] = len(found)
         for r, row in enumerate(found):
             flip = row[SIGN] if reduction == "max_abs" else 1.0
@@ -204,6 +230,8 @@ class GeneralDriver:
             if gradient:
                 self._pull(j, rows[r], 0, count, True, self.gradients[j, r])
                 self.gradients[j, r] *= flip
+            if across is not None and self.shapes[j] == "norm":
+                self._pull(j, rows[r], 0, count, True, across[j, r], across=True)
             rows[r, VALUE] *= flip
 
     def visit(
@@ -255,11 +283,20 @@ class GeneralDriver:
         """What every entry that differentiates begins with."""
         return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
 
-    def _pull(self, j: int, row: FloatArray, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
+    def _pull(
+        self,
+        j: int,
+        row: FloatArray,
+        integral: int,
+        count: int,
+        gradient: bool,
+        out: FloatArray,
+        across: bool = False,
+    ) -> float:
         self._row[:] = row
         total: float = self._ready(
-            "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self._row, self.room,
-            self.room_ints, self.strength, self.padded, self._pulled, self._pulled_start, self.work,
+            "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self._row, across,
+            self.room, self.room_ints, self.strength, self.padded, self._pulled, self._pulled_start, self.work,
         )  # fmt: skip
         if gradient:
             out[:] = self._pulled

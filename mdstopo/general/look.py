@@ -21,6 +21,7 @@ def pull(  # type: ignore[no-untyped-def]
     integral,
     gradient,
     row,
+    across,
     room,
     room_ints,
     strength,
@@ -32,7 +33,7 @@ def pull(  # type: ignore[no-untyped-def]
     """out (N,) = the derivative of one row of `extremes` by alpha (N,).
 
     integral 1 (2): of the integral over time of response j (of its square), which is returned. Room: padded
-    (M_padded,). start: as of `adjoint.row_gradient`.
+    (M_padded,). across: as of `adjoint.row_cotangents`. start: as of `adjoint.row_gradient`.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -43,7 +44,7 @@ def pull(  # type: ignore[no-untyped-def]
             tag, model, tables, strength, track, count, j, integral == 2, gradient, desk, start, padded, work
         )
     elif gradient:
-        row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, padded, work)
+        row_gradient(tag, model, tables, strength, track, count, j, row, across, desk, start, padded, work)
     if gradient:
         unscale_general(model.block, model.power, alpha, padded, out)
     return total
