@@ -85,56 +85,38 @@ def sweep(  # type: ignore[no-untyped-def]
     bar_set, drops as of `through_events`; looked, square: j and square of `parameters.add_times`.
     """
     n = lam_q.shape[0]
-    z = np.empty((17, n))
+    z = np.empty((1, 17, n))
     y = np.empty(model.size[0])
-    lam_x = np.zeros((2, n))
+    lam_x = np.zeros((1, 2, n))
+    fraction = np.empty(1)
+    fraction[0] = c
     spread = bars.shape[0] > 0
     while w >= 0:
         o = track.index[w, 0]
         end = track.index[w + 1, 0]
         b = bars[o:end] if spread else bars
         r = rows_bar[o:end] if spread else rows_bar
-        step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, b, r, z, y, desk, work)
+        step_back(
+            tag, model, tables, track, w, fraction, lam_q.reshape((1, n)), lam_v.reshape((1, n)), lam_x, b, r, z, y,
+            desk, work,
+        )  # fmt: skip
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
-        add_designs(model, segment, track, o, strength, z[: end - o], out, work)
+        add_designs(model, segment, track, o, strength, z[0, : end - o], out, work)
         if bar_set.shape[0] > 0:
             for j in range(end - o):
                 stage = track.stage[o + j]
-                add_sets(model, segment, strength, stage[0], stage[1], z[j], 0.0, bar_set)
+                add_sets(model, segment, strength, stage[0], stage[1], z[0, j], 0.0, bar_set)
                 if spread:
                     for i in range(bar_set.shape[0]):
                         bar_set[i] += sets_bar[o + j, i]
-        c = 1.0
+        fraction[0] = 1.0
         before = track.index[w, 1]
         if model.varied.shape[0] > 0:
             add_times(model, track, strength, count, before + 1, looked, square, lam_v, 0.0, out)
         if before >= 0:
             through_events(model, track, before + 1, lam_q, lam_v, bar_set, drops, strength, out)
         w = before
-
-
-@kernel
-def row_gradient(  # type: ignore[no-untyped-def]
-    tag, model, tables, strength, track, count, j, row, across, desk, start, out, work
-):
-    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu.
-
-    across: as of `row_cotangents`. start (n,), or no length: the cotangent of the start's positions comes out.
-    """
-    n = model.mass.shape[0]
-    bars = np.empty((3, n))
-    none = np.empty((0, 3, n))
-    no_rows = np.empty((0, model.size[0]))
-    bar_set = np.zeros(count_sets(model))
-    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work)
-    if w >= 0:
-        no_drops = np.empty(0)
-        sweep(
-            tag, model, tables, strength, track, count, w, c, bars[0], bars[1], bar_set, none, no_rows, no_rows,
-            no_drops, np.int64(-1), np.bool_(False), desk, out, work,
-        )  # fmt: skip
-    keep_start(model, track, bars[0], bar_set, start, out)
 
 
 @kernel
@@ -230,7 +212,7 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
 def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):  # type: ignore[no-untyped-def]
     """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out.
 
-    start as of `row_gradient`.
+    start (n,), or no length: the cotangent of the start's positions comes out.
     """
     n = model.mass.shape[0]
     stages = track.index[count, 0] if gradient else 0
