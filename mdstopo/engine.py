@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, Objective, ResponseRow
-from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.driver import Driver, Looked
 from mdstopo.integrators.steps import WORK, work_named
@@ -112,11 +112,14 @@ class Evaluator:
         """Bytes of the steps that are held between calls."""
         return sum(driver.room.nbytes for driver in self._drivers.values())
 
-    def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
+    def evaluate(
+        self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None, rows: Rows = USUAL
+    ) -> Evaluation:
         """Objectives, and on demand gradients, of a design alpha (N,), finite and >= 0 (ValueError otherwise).
 
         Behind alpha there may be the values (P,) of the case's variables; else these have their initial ones.
-        sensitivity: one of the four methods; default the case's.
+        sensitivity: one of the four methods; default the case's. rows: which peaks are told, and what of them;
+        constant_load tells no `Peak.across`.
         """
         method = sensitivity or self.sensitivity
         if gradient and self.case.variables and method not in BY_PARAMETERS:
@@ -125,7 +128,7 @@ class Evaluator:
                 str(self.case.path or self.case.name),
             )
         if method == "iterative" and self._gives_way:
-            return self.otherwise(sensitivity="iterative").evaluate(alpha, gradient, method)
+            return self.otherwise(sensitivity="iterative").evaluate(alpha, gradient, method, rows)
         seen = self._seen  # first: a driver that is made may simulate a design of its own
         design = self._design.take(alpha)
         edge = self._without_slope(design) if gradient and self._rooted else ""
@@ -139,14 +142,14 @@ class Evaluator:
             if too_coarse:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
                 break
-            result = driver.evaluate(design, exact)
+            result = driver.evaluate(design, exact, rows)
             status, culprit = result.status, ""
             if not status.ok or result.meeting >= 0:
                 status, culprit = self._verdict(name, design, result)
-            gradients = result.gradients if exact else None
+            gradients, across = (result.gradients, result.across) if exact else (None, None)
             if status.ok and gradient and not exact:
-                found = _differentiate(method, driver, design, result)
-                status, culprit, gradients = found.status, found.message, found.gradients
+                found = _differentiate(method, driver, design, result, rows.cones)
+                status, culprit, gradients, across = found.status, found.message, found.gradients, found.across
             work.append(driver.work.tolist())
             message = culprit or message
             if not status.ok:
@@ -154,7 +157,7 @@ class Evaluator:
             if result.grazing >= 0:
                 grazing = self._member(name, result.grazing)
             for j, key in enumerate(keys):
-                looked[key] = _peaks(result, j, gradients)
+                looked[key] = _peaks(result, j, gradients, across, driver.shapes[j])
         if edge and status.ok:
             status, message = Status.NO_GRADIENT, edge
         if grazing and gradient and status.ok:
@@ -360,7 +363,7 @@ class Evaluator:
         slopes: dict[str, FloatArray] = {}
         for name in self._names:
             found = peaks[name] = looked[name]
-            times[name], objectives[name], slope = found[0]
+            times[name], objectives[name], slope, *_ = found[0]
             if gradient and slope is not None:
                 slopes[name] = slope
         constraints, rows = self._design.excess.copy(), self._rows
@@ -407,7 +410,9 @@ def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
     return {load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases}
 
 
-def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked: Looked) -> "Differentiated":
+def _differentiate(
+    method: str, driver: "AnyDriver", design: FloatArray, looked: Looked, cones: bool
+) -> "Differentiated":
     """Gradients by another method than the adjoint one."""
     from mdstopo.sensitivity.methods import Differentiated, differentiate
 
@@ -415,18 +420,24 @@ def _differentiate(method: str, driver: "AnyDriver", design: FloatArray, looked:
         return differentiate(method, driver, design, looked)
     from mdstopo.general.methods import differentiate as differentiate_general
 
-    gradients, message = differentiate_general(driver, method, design, looked)
-    return Differentiated(Status.OK, message, gradients)
+    across = np.zeros_like(looked.gradients) if cones and method != "constant_load" else None
+    gradients, message = differentiate_general(driver, method, design, looked, across)
+    return Differentiated(Status.OK, message, gradients, across)
 
 
-def _peaks(result: Looked, j: int, gradients: FloatArray | None) -> tuple[Peak, ...]:
-    """What was found of objective j; gradients (n_obj, R, N) of all rows, of which copies are kept."""
+def _peaks(
+    result: Looked, j: int, gradients: FloatArray | None, across: FloatArray | None, shape: Shape
+) -> tuple[Peak, ...]:
+    """What was found of objective j; gradients (n_obj, R, N) and across of all rows, of which copies are kept."""
     peaks: tuple[Peak, ...] = ()
-    gradient = None
+    gradient = aside = None
     rows = result.rows.item
     for r in range(result.found.item(j)):
         if gradients is not None:
             gradient = gradients[j, r].copy()
             gradient.setflags(False)
-        peaks += (Peak(rows(j, r, 0), rows(j, r, 1), gradient),)
+        if across is not None and shape == "norm":
+            aside = across[j, r].copy()
+            aside.setflags(False)
+        peaks += (Peak(rows(j, r, 0), rows(j, r, 1), gradient, aside, shape),)
     return peaks

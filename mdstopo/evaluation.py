@@ -1,7 +1,7 @@
 """What an evaluation gives back."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,17 +20,44 @@ FloatArray = NDArray[np.float64]
 _NONE: Mapping[Any, Any] = {}
 
 
+Shape: TypeAlias = Literal["plain", "absolute", "norm"]
+
+
+class Rows(NamedTuple):
+    """Which peaks of a response are told, and what of them; None: what the engine takes by itself.
+
+    window: how far below the highest a peak may be to compete, relative to it. most: how many of one response at most.
+    cones: tell `Peak.across`, too.
+    """
+
+    window: float | None = None
+    most: int | None = None
+    cones: bool = False
+
+
+#: rows as the engine takes them by itself
+USUAL = Rows()
+
+
 class Peak(NamedTuple):
     """One of the competing peaks of an objective.
 
     time in s (NaN where the objective is no value at one time); value: raw; gradient (N,): d value / d alpha with
     the time held fixed, None where no gradient was asked for. Where the case has variables of laws, their derivatives
     (P,) stand behind those by alpha.
+
+    shape: what the value y is of what it is formed of, and so what becomes of it with a design alpha + d at that time,
+    to first order in what it is formed of: `plain` y + g.d; `absolute` |y + g.d|; `norm` sqrt((y + g.d)^2 + (p.d)^2),
+    where p is `across` (N,): the derivative of the component perpendicular to the vector, a quarter turn ahead of it
+    (in the frame in which the vector is formed), with the direction held. None where it was not asked for; zero where
+    the vector is.
     """
 
     time: float
     value: float
     gradient: FloatArray | None
+    across: FloatArray | None = None
+    shape: Shape = "plain"
 
 
 class Evaluation(NamedTuple):

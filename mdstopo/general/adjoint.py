@@ -15,7 +15,16 @@ from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.parameters import add_event, add_times
-from mdstopo.general.responses import ENERGY, MEMBER_FORCE, kinked, largest_force, response, value_at
+from mdstopo.general.responses import (
+    ENERGY,
+    MEMBER_FORCE,
+    across_rate,
+    across_slopes,
+    kinked,
+    largest_force,
+    response,
+    value_at,
+)
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
 from mdstopo.jit import kernel
@@ -76,27 +85,32 @@ def sweep(  # type: ignore[no-untyped-def]
     bar_set, drops as of `through_events`; looked, square: j and square of `parameters.add_times`.
     """
     n = lam_q.shape[0]
-    z = np.empty((17, n))
+    z = np.empty((1, 17, n))
     y = np.empty(model.size[0])
-    lam_x = np.zeros((2, n))
+    lam_x = np.zeros((1, 2, n))
+    fraction = np.empty(1)
+    fraction[0] = c
     spread = bars.shape[0] > 0
     while w >= 0:
         o = track.index[w, 0]
         end = track.index[w + 1, 0]
         b = bars[o:end] if spread else bars
         r = rows_bar[o:end] if spread else rows_bar
-        step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, b, r, z, y, desk, work)
+        step_back(
+            tag, model, tables, track, w, fraction, lam_q.reshape((1, n)), lam_v.reshape((1, n)), lam_x, b, r, z, y,
+            desk, work,
+        )  # fmt: skip
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
-        add_designs(model, segment, track, o, strength, z[: end - o], out, work)
+        add_designs(model, segment, track, o, strength, z[0, : end - o], out, work)
         if bar_set.shape[0] > 0:
             for j in range(end - o):
                 stage = track.stage[o + j]
-                add_sets(model, segment, strength, stage[0], stage[1], z[j], 0.0, bar_set)
+                add_sets(model, segment, strength, stage[0], stage[1], z[0, j], 0.0, bar_set)
                 if spread:
                     for i in range(bar_set.shape[0]):
                         bar_set[i] += sets_bar[o + j, i]
-        c = 1.0
+        fraction[0] = 1.0
         before = track.index[w, 1]
         if model.varied.shape[0] > 0:
             add_times(model, track, strength, count, before + 1, looked, square, lam_v, 0.0, out)
@@ -106,32 +120,14 @@ def sweep(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, out, work):  # type: ignore[no-untyped-def]
-    """out (M_padded,) = derivative of one row of `extremes` (or a final value) by alpha^mu.
-
-    start (n,), or no length: the cotangent of the start's positions comes out.
-    """
-    n = model.mass.shape[0]
-    bars = np.empty((3, n))
-    none = np.empty((0, 3, n))
-    no_rows = np.empty((0, model.size[0]))
-    bar_set = np.zeros(count_sets(model))
-    w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, out, work)
-    if w >= 0:
-        no_drops = np.empty(0)
-        sweep(
-            tag, model, tables, strength, track, count, w, c, bars[0], bars[1], bar_set, none, no_rows, no_rows,
-            no_drops, np.int64(-1), np.bool_(False), desk, out, work,
-        )  # fmt: skip
-    keep_start(model, track, bars[0], bar_set, start, out)
-
-
-@kernel
-def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, out, work):  # type: ignore[no-untyped-def]
+def row_cotangents(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work
+):
     """What a row pulls on the state where it is read: bars (3, n), q and v (a is used up); and on the members there.
 
-    Returns the step (-1: the start) and its fraction to which the cotangents belong; out (M_padded,) and bar_set
-    (slots,) are set.
+    across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector pulls,
+    the direction held. Returns the step (-1: the start) and its fraction to which the cotangents belong; out
+    (M_padded,) and bar_set (slots,) are set.
     """
     n = model.mass.shape[0]
     n_row = model.size[0]
@@ -155,10 +151,17 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
         w = point_of(tag, model, tables, strength, track, count, k, c, np.bool_(True), desk, q, v, work)
     t = track.t[k] + c * (track.t[k + 1] - track.t[k])
     restore_modes(track, track.index[k, 3], strength)
+    rate = row[4]
+    if across:
+        at_end = c <= 0.0 or c >= 1.0  # elsewhere nobody asks
+        rate = across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam) if at_end else 0.0
     balance(model, strength, segment, t, q, v, np.bool_(True), desk, a, lam)
     work[FORCES] += 1
     who = int(row[6])
-    response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    if across:
+        across_slopes(model, j, q, v, a, lam, bars, row_bar)
+    else:
+        response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
     if bar_set.shape[0] > 0:
         bar_set[:] = 0.0
         add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
@@ -178,19 +181,19 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bar
     if model.varied.shape[0] > 0 and (c <= 0.0 or c >= 1.0):
         # what lies behind the state does nothing to a value before it
         behind = bars[1] if c <= 0.0 or at == count else np.zeros(n)
-        add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, row[4], out)
+        add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, rate, out)
     if c <= 0.0 and k > 0:
         through_events(model, track, k, bars[0], bars[1], bar_set, np.empty(0), strength, out)
     if (c <= 0.0 and k > 0) or c >= 1.0:
         event = _first_event(track, at)
         if event >= 0:
             if model.varied.shape[0] > 0:
-                add_event(model, track, strength, event, row[4], out)
+                add_event(model, track, strength, event, rate, out)
             for d in range(n):
-                bars[0, d] -= row[4] * track.salt[event, 0, d]
-                bars[1, d] -= row[4] * track.salt[event, 1, d]
+                bars[0, d] -= rate * track.salt[event, 0, d]
+                bars[1, d] -= rate * track.salt[event, 1, d]
             if bar_set.shape[0] > 0:
-                time_back(model, track, event, row[4], bar_set)
+                time_back(model, track, event, rate, bar_set)
     return w, (c if w == k else 1.0)
 
 
@@ -209,7 +212,7 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
 def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):  # type: ignore[no-untyped-def]
     """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out.
 
-    start as of `row_gradient`.
+    start (n,), or no length: the cotangent of the start's positions comes out.
     """
     n = model.mass.shape[0]
     stages = track.index[count, 0] if gradient else 0

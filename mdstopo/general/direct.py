@@ -262,6 +262,7 @@ def push(  # type: ignore[no-untyped-def]
     integral,
     sweeps,
     row,
+    across,
     room,
     room_ints,
     strength,
@@ -304,7 +305,9 @@ def push(  # type: ignore[no-untyped-def]
         )  # fmt: skip
         drops = event_drops(model, strength, track, count, j, integral == 2, desk)
     else:
-        w, c = row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, padded, work)
+        w, c = row_cotangents(
+            tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, padded, work
+        )
         last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
     looked = j if integral > 0 else np.int64(-1)
     if model.varied.shape[0] > 0 and last >= 0 and w >= 0:
@@ -372,7 +375,9 @@ def follow(  # type: ignore[no-untyped-def]
                 tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, no_sets, desk, column, sets,
                 matrix, spare,
             )  # fmt: skip
-        row_cotangents(tag, model, tables, strength, track, count, j, row, desk, bars, bar_set, padded, work)
+        row_cotangents(
+            tag, model, tables, strength, track, count, j, row, np.bool_(False), desk, bars, bar_set, padded, work
+        )
         for i in range(padded.shape[0]):
             for d in range(n):
                 padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]

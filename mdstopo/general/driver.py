@@ -4,13 +4,14 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
+from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
 from mdstopo.general.kinks import landed
@@ -18,17 +19,22 @@ from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.ready import Ready
 from mdstopo.general.rivals import compete, members_peaks
+from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.status import Status
 
-#: peaks kept of one response
+#: peaks kept of one response, unless told otherwise
 ROWS = 6
+#: rows times members that are pulled back together at most, for the memory they take
+TOGETHER = 2**23
+#: rows of which the arrays of a call are kept for the next one
+KEPT = 32
 #: of what a reduction takes the peaks: of g, of -g, or of both
 SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
 
@@ -36,6 +42,16 @@ SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
 def load_method(name: str) -> ModuleType:
     """The compiled entries of a method for general scenes."""
     return import_module(f"mdstopo.general.{name}_entry")
+
+
+class _Block(NamedTuple):
+    """Rows that are pulled back together: what `row_sweep.pull_rows` takes, by its names."""
+
+    which: IndexArray
+    rows: FloatArray
+    padded: FloatArray
+    out: FloatArray
+    starts: FloatArray
 
 
 class GeneralDriver:
@@ -61,14 +77,16 @@ class GeneralDriver:
         self._values = np.zeros(0)
         self.strength = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
-        self.rows = np.zeros((count, ROWS, COLUMNS))
         self.found = np.zeros(count, dtype=np.int64)
-        self.gradients = np.zeros((count, ROWS, n_design + varied))
+        #: of every response (`evaluation.Peak`)
+        self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
         self.where = np.full(3, -1, dtype=np.int64)
         n = len(model.mass)
-        #: what `visit` is given for the end alone, and `pull` for a row
+        #: what `visit` is given for the end alone, and `pull`
         self._end = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
-        self._row, self._pulled = np.zeros(COLUMNS), np.zeros(n_design + varied)
+        self._pulled = np.zeros(n_design + varied)
+        self._blocks: dict[int, _Block] = {}
+        self._make_rows(ROWS)
         self._pulled_start = np.zeros(n if case.solver.settle else 0)
         self.events = 0
         #: where the steps of the last evaluation had to end (`landings`)
@@ -107,6 +125,13 @@ class GeneralDriver:
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self._ready = Ready()  # what was prepared with the room as it was would keep it
 
+    def _make_rows(self, most: int) -> None:
+        """Arrays for so many peaks of each response; those of cones when they are first asked for."""
+        count, length = len(self.scene.responses), len(self._pulled)
+        self.rows = np.zeros((count, most, COLUMNS))
+        self.gradients = np.zeros((count, most, length))
+        self.across: FloatArray | None = None
+
     def _fit(self) -> None:
         """Refuse joints that do not fit at the start, or move the start where the case asks for it (CaseError)."""
         model = self.scene.model
@@ -142,8 +167,12 @@ class GeneralDriver:
             self._start = q, v
             self._place()
 
-    def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
+    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> Looked:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
+        if self.rows.shape[1] != (rows.most or ROWS):
+            self._make_rows(rows.most or ROWS)
+        window = CLOSENESS if rows.window is None else rows.window
+        across = self._across() if rows.cones and gradient else None
         code, count, time = self.run(alpha, gradient)
         self.landings = []
         for _ in range(ROUNDS):
@@ -154,8 +183,18 @@ class GeneralDriver:
             code, count, time = self.run(alpha, gradient, self.landings)
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
-                self._look(j, name, count, gradient)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, int(self.where[1]), self._grazing())
+                self._look(j, name, count, gradient, window)
+            if gradient:
+                self._pull_rows(count, across)
+        grazing, meeting = self._grazing(), int(self.where[1])
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
+
+    def _across(self) -> FloatArray:
+        """(n_resp, R, N): of `evaluation.Peak.across`, zeros."""
+        if self.across is None:
+            self.across = np.zeros_like(self.gradients)
+        self.across[:] = 0.0
+        return self.across
 
     def see(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
         """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
@@ -175,12 +214,13 @@ class GeneralDriver:
                     return int(member)
         return -1
 
-    def _look(self, j: int, reduction: str, count: int, gradient: bool) -> None:
-        """Rows and gradients of response j, reduced over time."""
+    def _look(self, j: int, reduction: str, count: int, gradient: bool, window: float) -> None:
+        """Rows of response j, reduced over time; of an integral the gradient, too."""
+        most = self.rows.shape[1]
         t = self.states()[0][: count + 1]
         rows = self.rows[j]
         if reduction in INTEGRALS:
-            total = self._pull(j, rows[0], INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
+            total = self._pull(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
             value, slope = reduced(reduction, total, float(t[-1] - t[0]))
             rows[0] = np.nan, value, 0.0, 0.0, slope, 1.0, -1.0
             self.gradients[j, 0] *= slope
@@ -188,22 +228,20 @@ class GeneralDriver:
             return
 
         if compete(self.scene.model.response[j, 0], reduction):
-            found = ranked(members_peaks(self, j, t.copy(), reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
+            found = members_peaks(self, j, t.copy(), reduction == "final", window, most)
+            found = ranked(found, window, most, t[-1] - t[0])
         elif reduction == "final":
             value, rate, who = self._see_end(j, count).tolist()
             found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
         else:
             see, t = partial(self.see, j, count), t.copy()
             samples = sample(t, see)
-            found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, CLOSENESS)]
-            found = ranked(found, CLOSENESS, ROWS, t[-1] - t[0])
+            found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, window)]
+            found = ranked(found, window, most, t[-1] - t[0])
         self.found[j] = len(found)
         for r, row in enumerate(found):
             flip = row[SIGN] if reduction == "max_abs" else 1.0
             rows[r] = row
-            if gradient:
-                self._pull(j, rows[r], 0, count, True, self.gradients[j, r])
-                self.gradients[j, r] *= flip
             rows[r, VALUE] *= flip
 
     def visit(
@@ -255,17 +293,63 @@ class GeneralDriver:
         """What every entry that differentiates begins with."""
         return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
 
-    def _pull(self, j: int, row: FloatArray, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
-        self._row[:] = row
+    def _pull(self, j: int, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
+        """The integral of response j (2: of its square), and on demand its gradient into out (N + P,)."""
         total: float = self._ready(
-            "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self._row, self.room,
-            self.room_ints, self.strength, self.padded, self._pulled, self._pulled_start, self.work,
+            "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self.room, self.room_ints,
+            self.strength, self.padded, self._pulled, self._pulled_start, self.work,
         )  # fmt: skip
         if gradient:
             out[:] = self._pulled
             if self.start is not None:
                 self.start.pull(self._pulled_start, out)
         return total
+
+    def _pull_rows(self, count: int, across: FloatArray | None) -> None:
+        """The gradients of all rows that were found, and where it is wanted what is across, in one sweep."""
+        wanted = [
+            (j, r, aside)
+            for j, reduction in enumerate(self.scene.reductions)
+            if reduction not in INTEGRALS
+            for r in range(int(self.found[j]))
+            for aside in range(1 if across is None or self.shapes[j] != "norm" else 2)
+        ]
+        place = self.rows[:, :, [STEP, FRACTION]]
+        wanted.sort(key=lambda row: (-place[row[0], row[1]]).tolist())  # the latest first
+        most = max(1, TOGETHER // len(self.padded))
+        for first in range(0, len(wanted), most):
+            part = wanted[first : first + most]
+            block = self._block(len(part))
+            block.which[:] = [(j, aside) for j, _, aside in part]
+            block.rows[:] = [self.rows[j, r] for j, r, _ in part]
+            self._ready(
+                f"pull_rows {len(part)}", self.entry.pull_rows, *self.steps_arguments(count), block.which, block.rows,
+                self.room, self.room_ints, self.strength, block.padded, block.out, block.starts, self.work,
+            )  # fmt: skip
+            for (j, r, aside), own, start in zip(part, block.out, block.starts, strict=True):
+                if self.start is not None:
+                    self.start.pull(start, own)
+                if aside and across is not None:
+                    across[j, r] = own
+                else:
+                    self.gradients[j, r] = own
+                    if self.scene.reductions[j] == "max_abs":
+                        self.gradients[j, r] *= self.rows[j, r, SIGN]
+
+    def _block(self, count: int) -> "_Block":
+        """Arrays for so many rows at once; those of few rows are kept."""
+        if count not in self._blocks:
+            block = _Block(
+                np.zeros((count, 2), dtype=np.int64),
+                np.zeros((count, COLUMNS)),
+                np.zeros((count, len(self.padded))),
+                np.zeros((count, len(self._pulled))),
+                np.zeros((count, len(self._pulled_start))),
+            )
+            if count > KEPT:
+                return block
+            self._blocks[count] = block
+        return self._blocks[count]
 
     def start_from(self, q: FloatArray) -> None:
         """Take other positions q (n,) at the start."""

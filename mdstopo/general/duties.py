@@ -4,10 +4,11 @@ The tag is a tuple of zeros whose length says which method is meant.
 
 1. `point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work) -> w`: the state at fraction c of
    step k, inside it; with `keep` as an end from which the reverse sweep can start: of step w.
-2. `step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work)`: cotangents of
-   the end of step w (of its fraction c where that is below 1) pulled back to its start, in place, with explicit ones of
-   the stages; z (s, n) are the virtual displacements of the stages' balances. lam_x (2, n): what a method carries
-   from step to step beside the state.
+2. `step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work)`: R cotangents
+   lam_q, lam_v (R, n) of the end of step w (each of its fraction c (R,) where that is below 1) pulled back to its
+   start, in place, with explicit ones of the stages, which are the same for all; z (R, s, n) are the virtual
+   displacements of the stages' balances. lam_x (R, 2, n): what a method carries from step to step beside the state.
+   What a stage needs is formed once for all R.
 3. `step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk)`: changes pushed
    through step w, by fixed-point sweeps where sweeps > 0 (returns whether they settled), with forces (s, n) on its
    stages; changes (s, 3, n) and rows (s, n_row) of the stages come out.

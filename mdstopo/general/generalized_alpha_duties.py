@@ -9,11 +9,11 @@ import numpy as np
 from mdstopo.general.duties import implement
 from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_linear import stage_back, stage_forward
+from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
 from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 
 
 @kernel
@@ -64,77 +64,96 @@ def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-de
 @kernel
 def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
     """Duty 2."""
-    n = lam_q.shape[0]
+    count, n = lam_q.shape
     o = track.index[w, 0]
     last = track.index[w + 1, 0] - 1 - o
     h = track.t[w + 1] - track.t[w]
-    e1, e2, e3, beta, gamma, lag = alpha_weights(tables[0])
-    spread = bars.shape[0] > 0
-    bar_q = np.zeros(n)
-    bar_v = np.zeros(n)
-    bar_a = np.zeros(n)
-    bar_x = np.zeros(n)
-    start_q = np.zeros(n)
-    start_v = np.zeros(n)
-    work[REVERSE] += 1
-    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
-    for d in range(n):
-        start_q[d] = q0 * lam_q[d] + dq0 / h * lam_v[d]
-        start_v[d] = h * v0 * lam_q[d] + dv0 * lam_v[d]
-        bar_q[d] = q1 * lam_q[d] + dq1 / h * lam_v[d]
-        bar_v[d] = h * v1 * lam_q[d] + dv1 * lam_v[d]
+    weights = alpha_weights(tables[0])
+    bar_q = np.zeros((count, n))
+    bar_v = np.zeros((count, n))
+    bar_a = np.zeros((count, n))
+    bar_x = np.zeros((count, n))
+    start_q = np.zeros((count, n))
+    start_v = np.zeros((count, n))
+    work[REVERSE] += count
+    for m in range(count):
+        q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c[m])
+        for d in range(n):
+            start_q[m, d] = q0 * lam_q[m, d] + dq0 / h * lam_v[m, d]
+            start_v[m, d] = h * v0 * lam_q[m, d] + dv0 * lam_v[m, d]
+            bar_q[m, d] = q1 * lam_q[m, d] + dq1 / h * lam_v[m, d]
+            bar_v[m, d] = h * v1 * lam_q[m, d] + dv1 * lam_v[m, d]
     state = track.state[w + 1]
     push = track.push[w + 1]
     project_back(model, state[0], state[1], push[0], push[1], desk, bar_q, bar_v)
     for j in range(last, -1, -1):
-        x = z[j]
-        y[:] = 0.0
-        if j < last:
-            bar_q[:] = 0.0
-            bar_v[:] = 0.0
-        if spread:
-            for d in range(n):
-                bar_q[d] += bars[j, 0, d]
-                bar_v[d] += bars[j, 1, d]
-            for r in range(y.shape[0]):
-                y[r] = rows_bar[j, r]
-        for d in range(n):
-            if j == last:
-                x[d] = lam_x[0, d] + e1 * (lam_x[1, d] + h * (h * beta * bar_q[d] + gamma * bar_v[d]))
-            else:
-                x[d] = bar_a[d] if j == 0 else -bar_x[d]
-            if spread:
-                x[d] += bars[j, 2, d]
+        e1, _, _, beta, gamma, _ = weights
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
-        stage_back(model, track, o + j, w_q, w_v, desk, x, y, bar_q, bar_v)
-        for i in range(model.driven.shape[0]):
-            bar_q[model.driven[i]] = 0.0
-            bar_v[model.driven[i]] = 0.0
+        prepare_stage_back(model, track, o + j, w_q, w_v, desk)
+        for m in range(count):
+            _stage_row_back(
+                model, track, o, j, last, h, weights, bars, rows_bar, lam_x[m], z[m, j], y, bar_q[m], bar_v[m],
+                bar_a[m], bar_x[m], start_q[m], start_v[m], desk,
+            )  # fmt: skip
+    for m in range(count):
         for d in range(n):
-            start_q[d] += bar_q[d]
-            start_v[d] += bar_v[d]
-            if j == last:
-                reach_q = h * h * bar_q[d]
-                reach_v = h * bar_v[d]
-                start_v[d] += h * bar_q[d]
-                carried = lam_x[1, d] + beta * reach_q + gamma * reach_v
-                bar_a[d] = e2 * carried
-                bar_x[d] = (0.5 - beta) * reach_q + (1.0 - gamma) * reach_v - e3 * carried
-                if last == 1:
-                    bar_a[d] += bar_x[d]
-                elif last == 2:
-                    bar_a[d] += 2.0 * bar_x[d]
-            elif j == 1:
-                ahead = lag * h
-                start_v[d] += ahead * bar_q[d]
-                bar_a[d] += ahead * (0.5 * ahead * bar_q[d] + bar_v[d])
+            free = model.free[d] != 0
+            lam_q[m, d] = start_q[m, d] if free else 0.0
+            lam_v[m, d] = start_v[m, d] if free else 0.0
+            lam_x[m, 0, d] = bar_a[m, d] if last == 0 and free else 0.0
+            lam_x[m, 1, d] = bar_x[m, d] if last == 0 and free else 0.0
+
+
+@part
+def _stage_row_back(  # type: ignore[no-untyped-def]
+    model, track, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q, start_v,
+    desk,
+):  # fmt: skip
+    """Stage j of `step_back`, which is prepared, for one row: x (n,) = its virtual displacement; the bars (n,) are of
+    what is being pulled back, start_q, start_v of the start of the step."""
+    n = x.shape[0]
+    e1, e2, e3, beta, gamma, lag = weights
+    y[:] = 0.0
+    if j < last:
+        bar_q[:] = 0.0
+        bar_v[:] = 0.0
+    spread = bars.shape[0] > 0
+    if spread:
+        for d in range(n):
+            bar_q[d] += bars[j, 0, d]
+            bar_v[d] += bars[j, 1, d]
+        for r in range(y.shape[0]):
+            y[r] = rows_bar[j, r]
     for d in range(n):
-        free = model.free[d] != 0
-        lam_q[d] = start_q[d] if free else 0.0
-        lam_v[d] = start_v[d] if free else 0.0
-        lam_x[0, d] = bar_a[d] if last == 0 and free else 0.0
-        lam_x[1, d] = bar_x[d] if last == 0 and free else 0.0
+        if j == last:
+            x[d] = lam_x[0, d] + e1 * (lam_x[1, d] + h * (h * beta * bar_q[d] + gamma * bar_v[d]))
+        else:
+            x[d] = bar_a[d] if j == 0 else -bar_x[d]
+        if spread:
+            x[d] += bars[j, 2, d]
+    stage_back(model, track, o + j, desk, x, y, bar_q, bar_v)
+    for i in range(model.driven.shape[0]):
+        bar_q[model.driven[i]] = 0.0
+        bar_v[model.driven[i]] = 0.0
+    for d in range(n):
+        start_q[d] += bar_q[d]
+        start_v[d] += bar_v[d]
+        if j == last:
+            reach_q = h * h * bar_q[d]
+            reach_v = h * bar_v[d]
+            start_v[d] += h * bar_q[d]
+            carried = lam_x[1, d] + beta * reach_q + gamma * reach_v
+            bar_a[d] = e2 * carried
+            bar_x[d] = (0.5 - beta) * reach_q + (1.0 - gamma) * reach_v - e3 * carried
+            if last == 1:
+                bar_a[d] += bar_x[d]
+            elif last == 2:
+                bar_a[d] += 2.0 * bar_x[d]
+        elif j == 1:
+            ahead = lag * h
+            start_v[d] += ahead * bar_q[d]
+            bar_a[d] += ahead * (0.5 * ahead * bar_q[d] + bar_v[d])
 
 
 @kernel

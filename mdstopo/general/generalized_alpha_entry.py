@@ -4,6 +4,7 @@ import mdstopo.general.generalized_alpha_duties  # noqa: F401  (enters the metho
 from mdstopo.general.direct import follow, push
 from mdstopo.general.generalized_alpha import TAG, simulate
 from mdstopo.general.look import pull
+from mdstopo.general.row_sweep import pull_rows
 from mdstopo.general.visit import compare, visit
 
-__all__ = ["TAG", "compare", "follow", "pull", "push", "simulate", "visit"]
+__all__ = ["TAG", "compare", "follow", "pull", "pull_rows", "push", "simulate", "visit"]

@@ -1,6 +1,6 @@
-"""What Python calls for the gradients of a general scene's objectives, by the adjoint sweep."""
+"""What Python calls for integrals over time and their gradients, by the adjoint sweep; rows: `row_sweep`."""
 
-from mdstopo.general.adjoint import integral_gradient, row_gradient
+from mdstopo.general.adjoint import integral_gradient
 from mdstopo.general.balance import make_desk
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
@@ -20,7 +20,6 @@ def pull(  # type: ignore[no-untyped-def]
     j,
     integral,
     gradient,
-    row,
     room,
     room_ints,
     strength,
@@ -29,21 +28,16 @@ def pull(  # type: ignore[no-untyped-def]
     start,
     work,
 ):
-    """out (N,) = the derivative of one row of `extremes` by alpha (N,).
+    """The integral over time of response j, or where integral is 2 of its square; on demand its derivative by alpha.
 
-    integral 1 (2): of the integral over time of response j (of its square), which is returned. Room: padded
-    (M_padded,). start: as of `adjoint.row_gradient`.
+    out (N + P,); padded (M_padded + P,): room. start: as of `adjoint.integral_gradient`.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
     desk = make_desk(model)
-    total = 0.0
-    if integral > 0:
-        total = integral_gradient(
-            tag, model, tables, strength, track, count, j, integral == 2, gradient, desk, start, padded, work
-        )
-    elif gradient:
-        row_gradient(tag, model, tables, strength, track, count, j, row, desk, start, padded, work)
+    total = integral_gradient(
+        tag, model, tables, strength, track, count, j, integral == 2, gradient, desk, start, padded, work
+    )
     if gradient:
         unscale_general(model.block, model.power, alpha, padded, out)
     return total

@@ -20,9 +20,14 @@ if TYPE_CHECKING:
 SWEEPS = 200
 
 
-def differentiate(driver: "GeneralDriver", method: str, alpha: FloatArray, looked: Looked) -> tuple[FloatArray, str]:
+def differentiate(
+    driver: "GeneralDriver", method: str, alpha: FloatArray, looked: Looked, across: FloatArray | None = None
+) -> tuple[FloatArray, str]:
     """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by direct, iterative or
-    constant_load; and what the user should know although it worked."""
+    constant_load; and what the user should know although it worked.
+
+    across (n_resp, R, N): is filled, but not by constant_load (`evaluation.Peak.across`).
+    """
     gradients, message = np.zeros_like(looked.gradients), ""
     rows = looked.rows.copy()
     before = driver.work.copy()
@@ -35,13 +40,17 @@ def differentiate(driver: "GeneralDriver", method: str, alpha: FloatArray, looke
                 gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
                 continue
             sweeps = SWEEPS if method == "iterative" else 0
-            stopped = driver.entry.push(
-                *driver.steps_arguments(count), j, integral, sweeps, rows[j, r], driver.room, driver.room_ints,
-                driver.strength, driver.padded, gradients[j, r], driver.start_slopes(), driver.work,
-            )  # fmt: skip
-            if stopped >= 0:
-                message = FALLBACK.format(float(driver.states()[0][stopped]))
-                return differentiate(driver, "direct", alpha, looked)[0], message
+            asked = [(False, gradients[j, r])]
+            if across is not None and driver.shapes[j] == "norm":
+                asked.append((True, across[j, r]))
+            for which, out in asked:
+                stopped = driver.entry.push(
+                    *driver.steps_arguments(count), j, integral, sweeps, rows[j, r], which, driver.room,
+                    driver.room_ints, driver.strength, driver.padded, out, driver.start_slopes(), driver.work,
+                )  # fmt: skip
+                if stopped >= 0:
+                    message = FALLBACK.format(float(driver.states()[0][stopped]))
+                    return differentiate(driver, "direct", alpha, looked, across)[0], message
             if integral:
                 gradients[j, r] *= rows[j, r, RATE]
             elif reduction == "max_abs":

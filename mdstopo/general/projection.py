@@ -164,8 +164,9 @@ def swept(model, desk, h, x, y):  # type: ignore[no-untyped-def]
 
 @kernel
 def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-untyped-def]
-    """Pull cotangents of the projected state q, v back to the one before; bar_q, bar_v (n,) in place."""
+    """Pull cotangents of the projected state q, v back to the one before; bar_q, bar_v (R, n) in place."""
     n = q.shape[0]
+    count = bar_q.shape[0]
     if mu.shape[0] == 0:
         return
     n_pair = model.pair.shape[0]
@@ -179,24 +180,34 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-un
     turn_bodies(q, desk.turned)
     joint_state(model, q, v, desk)
     _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
-    factor_matrix(model, desk, none, none, bar_q, none, 0.0, 0.0, np.bool_(True))
-    solve_unknowns(model, desk, bar_v, y)
-    pull_matrices(model.pair, h_nu, bar_v, bar_q)
-    for j in range(model.joint.shape[0]):
-        for r in range(3):
-            own = model.row[j, r]
-            if own >= 0:
-                for i in range(6):
-                    bar_q[3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
-    y[:] = 0.0
-    if not swept(model, desk, h_mu, bar_q, y):
+    factor_matrix(model, desk, none, none, bar_q[0], none, 0.0, 0.0, np.bool_(True))
+    left = 0
+    unsettled = np.empty(count, np.int64)
+    for m in range(count):
+        y[:] = 0.0
+        solve_unknowns(model, desk, bar_v[m], y)
+        pull_matrices(model.pair, h_nu, bar_v[m], bar_q[m])
+        for j in range(model.joint.shape[0]):
+            for r in range(3):
+                own = model.row[j, r]
+                if own >= 0:
+                    for i in range(6):
+                        bar_q[m, 3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
+        y[:] = 0.0
+        if not swept(model, desk, h_mu, bar_q[m], y):
+            unsettled[left] = m
+            left += 1
+    if left > 0:
         desk.by_q[:] = 0.0
         desk.by_v[:] = 0.0
         factor_matrix(model, desk, h_mu, none, np.zeros(n), none, 1.0, 0.0, np.bool_(True))
-        solve_unknowns(model, desk, bar_q, y)
-    for d in range(n):
-        bar_q[d] *= model.mass[d]
-        bar_v[d] *= model.mass[d]
+        for i in range(left):
+            y[:] = 0.0
+            solve_unknowns(model, desk, bar_q[unsettled[i]], y)
+    for m in range(count):
+        for d in range(n):
+            bar_q[m, d] *= model.mass[d]
+            bar_v[m, d] *= model.mass[d]
 
 
 @kernel

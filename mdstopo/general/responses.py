@@ -14,9 +14,11 @@ from mdstopo.general.model import INERTER
 from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import add_pair_force
 from mdstopo.mechanics.joints.revolute import PLACES, turn
-from mdstopo.mechanics.joints.table import joint_transmitted
+from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
+from mdstopo.mechanics.joints.table import FIXED, REVOLUTE, joint_transmitted
 from mdstopo.mechanics.laws.table import law
-from mdstopo.responses.kinematics import angle_response, point_response
+from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
+from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
 
 #: kinds, column KIND of `GeneralModel.response`
 ENERGY, POINT, ANGLE, MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT = range(6)
@@ -32,8 +34,6 @@ KINDS = {
     "joint_force": (JOINT_FORCE, 0),
     "joint_moment": (JOINT_MOMENT, 1),
 }
-#: component of a point's motion that is a norm
-NORM = 2
 #: fraction of a step by which the rate of a response is differenced where it has no formula
 APART = 3e-4
 
@@ -116,25 +116,7 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
             add_pair_force(model.pair, desk.rel, p, o[4], o[5], o[6], bars[0])
         return value
     if kind in (POINT, ANGLE):
-        slope = np.empty((6, 3))
-        b = 3 * model.response[j, 1]
-        r = 3 * model.response[j, 2]
-        par = model.response_par[j]
-        order = model.response[j, 4]
-        if kind == POINT:
-            value = point_response(
-                order, model.response[j, 3], par[0:2], par[2:4], q[b : b + 3], v[b : b + 3], a[b : b + 3],
-                q[r : r + 3], v[r : r + 3], a[r : r + 3], slope,
-            )  # fmt: skip
-        else:
-            value = angle_response(
-                order, q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3], v[r : r + 3], a[r : r + 3], slope
-            )
-        for i in range(3):
-            for c in range(3):
-                bars[i, b + c] += slope[i, c]
-                bars[i, r + c] += slope[3 + i, c]
-        return value
+        return _motion(model, j, model.response[j, 3], q, v, a, bars)
     if kind == MEMBER_FORCE:
         slopes = np.empty((3, 6))
         own = np.empty((2, 6))
@@ -148,6 +130,36 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
         if inertial:
             _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars)
         return sign * f
+    return _transmitted(model, j, model.response[j, 4], q, lam, bars, row_bar)
+
+
+@kernel
+def _motion(model, j, component, q, v, a, bars):  # type: ignore[no-untyped-def]
+    """A component of a point's motion (or an angle's) that response j looks at; its slopes are added to bars (3, n)."""
+    slope = np.empty((6, 3))
+    b = 3 * model.response[j, 1]
+    r = 3 * model.response[j, 2]
+    par = model.response_par[j]
+    order = model.response[j, 4]
+    if model.response[j, 0] == POINT:
+        value = point_response(
+            order, component, par[0:2], par[2:4], q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3],
+            v[r : r + 3], a[r : r + 3], slope,
+        )  # fmt: skip
+    else:
+        value = angle_response(
+            order, q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3], v[r : r + 3], a[r : r + 3], slope
+        )
+    for i in range(3):
+        for c in range(3):
+            bars[i, b + c] += slope[i, c]
+            bars[i, r + c] += slope[3 + i, c]
+    return value
+
+
+@kernel
+def _transmitted(model, j, which, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+    """What the joint transmits that response j looks at (`joint_transmitted`); slopes as of `response`."""
     joint = model.response[j, 5]
     w = np.empty(PLACES)
     mine = np.empty(3)
@@ -156,15 +168,79 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
     gather(model, joint, q, w)
     turn(w)
     gather_multipliers(model, joint, lam, mine)
-    value = joint_transmitted(
-        model.joint[joint, 0], model.joint_par[joint], w, mine, model.response[j, 4], by_lam, by_q
-    )
+    value = joint_transmitted(model.joint[joint, 0], model.joint_par[joint], w, mine, which, by_lam, by_q)
     for r in range(3):
         if model.row[joint, r] >= 0:
             row_bar[model.row[joint, r]] = by_lam[r]
     for c in range(6):
         bars[0, 3 * model.joint[joint, 1 + c // 3] + c % 3] += by_q[c]
     return value
+
+
+@kernel
+def is_norm(model, j):  # type: ignore[no-untyped-def]
+    """Whether response j is the Euclidean norm of a vector (2,), which has a direction of its own."""
+    kind = model.response[j, 0]
+    if kind == JOINT_FORCE:
+        return model.joint[model.response[j, 5], 0] in (REVOLUTE, FIXED)
+    return kind == POINT and model.response[j, 3] == NORM
+
+
+@kernel
+def across_slopes(model, j, q, v, a, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+    """Slopes of the component perpendicular to the vector whose norm response j is (`is_norm`), its direction held.
+
+    bars (3, n), row_bar (n_row,): as of `response`; zero where the vector is.
+    """
+    bars[:] = 0.0
+    row_bar[:] = 0.0
+    if model.response[j, 0] == POINT:
+        _motion(model, j, ACROSS_MOTION, q, v, a, bars)
+    else:
+        _transmitted(model, j, ACROSS_FORCE, q, lam, bars, row_bar)
+
+
+@kernel
+def _vector(model, j, q, v, a, lam, out):  # type: ignore[no-untyped-def]
+    """out (2,) = the vector whose norm response j is, in the frame in which it is formed."""
+    if model.response[j, 0] == POINT:
+        spare = np.zeros((3, q.shape[0]))
+        out[0] = _motion(model, j, X, q, v, a, spare)
+        out[1] = _motion(model, j, Y, q, v, a, spare)
+        return
+    mine = np.empty(3)
+    gather_multipliers(model, model.response[j, 5], lam, mine)
+    out[0] = mine[0]
+    out[1] = mine[1]
+
+
+@kernel
+def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):  # type: ignore[no-untyped-def]
+    """Rate in time, at a state of step k, of the component of `across_slopes`; differenced as `rated` does.
+
+    a (n,), lam (n_row,) and the desk are used up.
+    """
+    n = q.shape[0]
+    segment = track.index[k, 2]
+    no = np.bool_(False)
+    near = np.empty((3, n))
+    vector = np.empty(2)
+    aside = np.empty((2, 2))
+    balance(model, strength, segment, t, q, v, no, desk, a, lam)
+    _vector(model, j, q, v, a, lam, vector)
+    size = np.hypot(vector[0], vector[1])
+    if size == 0.0:
+        return 0.0
+    here = a.copy()
+    apart = APART * (track.t[k + 1] - track.t[k])
+    for side in range(2):
+        e = apart if side == 1 else -apart
+        beside(tag, track, k, c, e, q, v, here, near[0], near[1])
+        balance(model, strength, segment, t + e, near[0], near[1], no, desk, near[2], lam)
+        _vector(model, j, near[0], near[1], near[2], lam, aside[side])
+    x = aside[1, 0] - aside[0, 0]
+    y = aside[1, 1] - aside[0, 1]
+    return (vector[0] * y - vector[1] * x) / (2.0 * apart * size)
 
 
 @kernel

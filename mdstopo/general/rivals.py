@@ -11,13 +11,12 @@ import numpy as np
 from mdstopo.general.extremes import FRACTIONS, Samples, peaks
 from mdstopo.general.model import COUNT, GROUP, OFFSET
 from mdstopo.general.responses import MEMBER_FORCE
-from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
 
-#: members that are followed at most
+#: members that are followed at most, unless more rows than these are asked for
 RIVALS = 12
 
 
@@ -26,10 +25,12 @@ def compete(kind: int, reduction: str) -> bool:
     return kind == MEMBER_FORCE and reduction in ("max", "max_abs", "final")
 
 
-def members_peaks(driver: "GeneralDriver", j: int, t: FloatArray, final: bool) -> list[FloatArray]:
+def members_peaks(
+    driver: "GeneralDriver", j: int, t: FloatArray, final: bool, window: float, most: int
+) -> list[FloatArray]:
     """The peaks of the members' forces that response j looks at, as rows of `extremes`; t (m + 1,): the steps' times.
 
-    final: their values at the end instead.
+    final: their values at the end instead. window, most: as of `evaluation.Rows`.
     """
     count = len(t) - 1
     if final:
@@ -39,8 +40,8 @@ def members_peaks(driver: "GeneralDriver", j: int, t: FloatArray, final: bool) -
         places[:, 0] = np.repeat(np.arange(count), len(FRACTIONS))
         places[:, 1] = np.tile(FRACTIONS, count)
     top, _ = _compare(driver, j, places, np.zeros(0, dtype=np.int64), count)
-    near = np.flatnonzero(top >= (1.0 - CLOSENESS) * top.max())
-    who = np.sort(near[np.argsort(-top[near], kind="stable")[:RIVALS]])
+    near = np.flatnonzero(top >= (1.0 - window) * top.max())
+    who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(RIVALS, most)]])
     if final:
         seen = [driver.visit(j, places, True, count, who=int(i))[2][0] for i in who]
         return [np.array([t[-1], s[0], count - 1.0, 1.0, s[1], 1.0, i]) for s, i in zip(seen, who, strict=True)]
@@ -53,7 +54,7 @@ def members_peaks(driver: "GeneralDriver", j: int, t: FloatArray, final: bool) -
         def see(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
             return driver.visit(j, places, exact, count, who=who)[2]
 
-        rows += peaks(samples, see, 1.0, CLOSENESS)
+        rows += peaks(samples, see, 1.0, window)
     return rows
 
 

@@ -19,7 +19,7 @@ from mdstopo.general.switches import DAMPED
 from mdstopo.general.track import has_factors, mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel
+from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import copy_rows
 
 #: change of a sweep of the iterative method, relative, at which it has settled
@@ -64,66 +64,96 @@ def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):  # type: i
 
 
 @kernel
-def stage_back(model, track, o, w_q, w_v, desk, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+def prepare_stage_back(model, track, o, w_q, w_v, desk):  # type: ignore[no-untyped-def]
+    """Put what `stage_back` needs of stage o on the desk: once for any number of rows."""
+    if has_factors(track):
+        copy_rows(track.turned[o], desk.turned)
+        return
+    k, c = lay_out(model, track, o, desk)
+    factor_matrix(model, desk, k, c, track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(True))
+
+
+@kernel
+def stage_back(model, track, o, desk, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
     """From what pulls on a stage's accelerations and multipliers, z (n,) and y (n_row,), to the virtual displacement of
     its balance, in place; and what that pulls on the stage's state, added to bar_q, bar_v (n,).
+
+    The stage is the one that was prepared last.
     """
     if has_factors(track):
         stage = track.stage[o]
-        copy_rows(track.turned[o], desk.turned)
-        solve_stage(model, track, o, w_q, w_v, np.bool_(True), desk, z, y)
+        solve_joints(model, desk.inverse, track.pull[o], track.gram[o], track.diagonal[o], desk.x, z, y)
         pull_carried(model, desk, track.K[o], track.C[o], track.turn[o], z, bar_q, bar_v)
         pull_joints(model, desk, stage[0], stage[1], stage[2], track.lam[o], z, y, bar_q, bar_v)
         return
-    k, c = lay_out(model, track, o, desk)
-    solve_stage(model, track, o, w_q, w_v, np.bool_(True), desk, z, y)
-    pull_back(model, desk, k, c, track.turn[o], z, y, bar_q, bar_v)
+    solve_unknowns(model, desk, z, y)
+    pull_back(model, desk, track.K[o], track.C[o], track.turn[o], z, y, bar_q, bar_v)
 
 
 @kernel
 def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work):  # type: ignore[no-untyped-def]
-    """Pull cotangents lam_q, lam_v (n,) of the end of step w back to its start, in place.
+    """Pull cotangents lam_q, lam_v (R, n) of the end of step w back to its start, in place.
 
-    bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of each stage's q, v, a and lam (no rows: none). Out: z
-    (s, n), the virtual displacement of each stage's balance.
+    bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of each stage's q, v, a and lam, the same for all (no rows:
+    none). Out: z (R, s, n), the virtual displacement of each stage's balance.
     """
-    n = lam_q.shape[0]
+    count, n = lam_q.shape
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     table = tables[method]
     o = track.index[w, 0]
     h = track.t[w + 1] - track.t[w]
-    work[REVERSE] += 1
+    work[REVERSE] += count
     state = track.state[w + 1]
     push = track.push[w + 1]
     project_back(model, state[0], state[1], push[0], push[1], desk, lam_q, lam_v)
-    spread = bars.shape[0] > 0
-    u = np.zeros((s, n))
-    g = np.zeros((s, n))
+    u = np.zeros((count, s, n))
+    g = np.zeros((count, s, n))
     for back in range(s):
         j = s - 1 - back
-        y[:] = 0.0
-        by_end = h * h * table[2, 1, j]
-        by_end_rate = h * table[2, 2, j]
-        for d in range(n):
-            z[j, d] = by_end * lam_q[d] + by_end_rate * lam_v[d]
-        for i in range(j + 1, s):
-            by_stage = h * h * table[0, i, j]
-            by_rate = h * table[1, i, j]
-            if by_stage != 0.0 or by_rate != 0.0:
-                for d in range(n):
-                    z[j, d] += by_stage * u[i, d] + by_rate * g[i, d]
-        if spread:
+        prepare_stage_back(model, track, o + j, 0.0, 0.0, desk)
+        for m in range(count):
+            _explicit_stage_back(
+                model, table, track, o, j, h, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m], desk
+            )
+    for m in range(count):
+        _gather_start(model, table, s, h, u[m], g[m], lam_q[m], lam_v[m])
+
+
+@part
+def _explicit_stage_back(  # type: ignore[no-untyped-def]
+    model, table, track, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, desk
+):
+    """Stage j of `explicit_back`, which is prepared, for one row: z[j], and what pulls on its q and v, u[j], g[j]."""
+    s, n = u.shape
+    y[:] = 0.0
+    by_end = h * h * table[2, 1, j]
+    by_end_rate = h * table[2, 2, j]
+    for d in range(n):
+        z[j, d] = by_end * lam_q[d] + by_end_rate * lam_v[d]
+    for i in range(j + 1, s):
+        by_stage = h * h * table[0, i, j]
+        by_rate = h * table[1, i, j]
+        if by_stage != 0.0 or by_rate != 0.0:
             for d in range(n):
-                z[j, d] += bars[j, 2, d]
-                u[j, d] = bars[j, 0, d]
-                g[j, d] = bars[j, 1, d]
-            for r in range(y.shape[0]):
-                y[r] = rows_bar[j, r]
-        stage_back(model, track, o + j, 0.0, 0.0, desk, z[j], y, u[j], g[j])
-        for i in range(model.driven.shape[0]):
-            u[j, model.driven[i]] = 0.0
-            g[j, model.driven[i]] = 0.0
+                z[j, d] += by_stage * u[i, d] + by_rate * g[i, d]
+    if bars.shape[0] > 0:
+        for d in range(n):
+            z[j, d] += bars[j, 2, d]
+            u[j, d] = bars[j, 0, d]
+            g[j, d] = bars[j, 1, d]
+        for r in range(y.shape[0]):
+            y[r] = rows_bar[j, r]
+    stage_back(model, track, o + j, desk, z[j], y, u[j], g[j])
+    for i in range(model.driven.shape[0]):
+        u[j, model.driven[i]] = 0.0
+        g[j, model.driven[i]] = 0.0
+
+
+@part
+def _gather_start(model, table, s, h, u, g, lam_q, lam_v):  # type: ignore[no-untyped-def]
+    """lam_q, lam_v (n,) of one row, in place: from the end of a step to its start, with what pulls on the stages."""
+    n = lam_q.shape[0]
     for d in range(n):
         lam_v[d] += h * lam_q[d]
     for i in range(s):

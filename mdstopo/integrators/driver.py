@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mdstopo.case.memory import holds_steps
+from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.mechanics.carrying import ROOMY
 from mdstopo.scene.compile import Scene
@@ -44,7 +45,8 @@ class Looked(NamedTuple):
     """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
 
     rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
-    meeting: padded index of a member whose ends meet, or -1. grazing: of one that leaves no derivative, or -1.
+    meeting: padded index of a member whose ends meet, or -1. grazing: of one that leaves no derivative, or -1. across:
+    as gradients, of `evaluation.Peak.across`, where it was asked for; rows of responses without one are zero.
     """
 
     status: Status
@@ -54,6 +56,7 @@ class Looked(NamedTuple):
     gradients: FloatArray
     meeting: int
     grazing: int = -1
+    across: FloatArray | None = None
 
 
 class Driver:
@@ -87,12 +90,13 @@ class Driver:
         padded = scene.model.member.shape[1]
         count = len(reductions)
         self._alpha = alpha  # one array for all designs: a read-only one would be another type
+        #: how the values come from what they are formed of (`evaluation.Peak`)
+        self.shapes: tuple[Shape, ...] = tuple("plain" for _ in reductions)
         self.strength = aligned((ROOMY, padded))
-        self.padded = np.zeros((ROWS, padded))
-        self.rows = np.zeros((count, ROWS, 4))
         self.found = np.zeros(count, dtype=np.int64)
-        self.gradients = np.zeros((count, ROWS, len(alpha)))
         self.meeting = np.zeros(2, dtype=np.int64)
+        self._width = padded
+        self._make_rows(ROWS)
         self._make_room(method.steps, method.stages)
 
     @property
@@ -118,6 +122,14 @@ class Driver:
         room = self.limits, self.room, self.room_ints, self.strength
         self.entry.dense.compile(*self._dense_arguments(0, *room))
 
+    def _make_rows(self, most: int) -> None:
+        """Arrays for so many peaks of each objective."""
+        count = len(self.reductions)
+        self.padded = np.zeros((most, self._width))
+        self.rows = np.zeros((count, most, 4))
+        self.gradients = np.zeros((count, most, len(self._alpha)))
+        self._look: dict[bool, Callable[..., Any]] = {}
+
     def _make_room(self, steps: int, stages: int) -> None:
         n, n_pair, damped, turning = self._shape
         floats, ints = room_for(n, n_pair, steps, stages, damped, turning)
@@ -126,10 +138,16 @@ class Driver:
         self.room_ints = np.zeros(ints, dtype=np.int64)
         # prepared calls with this room: `simulate` by whether tangents are wanted, `look` by whether gradients are
         self._simulate: dict[bool, Callable[..., Any]] = {}
-        self._look: dict[bool, Callable[..., Any]] = {}
+        self._look = {}
 
-    def evaluate(self, alpha: FloatArray, gradient: bool) -> Looked:
-        """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call."""
+    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> Looked:
+        """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call.
+
+        Energies are no norms: `rows.cones` asks for nothing.
+        """
+        self.settings[3] = CLOSENESS if rows.window is None else rows.window
+        if self.rows.shape[1] != (rows.most or ROWS):
+            self._make_rows(rows.most or ROWS)
         code, count, time = self.run(alpha, gradient)
         if code == OK:
             self._look_at(count, gradient)

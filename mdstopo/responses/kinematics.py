@@ -13,7 +13,8 @@ import math
 
 from mdstopo.jit import kernel
 
-X, Y, NORM = range(3)
+#: ACROSS: the component perpendicular to the vector as it is, whose own value is 0
+X, Y, NORM, ACROSS = range(4)
 DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
 
 
@@ -32,7 +33,10 @@ def point_start(s, qb, qr, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def point_response(order, component, s, start, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
-    """The response; slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r. The norm's slope is zero where the norm is."""
+    """The response; slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r. The norm's slope is zero where the norm is.
+
+    With ACROSS the norm comes back with the slopes of the component perpendicular to the vector, a quarter turn ahead.
+    """
     cb = math.cos(qb[2])
     sb = math.sin(qb[2])
     ca = math.cos(qr[2])
@@ -75,6 +79,8 @@ def point_response(order, component, s, start, qb, vb, ab, qr, vr, ar, slope):  
         value = math.sqrt(gx * gx + gy * gy)
         ex = gx / value if value > 0.0 else 0.0
         ey = gy / value if value > 0.0 else 0.0
+        if component == ACROSS:
+            ex, ey = -ey, ex
     # in global axes: dg = e . dy, and r's own turning turns y against its axes
     nx = ca * ex - sa * ey
     ny = sa * ex + ca * ey

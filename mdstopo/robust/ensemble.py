@@ -13,7 +13,7 @@ from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.uncertain import Measure
 from mdstopo.engine import Evaluator
 from mdstopo.error_estimate import ErrorEstimate
-from mdstopo.evaluation import Evaluation, FloatArray, Peak
+from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
 from mdstopo.optimizer.structure import competes, sign_of
 from mdstopo.robust.measures import rows, slopes
@@ -71,10 +71,13 @@ class Ensemble(Evaluator):
 
     # -- what a run asks
 
-    def evaluate(self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None) -> Evaluation:
+    def evaluate(
+        self, alpha: FloatArray, gradient: bool = True, sensitivity: str | None = None, rows: Rows = USUAL
+    ) -> Evaluation:
         """The measures of all objectives and constraints at a design alpha (N,), and on demand their gradients.
 
-        A point that cannot be computed fails the evaluation; the message names it and its values.
+        A point that cannot be computed fails the evaluation; the message names it and its values. Rows of a measure are
+        what the measure makes of the points' usual ones, and no norms: `rows` changes nothing.
         """
         design = self._design.take(alpha)
         wanted = [*([NOMINAL] if self._nominal_too else []), *self._wanted]

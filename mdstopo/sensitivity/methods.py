@@ -25,11 +25,15 @@ FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; 
 
 @dataclass(frozen=True)
 class Differentiated:
-    """gradients (n_obj, R, N) of the rows; message: what the user should know although it worked, or empty."""
+    """gradients (n_obj, R, N) of the rows; message: what the user should know although it worked, or empty.
+
+    across: as gradients, of `evaluation.Peak.across`, or None.
+    """
 
     status: Status
     message: str
     gradients: FloatArray
+    across: FloatArray | None = None
 
 
 def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: "Looked") -> Differentiated:

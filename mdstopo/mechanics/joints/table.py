@@ -45,6 +45,8 @@ REVOLUTE, PRISMATIC, FIXED, DISTANCE = range(4)
 CODES = {"revolute": REVOLUTE, "prismatic": PRISMATIC, "fixed": FIXED, "distance": DISTANCE}
 ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
 WIDTH = 12
+#: what a joint transmits (`joint_transmitted`)
+FORCE, MOMENT, ACROSS = range(3)
 #: slopes of Phi, by row, that are the same wherever the bodies are: columns of either body
 STEADY = {REVOLUTE: ((0, 1), (0, 1)), PRISMATIC: ((), ()), FIXED: ((0, 1), (0, 1), (0, 1, 2)), DISTANCE: ((),)}
 
@@ -145,20 +147,25 @@ def joint_reaction(code, rows, par, w, lam, out):  # type: ignore[no-untyped-def
 
 @kernel
 def joint_transmitted(code, par, w, lam, which, by_lam, by_q):  # type: ignore[no-untyped-def]
-    """Norm of the force (which 0) or the moment (1) that a joint transmits, at the first body's joint point.
+    """Norm of the force (which FORCE) or the moment (MOMENT) that a joint transmits, at the first body's joint point.
 
-    Out: its slopes by_lam (3,), by_q (6,); zero where the norm is.
+    Out: its slopes by_lam (3,), by_q (6,); zero where the norm is. ACROSS: the norm of the force, with the slopes of
+    the component perpendicular to it, a quarter turn ahead, in global axes; zero where the force has one direction.
     """
     by_lam[:] = 0.0
     by_q[:] = 0.0
-    if which == 0:
+    if which != MOMENT:
         if code in (REVOLUTE, FIXED):
             size = math.hypot(lam[0], lam[1])
-            if size > 0.0:
+            if size > 0.0 and which == FORCE:
                 by_lam[0] = lam[0] / size
                 by_lam[1] = lam[1] / size
+            elif size > 0.0:
+                by_lam[0] = -lam[1] / size
+                by_lam[1] = lam[0] / size
             return size
-        by_lam[0] = np.sign(lam[0])
+        if which == FORCE:
+            by_lam[0] = np.sign(lam[0])
         return abs(lam[0])
     if code == FIXED:
         by_lam[2] = np.sign(lam[2])

@@ -10,7 +10,7 @@ elongation has.
 import numpy as np
 
 from mdstopo.jit import kernel
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_work
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_parts, elastic_work
 from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
 from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
@@ -191,6 +191,62 @@ def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ign
         for j in range(rel.shape[0]):
             work += elastic_work(x, y, v, w, free, rel[j, p], u[j, p])
         store(out, i, load(out, i) + k * work)
+
+
+@kernel
+def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):  # type: ignore[no-untyped-def]
+    """`alike_design` without energy at S poses, of R rows: members are looked at once for all, and the sums are those
+    of each row by itself.
+
+    rel (S, n_pair, POSE); u (R, S, n_pair, 3); out (R, W), W at least M; room (4 S lanes(),).
+    """
+    poses = rel.shape[0]
+    flat = out.reshape(out.size)
+    vector = lanes()
+    for i in range(start, stop, vector):
+        for j in range(poses):
+            r = rel[j, pair]
+            _, _, _, bx, by, bt, x = _seen(member, width, i, r)
+            at = 4 * vector * j
+            store(room, at, p[0] * x + (p[2] + p[1] * (bx * r[4] + by * r[5] + bt * r[6])))
+            store(room, at + vector, bx)
+            store(room, at + 2 * vector, by)
+            store(room, at + 3 * vector, bt)
+        for m in range(u.shape[0]):
+            work = load(flat, m * out.shape[1] + i)
+            for j in range(poses):
+                at = 4 * vector * j
+                along = load(room, at + vector) * u[m, j, pair, 0] + load(room, at + 2 * vector) * u[m, j, pair, 1]
+                work += load(room, at) * (along + load(room, at + 3 * vector) * u[m, j, pair, 2])
+            store(flat, m * out.shape[1] + i, work)
+
+
+@kernel
+def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, out):  # type: ignore[no-untyped-def]
+    """`elastic_designs` of R rows; arguments as of `alike_designs`."""
+    poses = rel.shape[0]
+    flat = out.reshape(out.size)
+    vector = lanes()
+    for i in range(start, stop, vector):
+        x = load(member, i)
+        y = load(member, width + i)
+        v = load(member, 2 * width + i)
+        w = load(member, 3 * width + i)
+        free = load(member, 4 * width + i)
+        for j in range(poses):
+            force, rx, ry, moment = elastic_parts(x, y, v, w, free, rel[j, pair])
+            at = 4 * vector * j
+            store(room, at, force)
+            store(room, at + vector, rx)
+            store(room, at + 2 * vector, ry)
+            store(room, at + 3 * vector, moment)
+        for m in range(u.shape[0]):
+            work = zero()
+            for j in range(poses):
+                at = 4 * vector * j
+                along = load(room, at + vector) * u[m, j, pair, 0] + load(room, at + 2 * vector) * u[m, j, pair, 1]
+                work += load(room, at) * (along + load(room, at + 3 * vector) * u[m, j, pair, 2])
+            store(flat, m * out.shape[1] + i, load(flat, m * out.shape[1] + i) + k * work)
 
 
 @kernel

@@ -300,6 +300,20 @@ def elastic_work(x, y, v, w, free, pose, u):  # type: ignore[no-untyped-def]
     return (r2 * z - free) * z * along
 
 
+@kernel
+def elastic_parts(x, y, v, w, free, pose):  # type: ignore[no-untyped-def]
+    """Of `elastic_work`: Delta / L, and L b, with which it is Delta / L (L b . u)."""
+    c = pose[2]
+    s = pose[3]
+    ax = c * v - s * w
+    ay = s * v + c * w
+    rx = ax - (x - pose[0])
+    ry = ay - (y - pose[1])
+    r2 = rx * rx + ry * ry
+    z = inverse_root(r2, ZERO_LENGTH_SQUARED)
+    return (r2 * z - free) * z, rx, ry, ax * ry - ay * rx
+
+
 @member_kernel
 def viscous_design(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt, ux, uy, ut, out):  # type: ignore[no-untyped-def]
     """Add f_i (b_i . u) of each general spring to out; u is a virtual change of the relative pose."""

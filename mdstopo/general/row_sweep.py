@@ -1,0 +1,119 @@
+"""Many rows pulled back through one motion at once: peaks of any responses, and what is across of norms.
+
+All rows go through the steps together, so what a step needs (tangents, factors, the members' forces and directions) is
+read or formed once for all of them; each row joins at its own step. A point inside a step that needs a step of its own
+(`duties`, 1) is gone through by its row alone before it joins. The arithmetic of each row is what it is alone.
+"""
+
+import numpy as np
+
+from mdstopo.general.adjoint import row_cotangents, through_events
+from mdstopo.general.balance import make_desk
+from mdstopo.general.crush import add_sets, count_sets, keep_start
+from mdstopo.general.duties import step_back
+from mdstopo.general.gather import add_designs
+from mdstopo.general.members import unscale_general
+from mdstopo.general.model import unpack_general
+from mdstopo.general.parameters import add_times
+from mdstopo.general.row_design import add_designs_of_rows
+from mdstopo.general.track import carve_track, restore_modes
+from mdstopo.jit import entry, kernel
+
+
+@kernel
+def step_of_rows(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, w, c, lam_q, lam_v, lam_x, bar_set, z, y, desk, out, work
+):
+    """Pull the cotangents of R rows, of fraction c (R,) of step w's motion, back to its start and before its events.
+
+    lam_q, lam_v (R, n), lam_x (R, 2, n), bar_set (R, slots), in place; out (R, M_padded + P) is added to; z (R, 17, n),
+    y (n_row,): room. c becomes 1. Returns the step before.
+    """
+    none = np.empty((0, 3, lam_q.shape[1]))
+    no_rows = np.empty((0, model.size[0]))
+    no_drops = np.empty(0)
+    o = track.index[w, 0]
+    stages = track.index[w + 1, 0] - o
+    segment = track.index[w, 2]
+    step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, none, no_rows, z, y, desk, work)
+    restore_modes(track, track.index[w, 3], strength)
+    if z.shape[0] == 1:
+        add_designs(model, segment, track, o, strength, z[0, :stages], out[0], work)
+    else:
+        add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work)
+    before = track.index[w, 1]
+    for m in range(lam_q.shape[0]):
+        if bar_set.shape[1] > 0:
+            restore_modes(track, track.index[w, 3], strength)
+            for j in range(stages):
+                stage = track.stage[o + j]
+                add_sets(model, segment, strength, stage[0], stage[1], z[m, j], 0.0, bar_set[m])
+        if model.varied.shape[0] > 0:
+            add_times(model, track, strength, count, before + 1, np.int64(-1), np.bool_(False), lam_v[m], 0.0, out[m])
+        if before >= 0:
+            through_events(model, track, before + 1, lam_q[m], lam_v[m], bar_set[m], no_drops, strength, out[m])
+        c[m] = 1.0
+    return before
+
+
+@kernel
+def rows_gradients(  # type: ignore[no-untyped-def]
+    tag, model, tables, strength, track, count, which, rows, desk, starts, out, work
+):
+    """out (R, M_padded + P) = derivatives of R rows of `extremes` (R, COLUMNS), the latest first, by alpha^mu.
+
+    which (R, 2): the response, and whether the component across is meant (`adjoint.row_cotangents`). starts (R, n), or
+    (R, 0): the cotangents of the start's positions come out.
+    """
+    n = model.mass.shape[0]
+    total = rows.shape[0]
+    bars = np.empty((3, n))
+    bar_set = np.zeros((total, count_sets(model)))
+    lam_q = np.zeros((total, n))
+    lam_v = np.zeros((total, n))
+    lam_x = np.zeros((total, 2, n))
+    begins = np.empty(total, np.int64)
+    fraction = np.ones(total)
+    z = np.empty((total, 17, n))
+    y = np.empty(model.size[0])
+    for m in range(total):
+        w, fraction[m] = row_cotangents(
+            tag, model, tables, strength, track, count, which[m, 0], rows[m], which[m, 1] != 0, desk, bars, bar_set[m],
+            out[m], work,
+        )  # fmt: skip
+        lam_q[m] = bars[0]
+        lam_v[m] = bars[1]
+        if w > count:
+            own = slice(m, m + 1)
+            w = step_of_rows(
+                tag, model, tables, strength, track, count, w, fraction[own], lam_q[own], lam_v[own], lam_x[own],
+                bar_set[own], z[own], y, desk, out[own], work,
+            )  # fmt: skip
+        begins[m] = w
+    w = begins[0] if total > 0 else -1
+    active = 0
+    while w >= 0:
+        while active < total and begins[active] >= w:
+            active += 1
+        w = step_of_rows(
+            tag, model, tables, strength, track, count, w, fraction[:active], lam_q[:active], lam_v[:active],
+            lam_x[:active], bar_set[:active], z[:active], y, desk, out[:active], work,
+        )  # fmt: skip
+    for m in range(total):
+        keep_start(model, track, lam_q[m], bar_set[m], starts[m], out[m])
+
+
+@entry
+def pull_rows(  # type: ignore[no-untyped-def]
+    tag, ints, floats, tables, alpha, limits, count, which, rows, room, room_ints, strength, padded, out, starts, work
+):
+    """out (R, N + P) = derivatives of R rows of `extremes` by alpha (N,) and values; as of `rows_gradients`.
+
+    Room: padded (R, M_padded + P).
+    """
+    model = unpack_general(ints, floats)
+    track = carve_track(model, limits, room, room_ints)
+    desk = make_desk(model)
+    rows_gradients(tag, model, tables, strength, track, count, which, rows, desk, starts, padded, work)
+    for m in range(rows.shape[0]):
+        unscale_general(model.block, model.power, alpha, padded[m], out[m])
