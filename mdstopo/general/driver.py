@@ -12,9 +12,23 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.general.compile import GeneralScene
-from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
+from mdstopo.general.extremes import (
+    COLUMNS,
+    FRACTION,
+    NOBODY,
+    OTHER,
+    SIGN,
+    STEP,
+    VALUE,
+    parts,
+    peaks,
+    ranked,
+    row_of,
+    sample,
+)
 from mdstopo.general.kinks import landed
 from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
+from mdstopo.general.minima import minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.ready import Ready
 from mdstopo.general.rivals import compete, members_peaks
@@ -29,8 +43,8 @@ from mdstopo.status import Status
 
 #: peaks kept of one response
 ROWS = 6
-#: of what a reduction takes the peaks: of g, of -g, or of both
-SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
+#: of what a reduction takes the peaks: of g, or of -g too; minima are looked for apart (`minima`)
+SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
 
 
 def load_method(name: str) -> ModuleType:
@@ -182,7 +196,7 @@ class GeneralDriver:
         if reduction in INTEGRALS:
             total = self._pull(j, rows[0], INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
             value, slope = reduced(reduction, total, float(t[-1] - t[0]))
-            rows[0] = np.nan, value, 0.0, 0.0, slope, 1.0, -1.0
+            rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             self.gradients[j, 0] *= slope
             self.found[j] = 1
             return
@@ -191,7 +205,9 @@ class GeneralDriver:
             found = ranked(members_peaks(self, j, t.copy(), reduction == "final"), CLOSENESS, ROWS, t[-1] - t[0])
         elif reduction == "final":
             value, rate, who = self._see_end(j, count).tolist()
-            found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
+            found = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
+        elif reduction == "min":
+            found = ranked(minima(self, j, t.copy()), CLOSENESS, ROWS, t[-1] - t[0])
         else:
             see, t = partial(self.see, j, count), t.copy()
             samples = sample(t, see)
@@ -202,7 +218,7 @@ class GeneralDriver:
             flip = row[SIGN] if reduction == "max_abs" else 1.0
             rows[r] = row
             if gradient:
-                self._pull(j, rows[r], 0, count, True, self.gradients[j, r])
+                self._pull_row(j, rows[r], count, self.gradients[j, r])
                 self.gradients[j, r] *= flip
             rows[r, VALUE] *= flip
 
@@ -267,6 +283,17 @@ class GeneralDriver:
                 self.start.pull(self._pulled_start, out)
         return total
 
+    def _pull_row(self, j: int, row: FloatArray, count: int, out: FloatArray) -> None:
+        """The gradient of a row of `extremes`, put together from those of its parts."""
+        if row[OTHER] == NOBODY:
+            self._pull(j, row, 0, count, True, out)
+            return
+        out[:] = 0.0
+        own = np.zeros(len(out))
+        for share, part in parts(row):
+            self._pull(j, part, 0, count, True, own)
+            out += share * own
+
     def start_from(self, q: FloatArray) -> None:
         """Take other positions q (n,) at the start."""
         self._packed = self.ints, self.floats = pack_general(self._model._replace(q0=q))
@@ -313,6 +340,11 @@ class GeneralDriver:
         from mdstopo.general.vibration import natural_frequencies
 
         return float(natural_frequencies(self, np.concatenate([self._alpha, self._values])).max(initial=0.0))
+
+    @property
+    def times(self) -> FloatArray:
+        """The times that the case gives: ends of segments, without those that steps land on for other reasons."""
+        return self._model.times
 
     @property
     def message(self) -> str:
