@@ -20,8 +20,10 @@ from mdstopo.general.responses import (
     MEMBER_FORCE,
     across_rate,
     across_slopes,
+    equal_forces,
     kinked,
     largest_force,
+    members_of,
     response,
     value_at,
 )
@@ -203,8 +205,12 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
     if state == 0:
         return -1
     for e in range(track.index[state - 1, 3], track.index[state, 3]):
-        if track.event[e, 0] == state:
-            return e
+        if track.event[e, 0] != state:
+            continue
+        for part in range(2):
+            for d in range(track.salt.shape[2]):
+                if track.salt[e, part, d] != 0.0:
+                    return e
     return -1
 
 
@@ -362,6 +368,8 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
     rows = np.zeros(n_row)
     mine = -1
     size = 0.0
+    tied = np.empty(members_of(model, model.response[j, 5]) if kind == MEMBER_FORCE else 1, np.int64)
+    ties = 1
     for w in range(count):
         restore_modes(track, track.index[w, 3], strength)
         segment = track.index[w, 2]
@@ -372,6 +380,10 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
         inside = o + (stages - 1) // 2 if stages > 1 else o - 1
         if bends:
             size, mine = at_stage(model, strength, segment, track, inside, j, -1, desk, slopes, rows)
+            if gradient and kind == MEMBER_FORCE:
+                ties = equal_forces(
+                    model, strength, segment, track.when[inside], model.response[j, 5], track.stage[inside], size, tied
+                )
         for i in range(track.index[w + 1, 0] - o):
             if weight[i] == 0.0:
                 continue
@@ -388,19 +400,28 @@ def integral_cotangents(  # type: ignore[no-untyped-def]
             total += weight[i] * (value * value if square else value)
             if not gradient:
                 continue
-            for part in range(3):
-                for d in range(n):
-                    bars[o + i, part, d] = factor * own[part, d]
-            for r in range(n_row):
-                rows_bar[o + i, r] = factor * own_rows[r]
             if energy:
                 add_design(model, segment, t, strength, stage[0], stage[1], stage[2], none, factor, out, work)
-            sign = force_sign(model, segment, j, who, t, strength, stage[0], stage[1], stage[2])
-            if turned:
-                sign = -sign
-            explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor * sign, out)
-            if sets_bar.shape[1] > 0:
-                add_looked_sets(
-                    model, strength, segment, j, who, t, stage[0], stage[1], stage[2], own, factor, sets_bar[o + i]
-                )
+            shares = ties if who == mine and ties > 1 else 1
+            factor /= shares
+            bars[o + i] = 0.0
+            for m in range(shares):
+                if shares > 1:
+                    who = tied[m]
+                    at_stage(model, strength, segment, track, o + i, j, who, desk, own, own_rows)
+                    if turned:
+                        _turn(own, own_rows)
+                for part in range(3):
+                    for d in range(n):
+                        bars[o + i, part, d] += factor * own[part, d]
+                for r in range(n_row):
+                    rows_bar[o + i, r] = factor * own_rows[r]
+                sign = force_sign(model, segment, j, who, t, strength, stage[0], stage[1], stage[2])
+                if turned:
+                    sign = -sign
+                explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor * sign, out)
+                if sets_bar.shape[1] > 0:
+                    add_looked_sets(
+                        model, strength, segment, j, who, t, stage[0], stage[1], stage[2], own, factor, sets_bar[o + i]
+                    )
     return total

@@ -13,9 +13,21 @@ from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.compile import GeneralScene
-from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, VALUE, peaks, ranked, sample
+from mdstopo.general.extremes import (
+    COLUMNS,
+    FRACTION,
+    SIGN,
+    STEP,
+    VALUE,
+    parts,
+    peaks,
+    ranked,
+    row_of,
+    sample,
+)
 from mdstopo.general.kinks import landed
 from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
+from mdstopo.general.minima import minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.ready import Ready
 from mdstopo.general.rivals import compete, members_peaks
@@ -35,8 +47,8 @@ ROWS = 6
 TOGETHER = 2**23
 #: rows of which the arrays of a call are kept for the next one
 KEPT = 32
-#: of what a reduction takes the peaks: of g, of -g, or of both
-SIGNS = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}
+#: of what a reduction takes the peaks: of g, or of -g too; minima are looked for apart (`minima`)
+SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
 
 
 def load_method(name: str) -> ModuleType:
@@ -222,7 +234,7 @@ class GeneralDriver:
         if reduction in INTEGRALS:
             total = self._pull(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
             value, slope = reduced(reduction, total, float(t[-1] - t[0]))
-            rows[0] = np.nan, value, 0.0, 0.0, slope, 1.0, -1.0
+            rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             self.gradients[j, 0] *= slope
             self.found[j] = 1
             return
@@ -232,7 +244,9 @@ class GeneralDriver:
             found = ranked(found, window, most, t[-1] - t[0])
         elif reduction == "final":
             value, rate, who = self._see_end(j, count).tolist()
-            found = [np.array([t[-1], value, count - 1.0, 1.0, rate, 1.0, who])]
+            found = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
+        elif reduction == "min":
+            found = ranked(minima(self, j, t.copy()), window, most, t[-1] - t[0])
         else:
             see, t = partial(self.see, j, count), t.copy()
             samples = sample(t, see)
@@ -308,33 +322,35 @@ class GeneralDriver:
     def _pull_rows(self, count: int, across: FloatArray | None) -> None:
         """The gradients of all rows that were found, and where it is wanted what is across, in one sweep."""
         wanted = [
-            (j, r, aside)
+            (j, r, aside, share, part)
             for j, reduction in enumerate(self.scene.reductions)
             if reduction not in INTEGRALS
             for r in range(int(self.found[j]))
+            for share, part in parts(self.rows[j, r])
             for aside in range(1 if across is None or self.shapes[j] != "norm" else 2)
         ]
-        place = self.rows[:, :, [STEP, FRACTION]]
-        wanted.sort(key=lambda row: (-place[row[0], row[1]]).tolist())  # the latest first
+        wanted.sort(key=lambda row: (-row[4][[STEP, FRACTION]]).tolist())  # the latest first
+        for j, reduction in enumerate(self.scene.reductions):
+            if reduction not in INTEGRALS:
+                self.gradients[j, : self.found[j]] = 0.0
         most = max(1, TOGETHER // len(self.padded))
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
             block = self._block(len(part))
-            block.which[:] = [(j, aside) for j, _, aside in part]
-            block.rows[:] = [self.rows[j, r] for j, r, _ in part]
+            block.which[:] = [(j, aside) for j, _, aside, _, _ in part]
+            block.rows[:] = [row for *_, row in part]
             self._ready(
                 f"pull_rows {len(part)}", self.entry.pull_rows, *self.steps_arguments(count), block.which, block.rows,
                 self.room, self.room_ints, self.strength, block.padded, block.out, block.starts, self.work,
             )  # fmt: skip
-            for (j, r, aside), own, start in zip(part, block.out, block.starts, strict=True):
+            for (j, r, aside, share, _), own, start in zip(part, block.out, block.starts, strict=True):
                 if self.start is not None:
                     self.start.pull(start, own)
                 if aside and across is not None:
-                    across[j, r] = own
+                    across[j, r] += share * own
                 else:
-                    self.gradients[j, r] = own
-                    if self.scene.reductions[j] == "max_abs":
-                        self.gradients[j, r] *= self.rows[j, r, SIGN]
+                    flip = self.rows[j, r, SIGN] if self.scene.reductions[j] == "max_abs" else 1.0
+                    self.gradients[j, r] += flip * share * own
 
     def _block(self, count: int) -> "_Block":
         """Arrays for so many rows at once; those of few rows are kept."""
@@ -397,6 +413,11 @@ class GeneralDriver:
         from mdstopo.general.vibration import natural_frequencies
 
         return float(natural_frequencies(self, np.concatenate([self._alpha, self._values])).max(initial=0.0))
+
+    @property
+    def times(self) -> FloatArray:
+        """The times that the case gives: ends of segments, without those that steps land on for other reasons."""
+        return self._model.times
 
     @property
     def message(self) -> str:

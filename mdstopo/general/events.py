@@ -24,7 +24,15 @@ from mdstopo.integrators.steps import deflection
 from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
 from mdstopo.mechanics.geometry import relative_pose
-from mdstopo.mechanics.laws.table import law_grazes, law_margin, law_margin_slopes, law_next, law_set, law_switches
+from mdstopo.mechanics.laws.table import (
+    CURVE,
+    law_grazes,
+    law_margin,
+    law_margin_slopes,
+    law_next,
+    law_set,
+    law_switches,
+)
 
 #: error of the cubic through both ends of a step, relative to the square of its length times the second derivative:
 #: (h omega)^2 / 384 of a vibration
@@ -55,7 +63,7 @@ def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-d
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
             x = length - model.member[4, i] - strength[2, i]
-            s = law_margin(code, model.law[k], x, rate, int(strength[1, i]))
+            s = law_margin(code, model.law[k], x, rate, int(strength[1, i]), model.curves)
             if s < best:
                 best = s
                 who = i
@@ -92,8 +100,8 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
             x = length - model.member[4, i] - strength[2, i]
-            s0 = law_margin(code, model.law[k], x, rate, mode)
-            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+            s0 = law_margin(code, model.law[k], x, rate, mode, model.curves)
+            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
                 continue
             d0 = h * by_x * rate
@@ -101,8 +109,8 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
             x = length - model.member[4, i] - strength[2, i]
-            s1 = law_margin(code, model.law[k], x, rate, mode)
-            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+            s1 = law_margin(code, model.law[k], x, rate, mode, model.curves)
+            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
                 continue
             d1 = h * by_x * rate
@@ -276,6 +284,8 @@ def switch_any(model, segment, strength, rel, q, v, a, who, slopes):  # type: ig
     x -= strength[2, who]
     first = strength[0, who] != 0.0 and strength[2, who] == 0.0
     kind = law_grazes(code, model.law[k], x, old) if first else 0
+    if code == CURVE:  # nothing jumps at a knot: when it is passed makes no difference
+        slopes[:] = 0.0
     return new, beyond, kind, by_set, law_set(code, model.law[k], x, old, new)
 
 
@@ -297,7 +307,7 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
         d = 3 * model.pair[p, r // 3] + r % 3
         second += row[r] * a[d] + row_rate[r] * v[d]
     mode = int(strength[1, i])
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
     speed = by_x * rate + by_rate * second
     for d in range(n):
         slopes[0, d] = 0.0
@@ -310,7 +320,7 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
     bend = 2.0 * abs(by_x * second)
     beyond = speed * speed / bend if by_rate == 0.0 and bend > 0.0 else np.inf
     by_set = -by_x / speed if speed != 0.0 else 0.0
-    return law_next(code, model.law[k], x, rate, second, mode), beyond, by_set
+    return law_next(code, model.law[k], x, rate, second, mode, model.curves), beyond, by_set
 
 
 @kernel

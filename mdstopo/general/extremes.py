@@ -13,9 +13,12 @@ import numpy as np
 
 from mdstopo.scene.model import FloatArray
 
-#: columns of a row: time, value, step, fraction of it, rate on this side, sign of what is largest, member
-TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO = range(7)
-COLUMNS = 7
+#: columns of a row: time, value, step, fraction of it, rate on this side, sign of what is largest, member; and where
+#: two members change hands there (`minima`), the other one and its share of the derivative
+TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO, OTHER, SHARE = range(9)
+COLUMNS = 9
+#: what stands for another member: there is none; there is none, and the value is a zero that stays one
+NOBODY, ZERO = -1.0, -2.0
 #: samples of every step
 FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LAST = len(FRACTIONS) - 1
@@ -85,7 +88,23 @@ def ranked(rows: list[FloatArray], closeness: float, most: int, span: float) -> 
 
 def _row(samples: Samples, w: int, c: float, value: float, rate: float, sign: float, who: float) -> FloatArray:
     time = samples.t[w + 1] if c >= 1.0 else samples.t[w] + c * (samples.t[w + 1] - samples.t[w])
-    return np.array([time, value, w, c, rate, sign, who])
+    return row_of(float(time), value, w, c, rate, sign, who)
+
+
+def row_of(time: float, value: float, step: float, fraction: float, rate: float, sign: float, who: float) -> FloatArray:
+    """A row (COLUMNS,) of one member, or of a response that has none."""
+    return np.array([time, value, step, fraction, rate, sign, who, NOBODY, 0.0])
+
+
+def parts(row: FloatArray) -> list[tuple[float, FloatArray]]:
+    """What a row's derivative is put together from: shares, and rows of one member each."""
+    if row[OTHER] == ZERO:
+        return []
+    if row[OTHER] == NOBODY:
+        return [(1.0, row)]
+    other = row.copy()
+    other[WHO], other[OTHER] = row[OTHER], NOBODY
+    return [(1.0 - row[SHARE], row), (float(row[SHARE]), other)]
 
 
 def _inside(samples: Samples, g: FloatArray, d: FloatArray, limit: float, see: See, sign: float) -> list[FloatArray]:

@@ -7,43 +7,38 @@ integrand is continuous there, so that its derivatives need no term of their own
 """
 
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.general.extremes import FRACTION, FRACTIONS, STEP, VALUE, peaks, sample
+from mdstopo.general.extremes import FRACTION, STEP, VALUE, peaks
+from mdstopo.general.minima import LOW, Pieces
 from mdstopo.general.model import GeneralModel
 from mdstopo.scene.model import FloatArray
 
-#: a low value counts as a kink, or nearly one, below this share of the highest
-LOW = 0.05
-#: looks for changes of hands about a low value, and how far from it, in times that the fastest change needs for it
-LOOKS, REACH = 41, 20.0
-#: bisections that find where the largest force changes hands
-HALVINGS = 60
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
 
 See = Callable[[FloatArray, bool], FloatArray]
 
 
-def kinks(t: FloatArray, see: See) -> list[float]:
-    """Times inside (t[0], t[-1]) at which steps are to end, from looks at the steps between times t (m + 1,)."""
-    samples = sample(t, see)
+def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
+    """Times inside (t[0], t[-1]) at which steps are to end for the sake of response j; t (m + 1,): the steps' times."""
+    pieces = Pieces(driver, j, t)
+    samples = pieces.samples
     highest = float(np.abs(samples.value).max())
     if highest == 0.0:
         return []
-    found: list[float] = []
-    several = bool((samples.who != samples.who[0, 0]).any())
-    for row in peaks(samples, see, -1.0, 1e9):
+    found = list(pieces.changes)
+    rate = float(np.abs(samples.rate).max())
+    for row in peaks(samples, pieces.see, -1.0, 1e9):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
         if low > LOW * highest or not t[0] < row[0] < t[-1]:
             continue
-        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), see)
-        time = float(t[w] + c * (t[w + 1] - t[w]))
+        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.see)
+        time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
         found.append(time)
-        rate = float(np.abs(samples.rate).max())
         found += _around(time, low, rate, float(t[0]), float(t[-1]))
-        if several and rate > 0.0:
-            found += _hands_about(time, REACH * low / rate, t, see)
-    found += _changes_of_hands(t, samples.who, see)
     return found
 
 
@@ -70,44 +65,6 @@ def _around(time: float, low: float, rate: float, start: float, end: float) -> l
         found += [each for each in (time - width, time + width) if start < each < end]
         width *= 3.0
     return found
-
-
-def _changes_of_hands(t: FloatArray, who: FloatArray, see: See) -> list[float]:
-    """Where the member with the largest force becomes another one."""
-    found = []
-    for w in range(len(t) - 1):
-        for i in range(len(FRACTIONS) - 1):
-            if who[w, i] != who[w, i + 1]:
-                low, high = (float(t[w] + c * (t[w + 1] - t[w])) for c in (FRACTIONS[i], FRACTIONS[i + 1]))
-                found.append(_handover(low, high, float(who[w, i]), t, see))
-    return found
-
-
-def _hands_about(time: float, reach: float, t: FloatArray, see: See) -> list[float]:
-    """The same about a low value: of two forces that vanish one after the other, each is the larger for a moment."""
-    near = np.linspace(max(time - reach, float(t[0])), min(time + reach, float(t[-1])), LOOKS)
-    who = see(_places(near, t), True)[:, 2]
-    changes = np.flatnonzero(who[1:] != who[:-1])
-    return [_handover(float(near[i]), float(near[i + 1]), float(who[i]), t, see) for i in changes]
-
-
-def _handover(low: float, high: float, first: float, t: FloatArray, see: See) -> float:
-    """When, between two times, the largest force is no longer that of the member `first`."""
-    for _ in range(HALVINGS):
-        middle = 0.5 * (low + high)
-        if not low < middle < high:
-            break
-        if see(_places(np.array([middle]), t), True)[0, 2] == first:
-            low = middle
-        else:
-            high = middle
-    return high
-
-
-def _places(times: FloatArray, t: FloatArray) -> FloatArray:
-    """Step and fraction (m, 2) of times."""
-    w = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
-    return np.column_stack([w, np.clip((times - t[w]) / (t[w + 1] - t[w]), 0.0, 1.0)])
 
 
 def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:

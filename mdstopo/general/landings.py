@@ -10,7 +10,6 @@ stay.
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -51,7 +50,7 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
     t = driver.states()[0][: count + 1].copy()
     if not driver.landings:
         for j, _ in looked:
-            found += kinks(t, partial(driver.see, j, count))
+            found += kinks(driver, j, t)
     if driver.method.name != "runge_kutta" or driver.settings[2] > 0.0:
         return found
     ends = np.unique(np.concatenate([t, found, driver.landings]))

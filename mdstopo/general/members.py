@@ -174,7 +174,7 @@ def set_modes(model, strength, rel, rel_rate):  # type: ignore[no-untyped-def]
             rate = bx * r[4] + by * r[5] + bt * r[6]
             second = second_rate(model.member, i, r, acc)
             x = length - model.member[4, i]
-            strength[1, i] = law_start(code, model.law[k], x, rate, second)
+            strength[1, i] = law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
             if code == CRUSH and model.active[0, k] == 0:  # whatever it is like now, it has not been crushed
                 strength[1, i] = 0.0

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.general.extremes import RATE, SIGN
+from mdstopo.general.extremes import RATE, SIGN, parts, row_of
 from mdstopo.general.landings import INTEGRALS, reduced
 from mdstopo.integrators.driver import Looked
 from mdstopo.integrators.steps import OK, status_of
@@ -40,17 +40,20 @@ def differentiate(
                 gradients[j, r] = _held(driver, j, rows[j, r], reduction, count)
                 continue
             sweeps = SWEEPS if method == "iterative" else 0
-            asked = [(False, gradients[j, r])]
+            aims = [(False, gradients[j, r])]
             if across is not None and driver.shapes[j] == "norm":
-                asked.append((True, across[j, r]))
-            for which, out in asked:
-                stopped = driver.entry.push(
-                    *driver.steps_arguments(count), j, integral, sweeps, rows[j, r], which, driver.room,
-                    driver.room_ints, driver.strength, driver.padded, out, driver.start_slopes(), driver.work,
-                )  # fmt: skip
-                if stopped >= 0:
-                    message = FALLBACK.format(float(driver.states()[0][stopped]))
-                    return differentiate(driver, "direct", alpha, looked, across)[0], message
+                aims.append((True, across[j, r]))
+            for share, part in parts(rows[j, r]):
+                for aside, out in aims:
+                    own = np.zeros(gradients.shape[2])
+                    stopped = driver.entry.push(
+                        *driver.steps_arguments(count), j, integral, sweeps, part, aside, driver.room, driver.room_ints,
+                        driver.strength, driver.padded, own, driver.start_slopes(), driver.work,
+                    )  # fmt: skip
+                    if stopped >= 0:
+                        message = FALLBACK.format(float(driver.states()[0][stopped]))
+                        return differentiate(driver, "direct", alpha, looked, across)[0], message
+                    out += share * own
             if integral:
                 gradients[j, r] *= rows[j, r, RATE]
             elif reduction == "max_abs":
@@ -63,7 +66,9 @@ def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, coun
     t = driver.states()[0][: count + 1].copy()
     if reduction not in INTEGRALS:
         sign = row[SIGN] if reduction == "max_abs" else 1.0
-        gradient: FloatArray = sign * _held_at(driver, j, row, count)
+        gradient = np.zeros(len(driver._alpha))
+        for share, part in parts(row):
+            gradient += sign * share * _held_at(driver, j, part, count)
         return gradient
     total = np.zeros(len(driver._alpha))
     values = np.zeros(count + 1)
@@ -71,7 +76,7 @@ def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, coun
         place = np.array([[min(k, count - 1), float(k == count)]])
         seen = driver.visit(j, place, True, count)[2][0]
         weight = 0.5 * (t[min(k + 1, count)] - t[max(k - 1, 0)])
-        at = np.array([t[k], seen[0], place[0, 0], place[0, 1], seen[1], 1.0, seen[2]])
+        at = row_of(t[k], seen[0], place[0, 0], place[0, 1], seen[1], 1.0, seen[2])
         factor = 2.0 * seen[0] if reduction == "rms" else 1.0
         values[k] = weight * (seen[0] ** 2 if reduction == "rms" else seen[0])
         total += weight * factor * _held_at(driver, j, at, count)

@@ -121,10 +121,10 @@ def event_slope(model, track, strength, event, e):  # type: ignore[no-untyped-de
     x -= track.kept[event, 0]
     code = model.block[k, 3]
     mode = int(track.event[event, 2])
-    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode)
+    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, model.curves)
     if by_p == 0.0:
         return 0.0
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode)
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
     speed = by_x * rate
     if by_rate != 0.0:
         a = np.empty(model.mass.shape[0])

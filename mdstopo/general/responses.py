@@ -34,6 +34,9 @@ KINDS = {
     "joint_force": (JOINT_FORCE, 0),
     "joint_moment": (JOINT_MOMENT, 1),
 }
+#: forces of several members that differ by less than this, relative, are the same force: they share what the largest of
+#: them does to derivatives
+TIE = 1e-9
 #: fraction of a step by which the rate of a response is differenced where it has no formula
 APART = 3e-4
 
@@ -87,16 +90,36 @@ def largest_force(model, strength, segment, t, group, q, v, a):  # type: ignore[
     own = np.empty((2, 6))
     best = -1.0
     who = 0
-    count = 0
-    for k in range(model.block.shape[0]):
-        if model.block[k, 6] == group:
-            count = max(count, model.block[k, 7] + model.block[k, 5])
-    for i in range(count):
+    for i in range(members_of(model, group)):
         f, _ = member_force(model, strength, segment, t, group, i, q, v, a, slopes, own)
         if abs(f) > best:
             best = abs(f)
             who = i
     return who
+
+
+@kernel
+def members_of(model, group):  # type: ignore[no-untyped-def]
+    """How many members a group has."""
+    count = 0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 6] == group:
+            count = max(count, model.block[k, 7] + model.block[k, 5])
+    return count
+
+
+@kernel
+def equal_forces(model, strength, segment, t, group, stage, largest, tied):  # type: ignore[no-untyped-def]
+    """Which members of a group carry the largest |f*| at a stage (3, n), to TIE: into tied (members,); how many."""
+    slopes = np.empty((3, 6))
+    own = np.empty((2, 6))
+    found = 0
+    for i in range(members_of(model, group)):
+        f, _ = member_force(model, strength, segment, t, group, i, stage[0], stage[1], stage[2], slopes, own)
+        if abs(f) >= (1.0 - TIE) * largest and largest > 0.0:
+            tied[found] = i
+            found += 1
+    return max(found, 1)
 
 
 @kernel

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.general.extremes import FRACTIONS, Samples, peaks
+from mdstopo.general.extremes import FRACTIONS, Samples, peaks, row_of
 from mdstopo.general.model import COUNT, GROUP, OFFSET
 from mdstopo.general.responses import MEMBER_FORCE
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -39,17 +39,18 @@ def members_peaks(
         places = np.empty((count * len(FRACTIONS), 2))
         places[:, 0] = np.repeat(np.arange(count), len(FRACTIONS))
         places[:, 1] = np.tile(FRACTIONS, count)
-    top, _ = _compare(driver, j, places, np.zeros(0, dtype=np.int64), count)
+    top, _ = compare(driver, j, places, np.zeros(0, dtype=np.int64), count)
     near = np.flatnonzero(top >= (1.0 - window) * top.max())
     who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(RIVALS, most)]])
     if final:
         seen = [driver.visit(j, places, True, count, who=int(i))[2][0] for i in who]
-        return [np.array([t[-1], s[0], count - 1.0, 1.0, s[1], 1.0, i]) for s, i in zip(seen, who, strict=True)]
-    _, seen_all = _compare(driver, j, places, who, count)
+        return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]
+    _, seen_all = compare(driver, j, places, who, count)
     rows = []
     for i, seen_one in zip(who.tolist(), seen_all, strict=True):
-        shaped = seen_one.reshape(count, len(FRACTIONS), 2)
-        samples = Samples(t, shaped[:, :, 0], shaped[:, :, 1], np.full(shaped.shape[:2], float(i)))
+        force, rate = np.moveaxis(seen_one.reshape(count, len(FRACTIONS), 2), 2, 0)
+        sign = np.where(force >= 0.0, 1.0, -1.0)
+        samples = Samples(t, sign * force, sign * rate, np.full(force.shape, float(i)))
 
         def see(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
             return driver.visit(j, places, exact, count, who=who)[2]
@@ -58,17 +59,23 @@ def members_peaks(
     return rows
 
 
-def _compare(
-    driver: "GeneralDriver", j: int, places: FloatArray, who: IndexArray, count: int
+def compare(
+    driver: "GeneralDriver", j: int, places: FloatArray, who: IndexArray, count: int, exact: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """The largest |f*| of every member (count of members,), and |f*| with rate of some (C, K, 2), at places (K, 2)."""
-    model = driver.scene.model
-    group = int(model.response[j, 5])
-    own = model.block[model.block[:, GROUP] == group]
-    members = int((own[:, OFFSET] + own[:, COUNT]).max())
-    top, seen = np.zeros(members), np.zeros((len(who), len(places), 2))
+    """The largest |f*| of every member (count of members,), and f* with rate of some (C, K, 2), at places (K, 2).
+
+    exact: as of `GeneralDriver.visit`.
+    """
+    top, seen = np.zeros(members_of(driver, j)), np.zeros((len(who), len(places), 2))
     driver.entry.compare(
         driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,
-        driver.room_ints, driver.strength, j, places, who, top, seen, driver.work,
+        driver.room_ints, driver.strength, exact, j, places, who, top, seen, driver.work,
     )  # fmt: skip
     return top, seen
+
+
+def members_of(driver: "GeneralDriver", j: int) -> int:
+    """How many members the group has that response j looks at."""
+    block = driver.scene.model.block
+    own = block[block[:, GROUP] == driver.scene.model.response[j, 5]]
+    return int((own[:, OFFSET] + own[:, COUNT]).max())

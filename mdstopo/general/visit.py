@@ -76,11 +76,11 @@ def visit(  # type: ignore[no-untyped-def]
 
 @entry
 def compare(  # type: ignore[no-untyped-def]
-    tag, ints, floats, tables, limits, count, room, room_ints, strength, j, places, who, top, seen, work
+    tag, ints, floats, tables, limits, count, room, room_ints, strength, exact, j, places, who, top, seen, work
 ):
-    """Members beside each other, of the group that response j looks at, at places (K, 2) as `visit` takes inside steps.
+    """Members beside each other, of the group that response j looks at, at places (K, 2) and `exact` as of `visit`.
 
-    Out: top (count of members,), the largest |f*| of each at all places; seen (C, K, 2), |f*| and its rate of the
+    Out: top (count of members,), the largest |f*| of each at all places; seen (C, K, 2), f* and its rate of the
     members who (C,), by differences along the motion.
     """
     model = unpack_general(ints, floats)
@@ -105,7 +105,7 @@ def compare(  # type: ignore[no-untyped-def]
         k = int(places[i, 0])
         c = places[i, 1]
         segment = track.index[k, 2]
-        last = go_to(tag, model, tables, strength, track, count, k, c, no, last, desk, ends, lam, q, v, work)
+        last = go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work)
         t = time_at(track, k, c)
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         for m in range(top.shape[0]):
@@ -113,7 +113,7 @@ def compare(  # type: ignore[no-untyped-def]
             top[m] = max(top[m], abs(f))
         for m in range(who.shape[0]):
             f, _ = member_force(model, strength, segment, t, group, who[m], q, v, a, slopes, own)
-            seen[m, i, 0] = abs(f)
+            seen[m, i, 0] = f
             seen[m, i, 1] = 0.0
         if who.shape[0] == 0:
             continue
@@ -126,7 +126,7 @@ def compare(  # type: ignore[no-untyped-def]
                 f, _ = member_force(
                     model, strength, segment, t + e, group, who[m], near[0], near[1], near[2], slopes, own
                 )
-                seen[m, i, 1] += side * abs(f) / (2.0 * apart)
+                seen[m, i, 1] += side * f / (2.0 * apart)
 
 
 @kernel

@@ -53,22 +53,22 @@ def _law(p, x, mode):
 
 @numba.njit
 def _margin(p, x, xd, mode):
-    return table.law_margin(table.CRUSH, p, x, xd, mode)
+    return table.law_margin(table.CRUSH, p, x, xd, mode, np.empty(0))
 
 
 @numba.njit
 def _slopes(p, x, xd, mode):
-    return table.law_margin_slopes(table.CRUSH, p, x, xd, mode)
+    return table.law_margin_slopes(table.CRUSH, p, x, xd, mode, np.empty(0))
 
 
 @numba.njit
 def _next(p, x, mode):
-    return table.law_next(table.CRUSH, p, x, 0.0, 0.0, mode)
+    return table.law_next(table.CRUSH, p, x, 0.0, 0.0, mode, np.empty(0))
 
 
 @numba.njit
 def _start(p, x, xd, xdd):
-    mode = table.law_start(table.CRUSH, p, x, xd, xdd)
+    mode = table.law_start(table.CRUSH, p, x, xd, xdd, np.empty(0))
     return mode, table.law_first_set(table.CRUSH, p, x, mode)
 
 

@@ -51,23 +51,23 @@ def _law(code, p, x, xd, mode, t, value, curves):
 
 
 @numba.njit
-def _margin(code, p, x, xd, mode):
-    return table.law_margin(code, p, x, xd, mode)
+def _margin(code, p, x, xd, mode, curves):
+    return table.law_margin(code, p, x, xd, mode, curves)
 
 
 @numba.njit
-def _slopes(code, p, x, xd, mode):
-    return table.law_margin_slopes(code, p, x, xd, mode)
+def _slopes(code, p, x, xd, mode, curves):
+    return table.law_margin_slopes(code, p, x, xd, mode, curves)
 
 
 @numba.njit
-def _next(code, p, x, xd, xdd, mode):
-    return table.law_next(code, p, x, xd, xdd, mode)
+def _next(code, p, x, xd, xdd, mode, curves):
+    return table.law_next(code, p, x, xd, xdd, mode, curves)
 
 
 @numba.njit
-def _start(code, p, x, xd, xdd):
-    return table.law_start(code, p, x, xd, xdd)
+def _start(code, p, x, xd, xdd, curves):
+    return table.law_start(code, p, x, xd, xdd, curves)
 
 
 @numba.njit
@@ -95,16 +95,16 @@ class Kernel:
         return np.array(_law(self.code, self.p, float(x), float(xd), mode, float(t), float(value), self.curves))
 
     def margin(self, x, xd, mode):
-        return _margin(self.code, self.p, float(x), float(xd), mode)
+        return _margin(self.code, self.p, float(x), float(xd), mode, self.curves)
 
     def slopes(self, x, xd, mode):
-        return _slopes(self.code, self.p, float(x), float(xd), mode)
+        return _slopes(self.code, self.p, float(x), float(xd), mode, self.curves)
 
     def next(self, x, xd, xdd, mode):
-        return _next(self.code, self.p, float(x), float(xd), float(xdd), mode)
+        return _next(self.code, self.p, float(x), float(xd), float(xdd), mode, self.curves)
 
     def start(self, x, xd, xdd=0.0):
-        return _start(self.code, self.p, float(x), float(xd), float(xdd))
+        return _start(self.code, self.p, float(x), float(xd), float(xdd), self.curves)
 
     def grazes(self, mode):
         return int(_grazes(self.code, self.p, mode))
@@ -126,7 +126,13 @@ class Kernel:
             return (OPEN, CLOSED, CLIPPED) if self.record.clip else (OPEN, CLOSED)
         if isinstance(self.record, ActuatorLaw) and self.record.limit is not None:
             return (LINEAR, UPPER, LOWER)
+        if isinstance(self.record, CurveLaw):
+            return tuple(range(1, len(self.record.curve) + 2))
         return (0,)
+
+    def modes_at(self, x):
+        """The modes in which the law is what the contract says at x: of the pieces of a curve those that x is in."""
+        return sorted(right_modes(self.record, x, 0.0)) if isinstance(self.record, CurveLaw) else self.modes
 
 
 def size(rng):
@@ -164,7 +170,7 @@ MAKERS = {
         proportional=size(rng), derivative=size(rng), target=signed(rng), limit=size(rng)
     ),
 }
-SWITCHING = tuple(kind for kind in MAKERS if kind.startswith("gap") or kind == "actuator limited")
+SWITCHING = tuple(kind for kind in MAKERS if kind.startswith("gap") or kind in ("actuator limited", "curve"))
 GAPS = tuple(kind for kind in MAKERS if kind.startswith("gap"))
 
 every_kind = pytest.mark.parametrize("kind", MAKERS)
@@ -288,7 +294,7 @@ def test_a_law_tested_elsewhere_has_its_module(kind):
 def test_force_and_energy_are_those_of_the_definition(kind, seed):
     kernel, x, xd, rng = drawn(kind, seed)
     t, value = signed(rng), signed(rng, 10.0)
-    for mode in kernel.modes:
+    for mode in kernel.modes_at(x):
         force, energy = definition(kernel.record, mode, t, value)
         f, _, _, v, _ = kernel.at(x, xd, mode, t, value)
         assert f == pytest.approx(force(np.float64(x), np.float64(xd)), rel=1e-11, abs=1e-11)
@@ -302,7 +308,7 @@ def test_slopes_are_those_of_the_definition(kind, seed):
     kernel, x, xd, rng = drawn(kind, seed)
     t, value = signed(rng), signed(rng, 10.0)
     small = 1e-40
-    for mode in kernel.modes:
+    for mode in kernel.modes_at(x):
         force, energy = definition(kernel.record, mode, t, value)
         _, f_x, f_xd, _, v_x = kernel.at(x, xd, mode, t, value)
         wanted = (
@@ -392,6 +398,9 @@ def right_modes(law, x, xd):
     if isinstance(law, ActuatorLaw):
         f = demand(law, x, xd)
         allowed = {UPPER: f >= law.limit, LOWER: f <= -law.limit, LINEAR: abs(f) <= law.limit}
+    elif isinstance(law, CurveLaw):
+        edges = [-np.inf, *law.curve[:, 0], np.inf]
+        allowed = {1 + i: low <= x <= high for i, (low, high) in enumerate(itertools.pairwise(edges))}
     else:
         side = side_of(law)
         inside = side * x - law.gap
@@ -408,6 +417,8 @@ def clear(law, x, xd, distance=1e-9):
     """Whether a state is away from all switches."""
     if isinstance(law, ActuatorLaw):
         return abs(abs(demand(law, x, xd)) - law.limit) > distance
+    if isinstance(law, CurveLaw):  # a piece goes on a little beyond its ends
+        return float(np.abs(x - law.curve[:, 0]).min()) > 1e-7
     pull = law.stiffness * (x - touch(law)) + law.damping * xd
     return abs(x - touch(law)) > distance and abs(pull) > distance
 
@@ -571,7 +582,7 @@ def test_only_damped_contacts_graze_and_only_clipped_ones_so_that_the_motion_fee
     assert Kernel(undamped).grazes(OPEN) == 0
 
 
-@every_switching
+@pytest.mark.parametrize("kind", [kind for kind in SWITCHING if kind != "curve"])
 @many
 @given(seeds)
 def test_forces_jump_at_a_switch_by_their_damping_or_not_at_all(kind, seed):
@@ -674,6 +685,29 @@ def test_the_energy_of_a_curve_is_its_integral_from_no_elongation(seed):
         area = sum(quad(lambda s: kernel.at(s)[0], a, b)[0] for a, b in itertools.pairwise(cuts))
         assert kernel.at(x)[3] == pytest.approx(math.copysign(1.0, x) * area, rel=1e-9, abs=1e-9)
     assert kernel.at(0.0)[3] == pytest.approx(0.0, abs=1e-14)
+
+
+@many
+@given(seeds)
+def test_every_piece_of_a_curve_is_the_curve_where_it_holds_and_goes_on_smoothly_beyond(seed):
+    """Force, stiffness and energy in the mode that holds are those without one, and continuous where it changes."""
+    kernel, x, _, _ = drawn("curve", seed)
+    (mode, *_) = right_modes(kernel.record, x, 0.0)
+    assert kernel.at(x, mode=mode) == pytest.approx(kernel.at(x), rel=1e-12, abs=1e-12)
+    knots = kernel.record.curve[:, 0]
+    for i, knot in enumerate(knots):
+        assert kernel.at(knot, mode=i + 1) == pytest.approx(kernel.at(knot, mode=i + 2), rel=1e-10, abs=1e-10)
+        beyond = 0.9 * kernel.p[3]
+        assert kernel.margin(knot + beyond, 1.0, i + 1) > 0.0
+        assert kernel.margin(knot + 1.2 * kernel.p[3], 1.0, i + 1) < 0.0
+        assert kernel.at(knot + beyond, mode=i + 1)[0] == pytest.approx(kernel.at(knot + beyond)[0], abs=1e-12)
+
+
+@pytest.mark.parametrize(("rate", "second", "piece"), [(1.0, -1.0, 3), (-1.0, 1.0, 2), (0.0, 1.0, 3), (0.0, -1.0, 2)])
+def test_on_a_knot_a_curve_starts_in_the_piece_that_it_moves_into(rate, second, piece):
+    kernel = Kernel(CurveLaw(curve=np.array([[-1.0, -2.0], [0.0, 0.0], [1.0, 5.0]])))
+    assert kernel.start(0.0, rate, second) == piece
+    assert kernel.margin(0.0, rate, piece) >= 0.0
 
 
 def test_curves_share_one_array():

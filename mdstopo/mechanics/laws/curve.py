@@ -1,7 +1,13 @@
 """`curve`: a monotone cubic (PCHIP) through points [x, f], linear outside; V is its integral from x = 0.
 
-Parameters: where its data begin in the scene's curves, number of knots n, V of the formula below at x = 0. The data: n
-knots, then for each of the n - 1 pieces four coefficients of powers of x - knot, then V at each knot from the first.
+Parameters: where its data begin in the scene's curves, number of knots n, V of the formula below at x = 0, and by how
+much a piece goes on beyond its ends (`OVERLAP`). The data: n knots, then for each of the n - 1 pieces four coefficients
+of powers of x - knot, then V at each knot from the first.
+
+The second derivative jumps at the knots, where a step has to end if its error is to be of the method's order. So every
+piece is a mode: 1 is the line below the first knot, i + 1 the cubic behind knot i, n + 1 the line above the last knot;
+mode 0, of members whose mode nobody has set, is whichever piece x is in. Force and stiffness are continuous at a knot:
+accelerations do not jump there, and derivatives do not feel when it is passed.
 """
 
 from typing import Any
@@ -10,21 +16,26 @@ import numpy as np
 
 from mdstopo.jit import inline
 
+#: how far a piece goes on beyond its ends, relative to the narrowest: what rests on a knot does not change its mode by
+#: rounding, and the force is off by no more than the square of it
+OVERLAP = 1e-8
+
 
 @inline
-def curve_force(p, x, curves):  # type: ignore[no-untyped-def]
+def curve_force(p, x, mode, curves):  # type: ignore[no-untyped-def]
     """f, f_x, f_xd, V, V_x."""
     at = int(p[0])
     n = int(p[1])
     pieces = at + n
     stored = at + n + 4 * (n - 1)
-    if x <= curves[at]:
+    place = mode if mode > 0 else curve_piece(p, x, curves)
+    if place == 1:
         s = x - curves[at]
         f0 = curves[pieces]
         slope = curves[pieces + 1]
         f = f0 + slope * s
         return f, slope, 0.0, s * (f0 + 0.5 * slope * s) - p[2], f
-    if x >= curves[at + n - 1]:
+    if place == n + 1:
         o = pieces + 4 * (n - 2)
         w = curves[at + n - 1] - curves[at + n - 2]
         s = x - curves[at + n - 1]
@@ -32,20 +43,60 @@ def curve_force(p, x, curves):  # type: ignore[no-untyped-def]
         slope = curves[o + 1] + w * (2.0 * curves[o + 2] + 3.0 * w * curves[o + 3])
         f = f0 + slope * s
         return f, slope, 0.0, curves[stored + n - 1] + s * (f0 + 0.5 * slope * s) - p[2], f
-    low = 0
-    high = n - 1
-    while high - low > 1:
-        middle = (low + high) // 2
-        if curves[at + middle] <= x:
-            low = middle
-        else:
-            high = middle
+    low = place - 2
     o = pieces + 4 * low
     s = x - curves[at + low]
     f = curves[o] + s * (curves[o + 1] + s * (curves[o + 2] + s * curves[o + 3]))
     slope = curves[o + 1] + s * (2.0 * curves[o + 2] + 3.0 * s * curves[o + 3])
     energy = s * (curves[o] + s * (curves[o + 1] / 2.0 + s * (curves[o + 2] / 3.0 + s * curves[o + 3] / 4.0)))
     return f, slope, 0.0, curves[stored + low] + energy - p[2], f
+
+
+@inline
+def curve_piece(p, x, curves):  # type: ignore[no-untyped-def]
+    """The mode of the piece that x is in: 1 below the first knot, n + 1 from the last one on."""
+    at = int(p[0])
+    n = int(p[1])
+    low = -1
+    high = n
+    while high - low > 1:
+        middle = (low + high) // 2
+        if curves[at + middle] <= x:
+            low = middle
+        else:
+            high = middle
+    return low + 2
+
+
+@inline
+def curve_start(p, x, xd, xdd, curves):  # type: ignore[no-untyped-def]
+    """The mode at the start; on a knot, the piece that it moves into."""
+    ahead = xd if xd != 0.0 else xdd
+    if ahead == 0.0:
+        return curve_piece(p, x, curves)
+    return curve_piece(p, x + 0.5 * p[3] if ahead > 0.0 else x - 0.5 * p[3], curves)
+
+
+@inline
+def curve_margin(p, x, mode, curves):  # type: ignore[no-untyped-def]
+    """How far x is from the end of the piece, m."""
+    at = int(p[0])
+    n = int(p[1])
+    below = x - curves[at + mode - 2] if mode > 1 else np.inf
+    above = curves[at + mode - 1] - x if mode <= n else np.inf
+    return min(below, above) + p[3] if mode > 0 else np.inf
+
+
+@inline
+def curve_margin_slopes(p, x, mode, curves):  # type: ignore[no-untyped-def]
+    """Slopes of the margin by x and xd."""
+    at = int(p[0])
+    n = int(p[1])
+    if mode <= 0:
+        return 0.0, 0.0
+    if mode == 1 or (mode <= n and curves[at + mode - 1] - x < x - curves[at + mode - 2]):
+        return -1.0, 0.0
+    return 1.0, 0.0
 
 
 def curve_data(points: Any, at: int) -> tuple[list[float], list[float]]:
@@ -60,7 +111,8 @@ def curve_data(points: Any, at: int) -> tuple[list[float], list[float]]:
     areas = w * (c[:, 0] + w * (c[:, 1] / 2.0 + w * (c[:, 2] / 3.0 + w * c[:, 3] / 4.0)))
     stored = np.concatenate([[0.0], np.cumsum(areas)])
     data = np.concatenate([x, c.ravel(), stored])
-    parameters = np.array([0.0, len(x), 0.0])
-    parameters[2] = curve_force.py_func(parameters, 0.0, data)[3]  # type: ignore[attr-defined]
+    parameters = np.array([0.0, len(x), 0.0, OVERLAP * w.min()])
+    piece = int(np.searchsorted(x, 0.0, side="right")) + 1
+    parameters[2] = curve_force.py_func(parameters, 0.0, piece, data)[3]  # type: ignore[attr-defined]
     parameters[0] = at
     return parameters.tolist(), data.tolist()

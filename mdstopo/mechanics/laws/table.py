@@ -44,7 +44,14 @@ from mdstopo.mechanics.laws.crush import (
     crush_start,
 )
 from mdstopo.mechanics.laws.cubic import cubic_force, cubic_slopes
-from mdstopo.mechanics.laws.curve import curve_data, curve_force
+from mdstopo.mechanics.laws.curve import (
+    curve_data,
+    curve_force,
+    curve_margin,
+    curve_margin_slopes,
+    curve_piece,
+    curve_start,
+)
 from mdstopo.mechanics.laws.gap import (
     gap_force,
     gap_grazes,
@@ -99,7 +106,7 @@ def law(code, p, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
     if code == CUBIC:
         return cubic_force(p, x)
     if code == CURVE:
-        return curve_force(p, x, curves)
+        return curve_force(p, x, mode, curves)
     if code == PULSE:
         return pulse_force(p, t)
     if code == TABLE:
@@ -133,10 +140,10 @@ def law_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[n
 
 
 @inline
-def law_margin_slope(code, p, place, x, xd, mode):  # type: ignore[no-untyped-def]
+def law_margin_slope(code, p, place, x, xd, mode, curves):  # type: ignore[no-untyped-def]
     """Slope of the margin by the parameter at a place of the law's row, or by the free length."""
     if place == FREE_LENGTH:
-        by_x, _ = law_margin_slopes(code, p, x, xd, mode)
+        by_x, _ = law_margin_slopes(code, p, x, xd, mode, curves)
         return -by_x
     if code == GAP:
         return gap_margin_slope(p, place, x, xd, mode)
@@ -150,11 +157,11 @@ def law_margin_slope(code, p, place, x, xd, mode):  # type: ignore[no-untyped-de
 @inline
 def law_switches(code, p):  # type: ignore[no-untyped-def]
     """Whether the law has more than one mode."""
-    return code in (GAP, CRUSH) or (code == ACTUATOR and p[3] > 0.0)
+    return code in (GAP, CRUSH, CURVE) or (code == ACTUATOR and p[3] > 0.0)
 
 
 @inline
-def law_margin(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
+def law_margin(code, p, x, xd, mode, curves):  # type: ignore[no-untyped-def]
     """How far the mode is from its end; infinite where a law has one mode only."""
     if code == GAP:
         return gap_margin(p, x, xd, mode)
@@ -162,11 +169,13 @@ def law_margin(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
         return actuator_margin(p, x, xd, mode)
     if code == CRUSH:
         return crush_margin(p, x, xd, mode)
+    if code == CURVE:
+        return curve_margin(p, x, mode, curves)
     return np.inf
 
 
 @inline
-def law_margin_slopes(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
+def law_margin_slopes(code, p, x, xd, mode, curves):  # type: ignore[no-untyped-def]
     """Slopes of the margin by x and xd."""
     if code == GAP:
         return gap_margin_slopes(p, x, xd, mode)
@@ -174,21 +183,25 @@ def law_margin_slopes(code, p, x, xd, mode):  # type: ignore[no-untyped-def]
         return actuator_margin_slopes(p, x, xd, mode)
     if code == CRUSH:
         return crush_margin_slopes(p, x, xd, mode)
+    if code == CURVE:
+        return curve_margin_slopes(p, x, mode, curves)
     return 0.0, 0.0
 
 
 @inline
-def law_next(code, p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
+def law_next(code, p, x, xd, xdd, mode, curves):  # type: ignore[no-untyped-def]
     """The mode to go to where the margin is used up."""
     if code == GAP:
         return gap_next(p, x, xd, xdd, mode)
     if code == CRUSH:
         return crush_next(p, x, mode)
+    if code == CURVE:
+        return curve_piece(p, x, curves)
     return actuator_next(p, x, xd, mode)
 
 
 @inline
-def law_start(code, p, x, xd, xdd):  # type: ignore[no-untyped-def]
+def law_start(code, p, x, xd, xdd, curves):  # type: ignore[no-untyped-def]
     """The mode at the start of the motion."""
     if code == GAP:
         return gap_start(p, x, xd, xdd)
@@ -196,6 +209,8 @@ def law_start(code, p, x, xd, xdd):  # type: ignore[no-untyped-def]
         return actuator_start(p, x, xd)
     if code == CRUSH:
         return crush_start(p, x, xd, xdd)
+    if code == CURVE:
+        return curve_start(p, x, xd, xdd, curves)
     return 0
 
 

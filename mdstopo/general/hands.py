@@ -1,0 +1,217 @@
+"""Where the largest force of a group changes hands: which member leads when, to the last digit.
+
+In every step each member's force f*(t) is smooth. |f_a| = |f_b| where f_a - f_b or f_a + f_b vanishes: smooth functions
+both, whose roots are looked for between samples so near together that a cubic through values and rates tells all but
+the narrowest leads; where it does not tell, the motion itself is looked at. Only members come into question that may
+lead between two samples by a bound on their cubics. Forces that are the same at all samples of a step (laws of time
+alone, actuators at their limit, symmetry) have no changes of hands between them.
+"""
+
+from collections.abc import Callable, Iterator
+from itertools import combinations
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mdstopo.general.extremes import FRACTIONS
+from mdstopo.general.responses import MEMBER_FORCE, TIE
+from mdstopo.general.rivals import compare, members_of
+from mdstopo.scene.model import FloatArray, IndexArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
+
+#: samples of a step in which several members may lead
+FINE = np.linspace(0.0, 1.0, 17)
+#: forces looked at in one go, of all members at all samples
+BATCH = 4_000_000
+#: by what share of the largest force a member may stay below it by its cubic, and yet lead in truth
+CLOSE = 1e-3
+#: members that are compared between two samples at most, those with the largest forces
+MOST = 12
+#: the largest value of the cubics h10 and h11 of Hermite, which go with the rates
+BEND = 4.0 / 27.0
+#: the smallest part of a step that a member may lead for
+EDGE = 1e-9
+#: looks at a dip of a difference that may pass zero
+LOOKS = 4
+
+
+class Lead(NamedTuple):
+    """A member leads from fraction `low` to fraction `high` of a step."""
+
+    step: int
+    low: float
+    high: float
+    member: int
+
+
+def leads(driver: "GeneralDriver", j: int, t: FloatArray) -> list[Lead]:
+    """Who carries the largest force that response j looks at, in order of time; t (m + 1,): the steps' times."""
+    count, members = len(t) - 1, members_of(driver, j)
+    found: list[Lead] = []
+    if members == 1:
+        return [Lead(w, 0.0, 1.0, 0) for w in range(count)]
+    everyone = np.arange(members)
+    batch = max(1, BATCH // (members * len(FRACTIONS)))
+    for first in range(0, count, batch):
+        steps = np.arange(first, min(first + batch, count))
+        force, rate = _forces(driver, j, count, steps, np.array(FRACTIONS), everyone)
+        rate *= (np.diff(t)[steps] / (len(FRACTIONS) - 1))[None, :, None]
+        may = np.asarray(_may_lead(force, rate).any(axis=2))
+        leader = np.abs(force[:, :, len(FRACTIONS) // 2]).argmax(axis=0)
+        for i, w in enumerate(steps.tolist()):
+            who = np.flatnonzero(may[:, i])
+            who = who[_different(force[who, i])] if len(who) > 1 else who
+            if len(who) < 2:
+                found.append(Lead(w, 0.0, 1.0, int(leader[i])))
+            else:
+                found += _in_step(driver, j, count, w, float(t[w + 1] - t[w]), who)
+    return found
+
+
+def changes(leads_of: list[Lead], t: FloatArray) -> list[float]:
+    """The times within steps at which the lead changes."""
+    return [float(t[lead.step] + lead.low * (t[lead.step + 1] - t[lead.step])) for lead in leads_of if lead.low > 0.0]
+
+
+def is_led(driver: "GeneralDriver", j: int) -> bool:
+    """Whether response j is the largest force of several members."""
+    return bool(driver.scene.model.response[j, 0] == MEMBER_FORCE) and members_of(driver, j) > 1
+
+
+def _forces(
+    driver: "GeneralDriver", j: int, count: int, steps: IndexArray, fractions: FloatArray, who: IndexArray
+) -> tuple[FloatArray, FloatArray]:
+    """f* and its rate (C, steps, fractions) of members who (C,), on the quintics through the steps' ends."""
+    places = np.stack(np.broadcast_arrays(steps[:, None], fractions[None, :]), axis=-1).astype(np.float64)
+    _, seen = compare(driver, j, places.reshape(-1, 2), who, count)
+    shaped = seen.reshape(len(who), len(steps), len(fractions), 2)
+    return shaped[..., 0].copy(), shaped[..., 1].copy()
+
+
+def _may_lead(force: FloatArray, rate: FloatArray) -> FloatArray:
+    """(C, ..., K - 1) which members may lead between samples (C, ..., K); rates per interval between two samples."""
+    size = np.abs(force)
+    bend = BEND * (np.abs(rate[..., :-1]) + np.abs(rate[..., 1:]))
+    highest = np.maximum(size[..., :-1], size[..., 1:]) + bend
+    turns = force[..., :-1] * force[..., 1:] <= 0.0
+    lowest = np.where(turns, 0.0, np.minimum(size[..., :-1], size[..., 1:]) - bend)
+    found: FloatArray = highest >= (1.0 - CLOSE) * np.maximum(lowest.max(axis=0), 0.0)
+    return found
+
+
+def _different(force: FloatArray) -> IndexArray:
+    """Of members with samples force (C, K), one of each that have the same |f*| at all of them."""
+    kept: list[int] = []
+    size = np.abs(force)
+    largest = float(size.max())
+    for i in range(len(force)):
+        if not any(np.abs(size[i] - size[k]).max() <= TIE * largest for k in kept):
+            kept.append(i)
+    return np.array(kept, dtype=np.int64)
+
+
+def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who: IndexArray) -> list[Lead]:
+    """The leads within step w of length h, in which members who (C,) may lead."""
+    force, rate = (x[:, 0] for x in _forces(driver, j, count, np.array([w]), FINE, who))
+    rate *= h / (len(FINE) - 1)
+
+    def exact(fractions: FloatArray, members: IndexArray) -> FloatArray:
+        places = np.column_stack([np.full(len(fractions), float(w)), fractions])
+        seen: FloatArray = compare(driver, j, places, who[members], count, True)[1][:, :, 0]
+        return seen
+
+    may = _may_lead(force, rate)
+    cuts = [0.0]
+    for k in range(len(FINE) - 1):
+        near = np.flatnonzero(may[:, k])
+        if len(near) > MOST:
+            near = near[np.argsort(-np.abs(force[near, k : k + 2]).max(axis=1), kind="stable")[:MOST]]
+        for a, b in combinations(near.tolist(), 2):
+            for sign in (1.0, -1.0):
+                cuts += _roots(force, rate, k, a, b, sign, exact)
+    ends = np.array([*_apart(sorted(cuts)), 1.0])
+    middles = 0.5 * (ends[:-1] + ends[1:])
+    # what exact looks tell in the middle of all pieces: mostly there are none to look at but the whole step
+    size = np.abs(exact(middles, np.arange(len(who))))
+    first = (size >= (1.0 - TIE) * size.max(axis=0)).argmax(axis=0)
+    found: list[Lead] = []
+    for low, high, member in zip(ends[:-1].tolist(), ends[1:].tolist(), who[first].tolist(), strict=True):
+        if found and found[-1].member == member:
+            found[-1] = found[-1]._replace(high=high)
+        else:
+            found.append(Lead(w, low, high, member))
+    return found
+
+
+def _apart(cuts: list[float]) -> list[float]:
+    """Cuts, rising from 0, without those that leave next to nothing of the step before or behind them."""
+    kept = cuts[:1]
+    for cut in cuts[1:]:
+        if cut - kept[-1] > EDGE and cut < 1.0 - EDGE:
+            kept.append(cut)
+    return kept
+
+
+def _roots(
+    force: FloatArray,
+    rate: FloatArray,
+    k: int,
+    a: int,
+    b: int,
+    sign: float,
+    exact: Callable[[FloatArray, IndexArray], FloatArray],
+) -> Iterator[float]:
+    """Fractions of the step at which f_a - sign f_b vanishes between the samples k and k + 1."""
+    d, slope = force[a] - sign * force[b], rate[a] - sign * rate[b]
+    largest = float(max(np.abs(force[a]).max(), np.abs(force[b]).max()))
+    if float(np.abs(d).max()) <= TIE * largest:
+        return
+    d0, d1, s0, s1 = float(d[k]), float(d[k + 1]), float(slope[k]), float(slope[k + 1])
+    low, high = float(FINE[k]), float(FINE[k + 1])
+    pair = np.array([a, b])
+
+    def difference(c: float) -> float:
+        f = exact(np.array([c]), pair)
+        return float(f[0, 0] - sign * f[1, 0])
+
+    if (d0 >= 0.0) != (d1 >= 0.0):
+        yield from _bracketed(difference, low, high)
+        return
+    if not (d0 * s0 < 0.0 < d1 * s1):
+        return
+    # it comes nearer to zero and goes away again: the cubic says where, and whether that is worth a look
+    square, cube = 3.0 * (d1 - d0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (d1 - d0)
+    c = -s0 / (square + np.copysign(np.sqrt(max(square * square - 3.0 * cube * s0, 0.0)), d0))
+    dip = d0 + c * (s0 + c * (square + c * cube))
+    if not 0.0 < c < 1.0 or dip * d0 > (0.02 * min(abs(d0), abs(d1)) + 1e-4 * max(abs(s0), abs(s1))) * abs(d0):
+        return
+    c = low + c * (high - low)
+    width = 0.02 * (high - low)
+    for _ in range(LOOKS):
+        near = np.clip(np.array([c - width, c, c + width]), low, high)
+        f = exact(near, pair)
+        values = f[0] - sign * f[1]
+        beyond = np.flatnonzero(values * d0 < 0.0)
+        if len(beyond):
+            middle = float(near[beyond[0]])
+            yield from _bracketed(difference, low, middle)
+            yield from _bracketed(difference, middle, high)
+            return
+        bend = values[0] - 2.0 * values[1] + values[2]
+        if bend == 0.0:
+            return
+        c = float(np.clip(c + 0.5 * width * (values[0] - values[2]) / bend, low, high))
+        width *= 0.1
+
+
+def _bracketed(difference: Callable[[float], float], low: float, high: float) -> Iterator[float]:
+    """The root between two fractions at which a difference has two signs, if it has in truth."""
+    from scipy.optimize import brentq
+
+    first, last = difference(low), difference(high)
+    if first * last < 0.0:
+        yield float(brentq(difference, low, high, xtol=1e-15, rtol=1e-14))
+    elif first == 0.0 or last == 0.0:
+        yield low if first == 0.0 else high

@@ -1,0 +1,167 @@
+"""Minima over time of what has kinks: the largest of several forces, an absolute value, a norm.
+
+The minimum of the largest force may stand where two members change hands: there f_a falls and f_b rises, both have the
+value, and so does the minimum of a design nearby, where the time t of the crossing is another one:
+
+    dG = df_a + f_a' dt = df_b + f_b' dt,   so   dG = (f_b' df_a - f_a' df_b) / (f_b' - f_a'),
+
+a mean of both derivatives. A norm that passes zero has its minimum there and keeps it: dG = 0. Where it only comes near
+zero it turns round so sharply that its time has to be found better than from rates by differences: from its square,
+which is smooth.
+"""
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.general.extremes import (
+    FRACTION,
+    OTHER,
+    SHARE,
+    STEP,
+    TIME,
+    VALUE,
+    WHO,
+    ZERO,
+    Samples,
+    peaks,
+    sample,
+)
+from mdstopo.general.hands import Lead, changes, is_led, leads
+from mdstopo.general.responses import kinked
+from mdstopo.integrators.driver import CLOSENESS
+from mdstopo.scene.model import FloatArray, IndexArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
+
+#: a minimum below this share of the highest value may be a zero, or nearly one
+LOW = 0.05
+#: distances, in steps, of the places whose squares tell where a value turns round
+APART = (1e-2, 1e-3)
+#: how near to zero, as a time in steps at the rate beside it, a value is zero
+NOUGHT = 1e-9
+#: how near to zero a value is that has a kink where a step was made to end at its zero, relative to the highest
+LANDED = 1e-6
+
+
+class Pieces:
+    """The steps of a motion, those in which the largest force changes hands cut there: on each, response j is smooth.
+
+    t (P + 1,): their times. With `see` they are looked at as steps are.
+    """
+
+    def __init__(self, driver: "GeneralDriver", j: int, t: FloatArray) -> None:
+        self._driver, self._j, self._count = driver, j, len(t) - 1
+        led = is_led(driver, j)
+        self.leads = leads(driver, j, t) if led else [Lead(w, 0.0, 1.0, -1) for w in range(len(t) - 1)]
+        self._step = np.array([lead.step for lead in self.leads])
+        self._low = np.array([lead.low for lead in self.leads])
+        self._high = np.array([lead.high for lead in self.leads])
+        self._member = np.array([lead.member for lead in self.leads])
+        self.t: FloatArray = np.append(t[self._step] + self._low * (t[self._step + 1] - t[self._step]), t[-1])
+        self.changes = changes(self.leads, t)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Looks at all pieces."""
+        return sample(self.t, self.see)
+
+    def see(self, places: FloatArray, exact: bool) -> FloatArray:
+        """(K, 3) value, rate, member at places (K, 2): pieces and fractions of them."""
+        k = places[:, 0].astype(np.int64)
+        real = np.column_stack([self._step[k], self.fraction(k, places[:, 1])])
+        out = np.empty((len(k), 3))
+        for member in np.unique(self._member[k]).tolist():
+            own = self._member[k] == member
+            out[own] = self._driver.visit(self._j, real[own], exact, self._count, who=member)[2]
+        return out
+
+    def fraction(self, k: IndexArray, c: FloatArray) -> FloatArray:
+        """The fractions of steps that are fractions c of pieces k."""
+        low, high = self._low[k], self._high[k]
+        return np.asarray(np.where(c >= 1.0, high, low + c * (high - low)))
+
+    def value(self, k: int, fractions: FloatArray) -> FloatArray:
+        """Values at fractions of the step that piece k is in, of the member that leads there."""
+        real = np.column_stack([np.full(len(fractions), float(self._step[k])), fractions])
+        seen = self._driver.visit(self._j, real, True, self._count, who=int(self._member[k]), rates=False)[2]
+        value: FloatArray = seen[:, 0]
+        return value
+
+    def settle(self, row: FloatArray, k: int, c: float) -> None:
+        """Say in a row of piece k that its place is fraction c of its step."""
+        lead = self.leads[k]
+        row[STEP], row[FRACTION] = lead.step, c
+        row[TIME] = self.t[k] + (c - lead.low) / (lead.high - lead.low) * (self.t[k + 1] - self.t[k])
+
+
+def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> list[FloatArray]:
+    """The minima of response j that come near the lowest, as rows of `extremes`; t (m + 1,): the steps' times."""
+    pieces = Pieces(driver, j, t)
+    samples = pieces.samples
+    rows = peaks(samples, pieces.see, -1.0, CLOSENESS)
+    highest = float(np.abs(samples.value).max())
+    bent = bool(kinked.py_func(driver.scene.model, j))  # type: ignore[attr-defined]
+    for row in rows:
+        k, c = int(row[STEP]), float(row[FRACTION])
+        between = k if c <= 0.0 else k + 1  # which boundary, where it is one
+        pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
+        if c <= 0.0 or c >= 1.0:
+            if 0 < between < len(pieces.leads):
+                _at_boundary(row, pieces, between, highest, _stated(driver, pieces, between))
+        elif bent and row[VALUE] <= LOW * highest:
+            _turned_round(row, pieces, k)
+    return rows
+
+
+def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated: bool) -> None:
+    """Complete a row at the boundary in front of piece b, where a value that falls may begin to rise.
+
+    stated: whether the time is given, or an event's: then it varies as that does.
+    """
+    before, behind = pieces.see(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
+    row[VALUE] = (before if row[FRACTION] == pieces.leads[b - 1].high else behind)[0]
+    (falls, first), (rises, second) = before[1:].tolist(), behind[1:].tolist()
+    if not falls < 0.0 < rises:
+        return
+    if first == second:
+        if row[VALUE] <= LANDED * highest:
+            row[VALUE], row[OTHER] = 0.0, ZERO
+    elif not stated:
+        row[WHO], row[OTHER], row[SHARE] = first, second, -falls / (rises - falls)
+
+
+def _stated(driver: "GeneralDriver", pieces: Pieces, b: int) -> bool:
+    """Whether the time in front of piece b is one of the case's, or an event's."""
+    lead = pieces.leads[b]
+    if lead.low > 0.0:
+        return False
+    index = driver.room_ints[: 4 * (int(driver.limits[1]) + 1)].reshape(-1, 4)
+    happened = int(index[lead.step, 3]) - int(index[lead.step - 1, 3])
+    return happened > 0 or bool(np.any(driver.times == pieces.t[b]))
+
+
+def _turned_round(row: FloatArray, pieces: Pieces, k: int) -> None:
+    """Complete a row inside piece k whose value is low: where exactly its square is lowest, and whether it is zero."""
+    c = float(row[FRACTION])
+    least = slope = 0.0
+    for d in APART:
+        nodes = min(max(c - 2.0 * d, 0.0), 1.0 - 4.0 * d) + d * np.arange(5.0)
+        u = (nodes - c) / d
+        by_power = np.linalg.solve(np.vander(u, increasing=True), pieces.value(k, nodes) ** 2)
+        square = np.polynomial.Polynomial(by_power)
+        rate, bend = square.deriv(), square.deriv(2)
+        x = 0.0
+        for _ in range(8):
+            if not bend(x) > 0.0:
+                return
+            x = float(np.clip(x - rate(x) / bend(x), u[0], u[-1]))
+        c += d * x
+        least, slope = float(square(x)), 0.5 * float(bend(x)) / d**2
+    if least <= NOUGHT**2 * slope:
+        row[VALUE], row[OTHER] = 0.0, ZERO
+    else:
+        row[VALUE] = pieces.value(k, np.array([c]))[0]
+    pieces.settle(row, k, c)
