@@ -23,6 +23,7 @@ from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_o
 from mdstopo.scene.culprit import Culprits
 from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.origin import origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
 from mdstopo.sensitivity.reductions import REDUCTIONS
 from mdstopo.status import Status
@@ -69,7 +70,10 @@ class Evaluator:
         self._may_be_coarse = case.solver.step is not None and self.integrator == "generalized_alpha"
         self._compiles_beside = beside
         self._beside = Beside(self.integrator, share) if beside and not self.beyond else None
-        self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
+        #: what the scenes' coordinates are measured from, and the case in these
+        self._origin = origin_of(case)
+        self._near = seen_from(case, self._origin)
+        self.scenes: Mapping[str, AnyScene] = _compile(self._near, bool(self.beyond))
         self._drivers: dict[str, AnyDriver] = {}
         self._culprits: dict[str, Culprits] = {}
         self._coarse: dict[str, str] = {}
@@ -197,7 +201,7 @@ class Evaluator:
             if meeting >= 0:
                 status, message = Status.ZERO_LENGTH, self._member(load_case, meeting)
         work = work_named(driver.work.tolist())
-        return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
+        return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work, self._origin)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`.
@@ -296,7 +300,7 @@ class Evaluator:
             else:
                 from mdstopo.general.driver import GeneralDriver
 
-                driver = GeneralDriver(self.case, scene, self._method, tolerance, step)
+                driver = GeneralDriver(self._near, scene, self._method, tolerance, step)
             if self.integrator == "generalized_alpha" and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
 
@@ -318,7 +322,7 @@ class Evaluator:
         if name not in self._culprits:
             scene = self.scenes[name]
             assert isinstance(scene, Scene)
-            self._culprits[name] = Culprits(self.case, scene)
+            self._culprits[name] = Culprits(self._near, scene)
         return self._culprits[name]
 
     def _explain(
