@@ -42,14 +42,24 @@ _Tie = TypeVar("_Tie", Joint, Bushing)
 
 def origin_of(case: Case) -> Pair:
     """The point that the scene is computed from, in the file's coordinates; (0, 0) for scenes about the origin."""
-    cloud = np.concatenate(list(_places(case)))
-    low, high = cloud.min(axis=0), cloud.max(axis=0)
+    low, high = _corners(case)
     half = 0.5 * float((high - low).max())
     if half == 0.0:
         return 0.0, 0.0  # one body that nothing is tied to
     grid = 2.0 ** math.ceil(math.log2(WIDER * half))
     x, y = (grid * round(middle / grid) for middle in (0.5 * low + 0.5 * high).tolist())
     return x, y
+
+
+def extent_of(case: Case) -> float:
+    """The larger side of the box around bodies and what ties them, m."""
+    low, high = _corners(case)
+    return float((high - low).max())
+
+
+def _corners(case: Case) -> tuple[FloatArray, FloatArray]:
+    cloud = np.concatenate(list(_places(case)))
+    return cloud.min(axis=0), cloud.max(axis=0)
 
 
 def ends_of(group: MemberGroup, as_stated: bool = False) -> tuple[str, str, FloatArray, FloatArray]:
