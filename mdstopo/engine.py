@@ -23,6 +23,7 @@ from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_o
 from mdstopo.scene.culprit import Culprits
 from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.origin import extent_of, origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
 from mdstopo.sensitivity.reductions import REDUCTIONS
 from mdstopo.status import Status
@@ -51,11 +52,12 @@ HISTORY = 50
 class Evaluator:
     """A case, ready to be evaluated again and again.
 
-    beside: compile with a second process at the first use on a machine; share: what else that does (`warm`).
-    Raises CaseError where the case asks for what the engine cannot do yet.
+    beside: compile with a second process at the first use on a machine; share: what else that does (`warm`). sample:
+    0, or which of the scene's other roundings it computes (`scene.rounding`); what it tells is then not in the file's
+    coordinates. Raises CaseError where the case asks for what the engine cannot do yet.
     """
 
-    def __init__(self, case: Case, beside: bool = True, share: Sequence[str] = ()) -> None:
+    def __init__(self, case: Case, beside: bool = True, share: Sequence[str] = (), sample: int = 0) -> None:
         refused = refusals(case)
         if refused:
             raise CaseError(refused, str(case.path or case.name))
@@ -69,7 +71,14 @@ class Evaluator:
         self._may_be_coarse = case.solver.step is not None and self.integrator == "generalized_alpha"
         self._compiles_beside = beside
         self._beside = Beside(self.integrator, share) if beside and not self.beyond else None
-        self.scenes: Mapping[str, AnyScene] = _compile(case, bool(self.beyond))
+        #: what the scenes' coordinates are measured from, and the case in these
+        self._origin = origin_of(case)
+        self._near = seen_from(case, self._origin)
+        if sample:
+            from mdstopo.scene.rounding import rounded_otherwise
+
+            self._near = rounded_otherwise(case, self._origin, extent_of(case), sample)
+        self.scenes: Mapping[str, AnyScene] = _compile(self._near, bool(self.beyond))
         self._drivers: dict[str, AnyDriver] = {}
         self._culprits: dict[str, Culprits] = {}
         self._coarse: dict[str, str] = {}
@@ -94,7 +103,7 @@ class Evaluator:
             if group.power < 1.0
         ]
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
-        self._others: dict[tuple[tuple[str, Any], ...], Evaluator] = {}
+        self._others: dict[tuple[Any, ...], Evaluator] = {}
 
     # -- what a run asks
 
@@ -176,12 +185,15 @@ class Evaluator:
 
         return Estimator(self)
 
-    def otherwise(self, **solver: Any) -> "Evaluator":
-        """The evaluator of the same case with other solver settings, made once for each set of them."""
-        key = tuple(sorted(solver.items()))
+    def otherwise(self, sample: int = 0, **solver: Any) -> "Evaluator":
+        """The evaluator of the same case with other solver settings, made once for each set of them.
+
+        sample: as of the constructor.
+        """
+        key = (sample, *sorted(solver.items()))
         if key not in self._others:
             case = replace(self.case, solver=replace(self.case.solver, **solver))
-            self._others[key] = Evaluator(case, self._compiles_beside)
+            self._others[key] = Evaluator(case, self._compiles_beside, sample=sample)
         return self._others[key]
 
     def trajectory(self, alpha: FloatArray, load_case: str) -> Trajectory:
@@ -200,7 +212,7 @@ class Evaluator:
             if meeting >= 0:
                 status, message = Status.ZERO_LENGTH, self._member(load_case, meeting)
         work = work_named(driver.work.tolist())
-        return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work)
+        return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work, self._origin)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`.
@@ -299,7 +311,7 @@ class Evaluator:
             else:
                 from mdstopo.general.driver import GeneralDriver
 
-                driver = GeneralDriver(self.case, scene, self._method, tolerance, step)
+                driver = GeneralDriver(self._near, scene, self._method, tolerance, step)
             if self.integrator == "generalized_alpha" and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
 
@@ -321,7 +333,7 @@ class Evaluator:
         if name not in self._culprits:
             scene = self.scenes[name]
             assert isinstance(scene, Scene)
-            self._culprits[name] = Culprits(self.case, scene)
+            self._culprits[name] = Culprits(self._near, scene)
         return self._culprits[name]
 
     def _explain(

@@ -19,6 +19,7 @@ from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
+from mdstopo.scene.origin import ends_of
 from mdstopo.scene.signals import breakpoints, segment_values
 
 COMPONENTS = {"x": 0, "y": 1, "norm": 2}
@@ -166,7 +167,8 @@ def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int
     first = start = 0
     segments = len(times) - 1
     for number, group in enumerate(case.members):
-        pair = pairs.setdefault((index[group.body_from], index[group.body_to]), len(pairs))
+        first_body, second_body, p_local, q_local = ends_of(group)
+        pair = pairs.setdefault((index[first_body], index[second_body]), len(pairs))
         for place, record in enumerate(group.laws):
             rest = getattr(record, "free_length", None)
             code = laws.CODES[record.type]
@@ -179,7 +181,7 @@ def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int
                 count = len(part)
                 padded = -(-count // VECTOR) * VECTOR
                 member = np.zeros((5, padded))
-                member[0:2, :count], member[2:4, :count] = group.p_local[part].T, group.q_local[part].T
+                member[0:2, :count], member[2:4, :count] = p_local[part].T, q_local[part].T
                 member[4, :count] = group.length[part] if rest is None else rest
                 variable = first + int(part[0]) if group.design else -1
                 blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0])])

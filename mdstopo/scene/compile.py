@@ -12,6 +12,7 @@ import numpy as np
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, MemberGroup, SpringLaw
 from mdstopo.scene.grids import row_of
 from mdstopo.scene.model import BLOCK, VECTOR, FloatArray, IndexArray, Model
+from mdstopo.scene.origin import ends_of
 from mdstopo.scene.signals import breakpoints, segment_values
 
 ELASTIC, VISCOUS = 0, 1
@@ -65,10 +66,11 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     start = 0
     for group in case.members:
         law = _spring(group)
-        pair = pairs.setdefault((index[group.body_from], index[group.body_to]), len(pairs))
         count = len(group)
         kind = VISCOUS if law.damping > 0.0 or law.preload != 0.0 else ELASTIC
         width, length = row_of(group, kind == ELASTIC)
+        first_body, second_body, _, _ = ends_of(group, as_stated=width > 0)
+        pair = pairs.setdefault((index[first_body], index[second_body]), len(pairs))
         places = count // length * width if length else count
         stop = start + -(-places // VECTOR) * VECTOR
         blocks.append([pair, start, stop, kind, first if group.design else -1, count, width, length])
@@ -94,8 +96,9 @@ def _fill(group: MemberGroup, block: list[int], member: FloatArray) -> None:
     shape = (count // length, length) if width else (1, count)
     rows = member[:, start : start + shape[0] * (width or count)].reshape(8, shape[0], -1)
     own = rows[:, :, : shape[1]]
-    own[0:2] = group.p_local.T.reshape(2, *shape)
-    own[2:4] = group.q_local.T.reshape(2, *shape)
+    _, _, p_local, q_local = ends_of(group, as_stated=width > 0)
+    own[0:2] = p_local.T.reshape(2, *shape)
+    own[2:4] = q_local.T.reshape(2, *shape)
     own[4] = (group.length if law.free_length is None else np.full(count, law.free_length)).reshape(shape)
     own[5:8] = np.array([law.stiffness, law.damping, law.preload])[:, None, None]
     # what is between and behind them is the last one once more: no place has a length of its own

@@ -85,3 +85,49 @@ def test_the_methods_of_other_steps_are_estimated_on_those_steps():
     exact = evaluate(with_solver(paper("fig6"), tolerance=1e-12))
     true = np.abs(found.gradients["G"] - exact.gradients["G"]).max()
     assert found.errors["G"].gradient == pytest.approx(true, rel=0.2)
+
+
+#: length m, stiffness N/m, mass kg, load N, end s: a spring whose elongation is near the rounding of its length
+ROUNDED = {
+    "a long member": (1e4, 1.0, 1.0, 1e-4, 2.0),
+    "a long member for some periods": (1e4, 1.0, 1.0, 1e-4, 20.5),
+    "a light body": (1.0, 1.0, 1e-6, 1e-6, 0.01),
+    "a stiff member": (1.0, 1e8, 1.0, 2.0, 0.0031),
+    "a stiff member for hundreds of periods": (1.0, 1e8, 1.0, 2.0, 0.31),
+    "a moment": (1.0, 100.0, 1.0, 100.0, 1e-6),
+    "a member that stretches": (1.0, 100.0, 1.0, 10.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("integrator", ["gauss", "runge_kutta"])
+@pytest.mark.parametrize("which", ROUNDED)
+def test_estimates_know_what_rounding_leaves_of_a_small_elongation(which, integrator):
+    """Against the closed form x = F/(alpha k) (1 - cos wt), w^2 = alpha k/m, G = alpha k x^2/2."""
+    length, k, m, force, end = ROUNDED[which]
+    case = read(
+        {
+            "time": {"end": end},
+            "bodies": {"ball": {"mass": m, "inertia": m, "position": [length, 0.0]}},
+            "members": {
+                "tie": {
+                    "from": {"body": "ground", "at": [0.0, 0.0]},
+                    "to": {"body": "ball", "at": [length, 0.0]},
+                    "law": {"type": "spring", "stiffness": k},
+                }
+            },
+            "loads": [{"body": "ball", "force": [force, 0.0]}],
+            "design": {"initial": 1.0},
+            "objectives": {"G": {"response": "energy", "over_time": "final"}},
+        },
+        tolerance=1e-10,
+        integrator=integrator,
+    )
+    phase = math.sqrt(k / m) * end
+    x = 2.0 * force / k * math.sin(0.5 * phase) ** 2
+    value = 0.5 * k * x * x
+    gradient = value + k * x * (0.5 * phase * math.sin(phase) * force / k - x)
+    found = evaluate(case, error_estimate=True)
+    error = found.errors["G"]
+    assert abs(found.objectives["G"] - value) <= 10.0 * error.value
+    assert abs(found.gradients["G"][0] - gradient) <= 10.0 * error.gradient
+    assert error.value <= 1e-4 * value  # it is an estimate still

@@ -1,0 +1,182 @@
+"""A scene that stands far from the origin, moved close to it before it is compiled.
+
+Nothing that is looked at depends on where a scene stands, but its digits do: coordinates of 1e6 m leave 1e-10 m of an
+elongation, and a member that is tied to `ground` has an arm of 1e6 m, whose square stands in the moments' derivatives.
+So a scene is compiled in coordinates from a point of its own, and places are told in the file's (`Trajectory`).
+
+The point is a multiple of a power of two above the scene's size: differences from it are exact, scenes about the origin
+stay where they are to the last bit, and a scene that is moved by such a multiple is computed with the same numbers.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from mdstopo.case.model import (
+    GROUND,
+    Body,
+    Bushing,
+    Case,
+    Contact,
+    Joint,
+    LoadCase,
+    MemberGroup,
+    Motion,
+    Objective,
+    Pair,
+    Prescribed,
+    ResponseRow,
+    Table,
+)
+from mdstopo.scene.model import FloatArray
+
+#: the grid of origins is at least so many times as wide as half the scene
+WIDER = 4.0
+
+_Row = TypeVar("_Row", Objective, ResponseRow)
+_Tie = TypeVar("_Tie", Joint, Bushing)
+
+
+def origin_of(case: Case) -> Pair:
+    """The point that the scene is computed from, in the file's coordinates; (0, 0) for scenes about the origin."""
+    low, high = _corners(case)
+    half = 0.5 * float((high - low).max())
+    if half == 0.0:
+        return 0.0, 0.0  # one body that nothing is tied to
+    grid = 2.0 ** math.ceil(math.log2(WIDER * half))
+    x, y = (grid * round(middle / grid) for middle in (0.5 * low + 0.5 * high).tolist())
+    return x, y
+
+
+def extent_of(case: Case) -> float:
+    """The larger side of the box around bodies and what ties them, m."""
+    low, high = _corners(case)
+    return float((high - low).max())
+
+
+def _corners(case: Case) -> tuple[FloatArray, FloatArray]:
+    cloud = np.concatenate(list(_places(case)))
+    return cloud.min(axis=0), cloud.max(axis=0)
+
+
+def ends_of(group: MemberGroup, as_stated: bool = False) -> tuple[str, str, FloatArray, FloatArray]:
+    """First and second body of a group, and its members' ends (M, 2) on each, in body coordinates; ground comes first.
+
+    Poses are told in the first body's frame: from a body that turns, a far point of ground moves fast, and the square
+    of its distance stands in what has to cancel. as_stated: keep the ends as they are (members in rows of a grid).
+    """
+    if group.body_to == GROUND and not as_stated:
+        return group.body_to, group.body_from, group.q_local, group.p_local
+    return group.body_from, group.body_to, group.p_local, group.q_local
+
+
+def _places(case: Case) -> Iterator[FloatArray]:
+    """Where bodies and what ties them are at the start, (any, 2) each."""
+    yield np.array([body.position for body in case.bodies])
+    for group in case.members:
+        yield group.from_world
+        yield group.to_world
+    ties: tuple[Joint | Bushing, ...] = (*case.joints, *case.bushings)
+    for tie in ties:
+        for name, at in zip(tie.bodies, (tie.at_first, tie.at_second), strict=True):
+            if name == GROUND:
+                yield np.array([at])
+    for contact in case.contacts:
+        if contact.edge_body == GROUND:
+            yield np.array([contact.edge_from, contact.edge_to])
+        if contact.body == GROUND:
+            yield contact.points
+
+
+def seen_from(case: Case, origin: Pair) -> Case:
+    """The same scene in coordinates from `origin`; the case itself where that is (0, 0).
+
+    What only words are made of (`from_world`, `points`) stays as in the file.
+    """
+    if origin == (0.0, 0.0):
+        return case
+    bodies = _bodies(case.bodies, origin)
+    stands = {body.name: body for body in bodies}
+    return replace(
+        case,
+        bodies=bodies,
+        members=tuple(_group(group, stands, origin) for group in case.members),
+        contacts=tuple(_contact(contact, origin) for contact in case.contacts),
+        load_cases=tuple(_load_case(load_case, origin) for load_case in case.load_cases),
+        objectives=tuple(_looked(objective, origin) for objective in case.objectives),
+        constraints=tuple(_looked(row, origin) if isinstance(row, ResponseRow) else row for row in case.constraints),
+        joints=tuple(_tie(joint, origin) for joint in case.joints),
+        bushings=tuple(_tie(bushing, origin) for bushing in case.bushings),
+    )
+
+
+def _from(at: Pair, origin: Pair) -> Pair:
+    return at[0] - origin[0], at[1] - origin[1]
+
+
+def _bodies(bodies: tuple[Body, ...], origin: Pair) -> tuple[Body, ...]:
+    return tuple(replace(body, position=_from(body.position, origin)) for body in bodies)
+
+
+def _tie(tie: _Tie, origin: Pair) -> _Tie:
+    """A joint or bushing; its end on ground, where it has one, from `origin`."""
+    first, second = tie.bodies
+    if first == GROUND:
+        tie = replace(tie, at_first=_from(tie.at_first, origin))
+    if second == GROUND:
+        tie = replace(tie, at_second=_from(tie.at_second, origin))
+    return tie
+
+
+def _group(group: MemberGroup, stands: dict[str, Body], origin: Pair) -> MemberGroup:
+    """A group with ends on ground from `origin`, and with lengths that its own coordinates have."""
+    ends: dict[str, Any] = {}
+    places = []
+    for side, name in (("from", group.body_from), ("to", group.body_to)):
+        local = getattr(group, f"{side}_local")
+        if name == GROUND:
+            ends[f"{side}_local"] = place = local - np.array(origin)
+        else:
+            body = stands[name]
+            c, s = math.cos(body.angle), math.sin(body.angle)
+            place = local @ np.array([[c, s], [-s, c]]) + np.array(body.position)
+        places.append(place)
+    d = places[1][group.to_index] - places[0][group.from_index]
+    return replace(group, **ends, length=np.hypot(d[:, 0], d[:, 1]))
+
+
+def _contact(contact: Contact, origin: Pair) -> Contact:
+    if contact.edge_body == GROUND:
+        edge_from, edge_to = _from(contact.edge_from, origin), _from(contact.edge_to, origin)
+        contact = replace(contact, edge_from=edge_from, edge_to=edge_to)
+    if contact.body == GROUND:
+        contact = replace(contact, points=contact.points - np.array(origin))
+    return contact
+
+
+def _looked(row: _Row, origin: Pair) -> _Row:
+    """An objective or constraint; a point on ground that is looked at, from `origin`."""
+    seen = row.response
+    if seen.body != GROUND or seen.at_local is None:
+        return row
+    return replace(row, response=replace(seen, at_local=_from(seen.at_local, origin)))
+
+
+def _load_case(load_case: LoadCase, origin: Pair) -> LoadCase:
+    motions = tuple(_motion(motion, origin) for motion in load_case.motions)
+    return replace(load_case, bodies=_bodies(load_case.bodies, origin), motions=motions)
+
+
+def _motion(motion: Motion, origin: Pair) -> Motion:
+    """A motion whose positions, where it prescribes such, are from `origin`."""
+    return replace(motion, x=_along(motion.x, origin[0]), y=_along(motion.y, origin[1]))
+
+
+def _along(part: Prescribed | None, along: float) -> Prescribed | None:
+    if part is None or part.kind != "position":
+        return part
+    assert isinstance(part.signal, Table)
+    return Prescribed("position", Table(part.signal.times, part.signal.values - along))

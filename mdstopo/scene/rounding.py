@@ -1,0 +1,39 @@
+"""The same scene, rounded otherwise: a sample of what double precision leaves uncertain.
+
+Two evaluations of one scene that differ in nothing but their tolerance round elongations alike, so their difference
+says nothing of what rounding does. Where a member of length L is stretched by Delta, its force is uncertain by
+eps L / Delta; states are rounded at every step, which adds up over many periods. Here the scene is computed from
+another point, so that its states round otherwise, and each length and each attachment point is moved to one of its
+neighbours in double precision. What that changes is what rounding changes, its growth in time included.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from mdstopo.case.model import Case, MemberGroup, Pair
+from mdstopo.scene.model import FloatArray
+from mdstopo.scene.origin import seen_from
+
+#: the other point is so far away, of the scene's size: coordinates stay as large as they are
+APART = 0.05, 0.2
+
+
+def rounded_otherwise(case: Case, origin: Pair, size: float, sample: int) -> Case:
+    """The case in coordinates from a point near `origin`, with neighbours of its numbers; sample: which, from 1."""
+    random = np.random.default_rng(sample)
+    x, y = (size * random.uniform(*APART, 2)).tolist()
+    moved = seen_from(case, (origin[0] + x, origin[1] + y))
+    return replace(moved, members=tuple(_nudged(group, random) for group in moved.members))
+
+
+def _nudged(group: MemberGroup, random: np.random.Generator) -> MemberGroup:
+    arrays = {name: _neighbours(getattr(group, name), random) for name in ("from_local", "to_local", "length")}
+    return replace(group, **arrays)
+
+
+def _neighbours(numbers: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Of each number the next larger or smaller one; zeros, which are exact, stay."""
+    towards = np.where(random.random(numbers.shape) < 0.5, -np.inf, np.inf)
+    found: FloatArray = np.where(numbers == 0.0, 0.0, np.nextafter(numbers, towards))
+    return found
