@@ -179,6 +179,8 @@ class _Run:
         ended = time.perf_counter()
         best = best_of(self.case, self.states)
         if best is None:
+            if path is not None and self.combining.solved:
+                self.save(path, RunStatus.INTERRUPTED, "stopped on request; the individual optima are saved")
             raise KeyboardInterrupt
         status, reason = self.conclude(best)
         if status not in (RunStatus.RUNNING, RunStatus.INTERRUPTED):
