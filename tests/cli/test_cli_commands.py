@@ -242,7 +242,8 @@ def test_gradient_stores_histories_of_the_direct_method(capsys: pytest.CaptureFi
         t = file["trajectories/default/t"][()]
         history = file["sensitivities/direct/history/G"][()]
         assert history.shape == (len(t), 12)
-        assert not history[0].any()
+        # at the start nothing is strained, but for the rounding of lengths
+        assert abs(history[0]).max() < 1e-20 * abs(history).max()
     status, _, err = call(capsys, "gradient", "probe.yaml", "--method", "adjoint", "--history")
     assert status == 2
     assert "--history needs --method direct" in err

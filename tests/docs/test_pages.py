@@ -105,6 +105,9 @@ def test_blocks_are_found_with_their_titles_and_comments() -> None:
     [
         ("  G  6.81 at 0.2 s", "G 6.80874694 at 0.2 s", True),
         ("G 6.82", "G 6.80874694", False),
+        ("shock 122", "shock 121.495", True),
+        ("shock 121", "shock 121.505", True),
+        ("shock 123", "shock 121.505", False),
         ("46, ... evaluations", "46, 47 evaluations", True),
         ("45 iterations", "46 iterations", False),
         ("a.yaml:3:5: unknown key ...", "a.yaml:3:5: unknown key 'x', allowed", True),
@@ -112,6 +115,8 @@ def test_blocks_are_found_with_their_titles_and_comments() -> None:
         ("0.00", "0.004", True),
         ("102", "102.4", True),
         ("102", "103.4", False),
+        ("0.100", "0.0998", True),
+        ("9.99", "10.01", False),
         ("102", "103", False),
         ("nothing", "anything", False),
     ],
