@@ -3,7 +3,8 @@
 A block's title is the file that it is written to, in a folder of the page's own; later blocks find it there. A comment
 above a block says more: `<!-- part: KEY -->` (YAML that is the value of a key of a case, or has the key), `<!-- exit: 2
 -->` (how the last command of a console block ends), `<!-- wrong -->` (a case that is refused), `<!-- needs:
-pandas -->` (modules without which a Python block is left out).
+pandas -->` (modules without which a Python block is left out), `<!-- example -->` (part of a worked example of how to
+extend the program: `test_extending`).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 
 _FENCE = re.compile(r"^(?P<indent> *)(?P<ticks>`{3,}|~{3,}) *(?P<language>[\w+-]*)(?P<rest>[^`]*)$")
-_COMMENT = re.compile(r"^\s*<!-- (part|exit|wrong|needs)(?:: (\S.*?))? -->\s*$")
+_COMMENT = re.compile(r"^\s*<!-- (part|exit|wrong|needs|example)(?:: (\S.*?))? -->\s*$")
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w])")
 _ELSEWHERE = "..."
 
@@ -40,6 +41,7 @@ class Block:
     part: str = ""
     exit: int = 0
     wrong: bool = False
+    example: bool = False
     needs: tuple[str, ...] = ()
 
 
@@ -77,6 +79,7 @@ def blocks(text: str) -> list[Block]:
                 marks.get("part", ""),
                 int(marks.get("exit", "0")),
                 "wrong" in marks,
+                "example" in marks,
                 tuple(marks["needs"].split(", ")) if "needs" in marks else (),
             )
         )
