@@ -69,8 +69,8 @@ def _check_step(fields: Fields, spans: list[float], reading: Reading) -> None:
 
 def _is_damped(fields: Fields) -> bool:
     """Whether the integrator is generalized_alpha."""
-    integrator = fields["integrator"]
-    return integrator == "generalized_alpha" or (integrator == "auto" and fields["sensitivity"] == "iterative")
+    integrator: str = fields["integrator"]
+    return integrator == "generalized_alpha" or (integrator == "auto" and str(fields["sensitivity"]) == "iterative")
 
 
 def _warn_ignored(fields: Fields, reading: Reading) -> None:
