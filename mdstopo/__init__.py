@@ -43,3 +43,8 @@ def __getattr__(name: str) -> Any:
         globals()[name] = value
         return value
     raise AttributeError(f"module 'mdstopo' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """All names, those not resolved yet too, so that `dir` and completion show the calls."""
+    return sorted({*globals(), *__all__})

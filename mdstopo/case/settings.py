@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
@@ -13,6 +14,10 @@ from mdstopo.optimizer.options import OPTIONS
 
 MOST_STEPS = 10**8
 """Fixed steps in one load case; more would neither end nor fit in memory."""
+FEWEST_STEPS = 16
+"""Steps of generalized_alpha in a load case below which there is a warning: they hardly tell the motion."""
+ROUNDING = 1e-9
+"""Share of a length of time that does not count: 0.3 / 3 is as good as 0.1."""
 
 
 def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> SolverSettings:
@@ -26,13 +31,8 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
             inside(fields.path, "sensitivity"),
             f"iterative does not go with the integrator {integrator}: it needs generalized_alpha (or auto)",
         )
-    longest = max((window.end - window.start for window in times.values() if window.good), default=0.0)
-    if step is not None and step is not BAD and longest / step > MOST_STEPS:
-        reading.mistake(
-            inside(fields.path, "step"),
-            f"found {number_text(step)}: {count_text(int(min(longest / step, 1e300)))} steps in "
-            f"{number_text(longest)} s; allowed are {count_text(MOST_STEPS)}",
-        )
+    if step is not None and step is not BAD:
+        _check_step(fields, [window.end - window.start for window in times.values() if window.good], reading)
     if not fields.good():
         return SolverSettings()
     _warn_ignored(fields, reading)
@@ -41,10 +41,41 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
     )
 
 
+def _check_step(fields: Fields, spans: list[float], reading: Reading) -> None:
+    """Refuse a fixed step that no load case of such a length (s) can be computed with; warn of one that is coarse."""
+    step, path = fields["step"], inside(fields.path, "step")
+    longest, shortest = max(spans, default=0.0), min(spans, default=step)
+    if longest / step > MOST_STEPS:
+        reading.mistake(
+            path,
+            f"found {number_text(step)}: {count_text(int(min(longest / step, 1e300)))} steps in "
+            f"{number_text(longest)} s; allowed are {count_text(MOST_STEPS)}",
+        )
+    elif step > shortest * (1.0 + ROUNDING):
+        whose = "the motion" if longest == shortest else "the shortest load case"
+        reading.mistake(
+            path,
+            f"found {number_text(step)}: longer than {whose}, which takes {number_text(shortest)} s; allowed is less",
+        )
+    elif _is_damped(fields) and shortest < FEWEST_STEPS * step * (1.0 - ROUNDING):
+        count = math.ceil(shortest / step * (1.0 - ROUNDING))
+        words = "one step" if count == 1 else f"{count} steps"
+        reading.warning(
+            path,
+            f"{words} of generalized_alpha for {number_text(shortest)} s: what comes out may have little to do with "
+            "the motion; halve the step until nothing changes, or leave it out",
+        )
+
+
+def _is_damped(fields: Fields) -> bool:
+    """Whether the integrator is generalized_alpha."""
+    integrator: str = fields["integrator"]
+    return integrator == "generalized_alpha" or (integrator == "auto" and str(fields["sensitivity"]) == "iterative")
+
+
 def _warn_ignored(fields: Fields, reading: Reading) -> None:
     integrator = fields["integrator"]
-    damped = integrator == "generalized_alpha" or (integrator == "auto" and fields["sensitivity"] == "iterative")
-    if "spectral_radius" in fields.stated and not damped:
+    if "spectral_radius" in fields.stated and not _is_damped(fields):
         message = f"the integrator {integrator} ignores spectral_radius: only generalized_alpha has one"
         reading.warning(inside(fields.path, "spectral_radius"), message)
     if "step" in fields.stated and "tolerance" in fields.stated:

@@ -7,6 +7,8 @@ import click
 from mdstopo.cli.options import FILE, result_argument
 from mdstopo.cli.output import Output
 
+_NOT_IN_TABLES = ("optimizer", "resume", "pareto/tasks", "sweep/tasks", "combine/tasks")
+
 
 @click.command("export")
 @result_argument
@@ -24,7 +26,7 @@ def command(result_path: Path, kind: str | None, out: Path | None, quiet: bool) 
     from mdstopo.store.stored_case import case_of
 
     output = Output(json=False, quiet=quiet)
-    view = read_result(result_path, leave_out=("optimizer", "resume", "pareto/tasks", "sweep/tasks", "combine/tasks"))
+    view = read_result(result_path, leave_out=_NOT_IN_TABLES if kind == "csv" else ())
     place = out or result_path.with_suffix(f".{kind}")
     try:
         if kind == "json":

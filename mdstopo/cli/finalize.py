@@ -96,7 +96,7 @@ def command(
         replace_file(place, done.text.encode())
     _say(output, done, place)
     output.document(_document(done, place))
-    for warning in (*done.outcome.warnings, *(each for each in map(_trouble, done.columns) if each), *done.told):
+    for warning in (*_warnings(done), *(each for each in map(_trouble, done.columns) if each)):
         output.notice(f"warning: {warning}")
     if not done.text:
         output.notice(f"{place} is not written: {_why(done)}")
@@ -175,9 +175,15 @@ def _trouble(column: Any) -> str:
     return "" if found.status.ok else f"{column.title}: {found.status.value}: {getattr(found, 'message', '')}"
 
 
+def _warnings(done: "Finalized") -> tuple[str, ...]:
+    return (*done.outcome.warnings, *done.told, *([done.rest.moved] if done.rest.moved else []))
+
+
 def _why(done: "Finalized") -> str:
     if not done.columns:
         return "the run was interrupted"
+    if done.rest.fallen:
+        return f"{done.rest.fallen}; keep more members"
     if any(not column.found.status.usable for column in done.columns[-2:]):
         return "the motion of its design cannot be computed"
     return "all members have alpha = 0"
@@ -219,6 +225,7 @@ def _document(done: "Finalized", place: Path) -> dict[str, Any]:
         "evaluations": done.outcome.evaluations,
         "verified_with": done.tighter or None,
         "difference": done.difference,
-        "warnings": [*done.outcome.warnings, *done.told],
+        "warnings": _warnings(done),
         "path": str(place) if done.text else None,
+        "not_written": None if done.text else _why(done),
     }

@@ -2,6 +2,13 @@
 
 import os
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from mdstopo.cli.output import Output
 
 
 class Interrupts:
@@ -31,3 +38,47 @@ class Interrupts:
         if not self._quiet:
             # Not print: the signal may have come while the stream was being written.
             os.write(2, b"\nfinishing the iteration (once more to end at once)\n")
+
+
+@contextmanager
+def saying_how_to_go_on(
+    output: Output, command: str, case: str, path: Path, resume: bool, again: str
+) -> Iterator[None]:
+    """Where what is done here is interrupted, say by which command it goes on, if anything of it has been saved.
+
+    command, case: their names; path: the result file; resume: whether it is one of before that is continued; again: the
+    command that goes on. Raises click's Exit with the status of an interruption then, else KeyboardInterrupt.
+    """
+    before = _stamp(path)
+    try:
+        yield
+    except KeyboardInterrupt:
+        if not (resume or _stamp(path) != before) or not _is_unfinished(path):
+            raise
+        reason = "stopped on request; what was saved last can be continued"
+        output.document(
+            {"command": command, "case": case, "status": "interrupted", "reason": reason, "path": path, "resume": again}
+        )
+        output.notice(f"interrupted; to go on: {again}")
+        raise click.exceptions.Exit(3) from None
+
+
+def _stamp(path: Path) -> tuple[int, int] | None:
+    """What changes whenever a file is replaced; None where there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
+def _is_unfinished(path: Path) -> bool:
+    """Whether a file holds a result that `--resume` continues."""
+    from mdstopo.store.errors import StoreError
+    from mdstopo.store.reader import read_result
+
+    large = ("trajectories", "sensitivities", "optimizer", "iterations", "members", "pareto", "sweep", "combine")
+    try:
+        return not read_result(path, leave_out=large).finished
+    except StoreError:
+        return False

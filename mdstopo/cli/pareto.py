@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdstopo.cli.front_display import front_display
-from mdstopo.cli.interrupt import Interrupts
+from mdstopo.cli.interrupt import Interrupts, saying_how_to_go_on
 from mdstopo.cli.options import (
     CASE_FILE,
     EXIT,
@@ -89,7 +89,8 @@ def command(
     line = shlex.join(["mdstopo", *sys.argv[1:]])
     path = result_path(out, case, "pareto")
     ask = _asked(case, path if resume else None, weights, points, method, starts)
-    with front_display(quiet) as show:
+    again = resumed(line)
+    with saying_how_to_go_on(output, "pareto", case.name, path, resume, again), front_display(quiet) as show:
         outcome = run_front(
             case,
             ask,
@@ -103,7 +104,6 @@ def command(
             notify=output.notice,
             command=line,
         )
-    again = resumed(line)
     _say(output, outcome)
     output.document(_document(outcome, again))
     for warning in outcome.warnings:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from mdstopo.cli.interrupt import Interrupts
+from mdstopo.cli.interrupt import Interrupts, saying_how_to_go_on
 from mdstopo.cli.options import (
     EXIT,
     alpha_option,
@@ -68,7 +68,8 @@ def command(
     path = result_path(out, case)
     from mdstopo.session.run import run_session
 
-    with display(quiet) as show:
+    again = resume_command(case_path, out, overrides, alpha_path, starts, workers)
+    with saying_how_to_go_on(output, "run", case.name, path, resume, again), display(quiet) as show:
         outcome = run_session(
             case,
             path=path,
@@ -82,7 +83,6 @@ def command(
             notify=output.notice,
             command=shlex.join(["mdstopo", *sys.argv[1:]]),
         )
-    again = resume_command(case_path, out, overrides, alpha_path, starts, workers)
     _summarise(output, outcome, path)
     output.document(_document(outcome, path, again))
     for warning in outcome.warnings:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from mdstopo.cli.front_display import front_display
-from mdstopo.cli.interrupt import Interrupts
+from mdstopo.cli.interrupt import Interrupts, saying_how_to_go_on
 from mdstopo.cli.options import (
     EXIT,
     case_argument,
@@ -76,12 +76,13 @@ def set_values(
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="'KEY=a:b:step'") from None
     line = shlex.join(["mdstopo", *sys.argv[1:]])
-    with front_display(quiet) as show:
+    path, again = result_path(out, case, "sweep"), resumed(line)
+    with saying_how_to_go_on(output, "sweep", case.name, path, resume, again), front_display(quiet) as show:
         outcome = run_sweep(
             case_path,
             {},
             wanted,
-            path=result_path(out, case, "sweep"),
+            path=path,
             resume=resume,
             overwrite=overwrite,
             workers=workers,
@@ -91,7 +92,6 @@ def set_values(
             notify=output.notice,
             command=line,
         )
-    again = resumed(line)
     _say(output, outcome)
     output.document(_document(outcome, again))
     if outcome.status == "interrupted":

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
+from mdstopo.finalize.rest import Rest, compare_rest
 from mdstopo.finalize.text import text_of
 from mdstopo.finalize.values import Parameter, told_apart
 from mdstopo.scene.refusals import refusals
@@ -56,7 +57,8 @@ class Finalized:
     columns: full design, kept, re-optimised, verified, the last two those of the final case where there are such
     parameters and it says all. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words.
     text: the final case, empty where there is none; told: what it cannot say. difference: largest relative one between
-    its objectives and those of the re-optimised design, None where it has none.
+    its objectives and those of the re-optimised design, None where it has none. rest: where the final design settles,
+    beside the full one; there is no text where it has fallen.
     """
 
     case: Case
@@ -72,6 +74,7 @@ class Finalized:
     told: list[str]
     difference: float | None
     values: list[Parameter]
+    rest: Rest = field(default_factory=Rest)
 
 
 def opened(
@@ -153,7 +156,8 @@ def finalize(
     text is empty where the run was interrupted or its design cannot be computed.
     """
     design = case.whole(design)
-    held = kept_values(apart(case, unlike(case, kept)), kept)
+    joined = apart(case, unlike(case, kept))
+    held = kept_values(joined, kept)
     count = len(kept)
     before = design[np.concatenate([kept, case.n_design + held])]
     outcome = run_session(
@@ -164,10 +168,13 @@ def finalize(
     now = reduced.space.expand(first_design(reduced, problem_of(engine, even(reduced)), reached)[1])
     own = places(case, kept)
     values = told_apart(case, held, before[count:], now[count:])
+    rest = Rest()
 
     def made(columns: tuple[Column, ...], words: str, text: str, told: list[str], gap: float | None) -> Finalized:
         sizes, stated = now[:count], before[:count]
-        return Finalized(case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values)
+        return Finalized(
+            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, rest
+        )
 
     if outcome.status is RunStatus.INTERRUPTED:
         return made((), "", "", [], None)
@@ -190,6 +197,12 @@ def finalize(
     verified = make_engine(tighter).evaluate(sized, gradient=False)
     columns = (full, first, Column("re-optimised", count, found), Column("verified", count, verified))
     if not (found.status.usable and verified.status.usable):
+        return made(columns, words, "", [], None)
+    end = design.copy()  # the final design as one of the full case: members left out have no size
+    end[: case.n_design] = 0.0
+    end[kept], end[case.n_design + held] = now[:count], now[count:]
+    rest = compare_rest(joined, design, end, reduced, now)
+    if rest.fallen:
         return made(columns, words, "", [], None)
     return made(columns, words, text, told, difference)
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, scaled, spacing
+from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, repeated, scaled, spacing
 from mdstopo.front.plan import TOLERATED, Front
 from mdstopo.front.tasks import Found
 from mdstopo.optimizer.structure import sign_of
@@ -151,11 +151,11 @@ class Quality:
 
 
 def quality(case: Case, front: Front) -> Quality:
-    """Of the front's points that keep the constraints and are not dominated."""
+    """Of the front's points that keep the constraints and are not dominated, of the same ones the first."""
     signs = np.array([sign_of(objective) for objective in case.objectives])
     good = [each for each in front.points if each is not None and each.usable and each.violation <= TOLERATED]
     points = signs * np.array([each.objectives for each in good]).reshape(len(good), len(signs))
-    kept = points[~dominated(points)]
+    kept = points[~(dominated(points) | repeated(points))]
     if not len(kept):
         nothing = np.full(len(signs), np.nan)
         return Quality(0.0, 0.0, 0.0, nothing, nothing)

@@ -8,22 +8,35 @@ Bools = NDArray[np.bool_]
 
 #: the reference point of a front's hypervolume, in objectives scaled to its own ideal and nadir
 REFERENCE = 1.1
+#: relative difference up to which two values of an objective are the same: finer than optima are found
+ALIKE = 1e-6
 
 
 def dominated(points: Floats) -> Bools:
     """(W,) whether another point is at least as good in every objective and better in one; points (W, m).
 
-    Points that are not finite are dominated. Of equal points the first is not.
+    Better is what is lower by more than `ALIKE` of the value: by the last bit nobody is beaten, and equal points do not
+    beat each other. Points that are not finite are dominated.
     """
     finite: Bools = np.array(np.isfinite(points).all(axis=1))
     marked: Bools = np.array(~finite)
+    others = points[finite]
     for j in np.flatnonzero(finite).tolist():
-        others = points[finite]
-        places = np.flatnonzero(finite)
         no_worse = (others <= points[j]).all(axis=1)
-        better = (others < points[j]).any(axis=1)
-        marked[j] = bool(np.any(no_worse & (better | (places < j))))
+        better = ((others < points[j]) & ~_alike(others, points[j])).any(axis=1)
+        marked[j] = bool(np.any(no_worse & better))
     return marked
+
+
+def repeated(points: Floats) -> Bools:
+    """(W,) whether an earlier point is the same, but for `ALIKE` of its values; points (W, m)."""
+    return np.array([bool(_alike(points[:j], points[j]).all(axis=1).any()) for j in range(len(points))], dtype=np.bool_)
+
+
+def _alike(points: Floats, point: Floats) -> Bools:
+    """(W, m) whether values are the same, but for `ALIKE` of them."""
+    size = np.maximum(np.abs(points), np.abs(point))
+    return np.asarray(np.abs(points - point) <= ALIKE * size)
 
 
 def hypervolume(points: Floats, reference: Floats) -> float:

@@ -28,6 +28,11 @@ def __getattr__(name: str) -> type:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}") from None
 
 
+def __dir__() -> list[str]:
+    """The module's own names and the types that are made by now."""
+    return sorted({*globals(), *_KINDS})
+
+
 def bundle(maker: type, fields: tuple[str, ...]) -> None:
     """Let `maker(...)` in kernels make a structure from its fields, in their order; each maker has its own type."""
 

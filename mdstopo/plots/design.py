@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS, new_figure
+from mdstopo.plots.style import COLOURS, MOST_NAMED, new_figure
 
 #: members that still are stems of their own
 STEMS = 400
@@ -24,6 +24,6 @@ def draw(module: Any, source: Source) -> Any:
     axis.set_xlabel("member")
     axis.set_ylabel("alpha")
     axis.set_ylim(bottom=min(0.0, float(alpha.min(initial=0.0))))
-    if len(source.case.group_slices) > 1:
+    if 1 < len(source.case.group_slices) <= MOST_NAMED:
         axis.legend()
     return figure

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import GROUND
-from mdstopo.plots.scenery import edge_at, ends_at, outline, start_state
+from mdstopo.plots.scenery import edge_at, ends_at, outline, sizes, start_state
 from mdstopo.plots.source import Floats, Source
-from mdstopo.plots.style import COLOURS, WIDTH
+from mdstopo.plots.style import COLOURS, MOST_NAMED, WIDTH
 from mdstopo.plots.watch import points_at
 
 #: of the range of alpha: what is thinner is not drawn
@@ -86,8 +86,7 @@ def _members(axis: Any, source: Source, q: Floats) -> None:
         colour = COLOURS[k % len(COLOURS)]
         style = "-"
         if group.design:
-            values = source.alpha[slices[group.name]]
-            share = (values - group.lower) / max(group.upper - group.lower, 1e-300)
+            share = sizes(group, source.alpha[slices[group.name]])
         else:
             share, style = np.full(len(group), 0.5), "--"
         order = np.argsort(share)[-MOST:]
@@ -97,7 +96,8 @@ def _members(axis: Any, source: Source, q: Floats) -> None:
             LineCollection(list(ends[order]), colors=colour, linewidths=widths, alpha=0.8, linestyles=style),
             autolim=True,
         )
-        axis.plot([], [], style, color=colour, label=group.name)
+        if len(case.members) <= MOST_NAMED:
+            axis.plot([], [], style, color=colour, label=group.name)
 
 
 def _look_at_design(axis: Any, source: Source, q: Floats) -> None:

@@ -12,6 +12,17 @@ Floats = NDArray[np.float64]
 PRESENT = 0.5
 
 
+def sizes(group: MemberGroup, alpha: Floats) -> Floats:
+    """(M,) how much there is of each member of a group of design members, from 0 to 1, as a share of the group's range.
+
+    alpha (M,). Members that have no range (lower = upper, as in the cases that `finalize` writes) are as much there as
+    alpha says.
+    """
+    width = group.upper - group.lower
+    share: Floats = (alpha - group.lower) / width if width > 0.0 else alpha
+    return np.clip(share, 0.0, 1.0)
+
+
 def outline(case: Case, body: str) -> Floats:
     """(K, 2) corners of the convex hull of a body's points and its centre of mass, in body coordinates."""
     pieces = [np.zeros((1, 2))] if body != GROUND else []

@@ -12,6 +12,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 #: beside the colours, for print without them
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)), (0, (3, 1)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+#: groups of members up to which a legend names each; a finalised design has as many groups as members
+MOST_NAMED = 12
 #: inches: one column of a page, and its usual height
 WIDTH, HEIGHT = 3.5, 2.6
 FORMATS = (".png", ".svg", ".pdf")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import GROUND, Case, GapLaw, MemberGroup, SpringLaw
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
-from mdstopo.plots.scenery import outline, start_state
+from mdstopo.plots.scenery import outline, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.watch import points_at, response_history
 
@@ -129,8 +129,7 @@ def _members(case: Case, alpha: Floats) -> tuple[dict[str, Any], list[tuple[Memb
     shares = []
     for group in case.members:
         if group.design:
-            values = alpha[slices[group.name]]
-            shares.append((values - group.lower) / max(group.upper - group.lower, 1e-300))
+            shares.append(sizes(group, alpha[slices[group.name]]))
         else:
             shares.append(np.ones(len(group)))
     every = np.concatenate(shares) if shares else np.zeros(0)

@@ -179,6 +179,8 @@ class _Run:
         ended = time.perf_counter()
         best = best_of(self.case, self.states)
         if best is None:
+            if path is not None and self.combining.solved:
+                self.save(path, RunStatus.INTERRUPTED, "stopped on request; the individual optima are saved")
             raise KeyboardInterrupt
         status, reason = self.conclude(best)
         if status not in (RunStatus.RUNNING, RunStatus.INTERRUPTED):
@@ -348,15 +350,15 @@ class _Run:
         """The status, where no design keeps the constraints: then the optimiser has converged to nothing of use."""
         state = self.states[best]
         assert state is not None
-        if status is RunStatus.FAILED or state.best_violation <= self.case.optimizer.tolerance:
-            return status, reason
-        if self.constraints is None:
+        if state.best_violation <= self.case.optimizer.tolerance or self.constraints is None:
             return status, reason
         excess = [
             {"limit": value, "at_least": -value, "equals": abs(value)}[row.sense] / (abs(row.bound) or 1.0)
             for row, value in zip(self.case.constraints, self.constraints.tolist(), strict=True)
         ]
         i = int(np.argmax(excess))
+        if not excess[i] > 0.0:  # the optimiser failed before it had looked at any design
+            return status, reason
         row = self.case.constraints[i]
         word = {"limit": "above its limit", "at_least": "below its least", "equals": "away from its"}[row.sense]
         sentence = (

@@ -123,6 +123,9 @@ ONE = [
     ("objectives:", "optimizer: {peaks: 0}\nobjectives:", "0}\nobj", "optimizer.peaks", [">= 1"]),
     ("objectives:", "solver: {step: 0}\nobjectives:", "0}\nobj", "solver.step", ["> 0"]),
     ("objectives:", "solver: {step: 1e-12}\nobjectives:", "1e-12", "solver.step", ["steps"]),
+    ("objectives:", "solver: {step: 10, integrator: generalized_alpha}\nobjectives:", "10, int", "solver.step",
+     ["found 10", "longer than the motion", "0.2 s"]),
+    ("objectives:", "solver: {step: 0.2001}\nobjectives:", "0.2001", "solver.step", ["longer than the motion"]),
     ("objectives:", "solver: {tolerance: 0}\nobjectives:", "0}\nobj", "solver.tolerance", ["> 0"]),
     ("objectives:", "solver: {spectral_radius: 1.1}\nobjectives:", "1.1", "solver.spectral_radius", ["<= 1"]),
     ("objectives:", "solver: {sensitivity: iterative, integrator: gauss}\nobjectives:", "iterative",
@@ -183,6 +186,30 @@ def test_a_single_mistake_is_told_once_with_place_key_found_and_allowed(
     assert mistake.path_key == key
     for word in words:
         assert word in mistake.message
+
+
+def test_a_fixed_step_has_to_fit_the_shortest_load_case() -> None:
+    cases = "solver: {step: 0.15}\nload_cases: {one: {}, two: {time: {end: 0.1}}}\nobjectives:"
+    text = changed(SMALL, ("objectives:", cases), ("response: energy", "response: energy, load_case: one"))
+    (mistake,) = mistakes(text)
+    assert mistake.path_key == "solver.step"
+    assert "found 0.15: longer than the shortest load case, which takes 0.1 s" in mistake.message
+
+
+@pytest.mark.parametrize(
+    ("solver", "words"),
+    [
+        ("step: 0.2, integrator: generalized_alpha", "one step of generalized_alpha for 0.2 s"),
+        ("step: 0.1, sensitivity: iterative", "2 steps of generalized_alpha for 0.2 s"),
+        ("step: 0.0134, integrator: generalized_alpha", "15 steps of generalized_alpha"),
+        ("step: 0.0125, integrator: generalized_alpha", None),
+        ("step: 0.2, integrator: gauss", None),
+    ],
+)
+def test_so_few_fixed_steps_that_they_hardly_tell_the_motion_are_warned_of(solver: str, words: str | None) -> None:
+    case = read_case(changed(SMALL, ("objectives:", f"solver: {{{solver}}}\nobjectives:")))
+    found = [each for each in case.warnings if each.path_key == "solver.step"]
+    assert [words in each.message for each in found] == ([] if words is None else [True])
 
 
 def test_all_mistakes_are_told_together_sorted_by_place() -> None:

@@ -1,6 +1,7 @@
 """`mdstopo finalize`: the members kept, their sizes, and the case that repeats their motion."""
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -425,3 +426,66 @@ def test_an_interrupted_run_writes_no_case(tmp_path: Path) -> None:
     done = finalize(case, alpha, kept, reduced, place=tmp_path / "x.yaml", stop_requested=lambda: next(asked, True))
     assert done.outcome.status == "interrupted"
     assert (done.text, done.columns) == ("", ())
+
+
+#: held upright by four stays; a single one is too soft for that
+MAST = """\
+format: 1
+gravity: [0, -10]
+time: {end: 0.05}
+bodies:
+  mast: {mass: 10, inertia: 1, position: [0.02, 1]}
+joints:
+  - {type: revolute, bodies: [ground, mast], at: [0, 0]}
+points:
+  top: {body: mast, grid: {list: [[0, 1.5]]}}
+  pegs: {body: ground, grid: {list: [[-1, 1.5], [-1, 1.3], [1, 1.5], [1, 1.3]]}}
+members:
+  stays: {from: top, to: pegs, law: {type: spring, stiffness: 40, damping: 1}}
+objectives:
+  G: {response: energy}
+solver: {settle: true, integrator: runge_kutta}
+optimizer: {max_iterations: 0}
+"""
+
+
+@pytest.fixture(scope="module")
+def mast(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("mast")
+    (folder / "mast.yaml").write_text(MAST)
+    np.savetxt(folder / "start.txt", [0.9, 0.8, 0.85, 0.8])
+    words = ["--alpha", str(folder / "start.txt"), "--out", str(folder / "mast.h5"), "--quiet"]
+    assert run_group(["run", str(folder / "mast.yaml"), *words]) in (0, 1)
+    return folder / "mast.h5"
+
+
+def test_a_machine_that_falls_to_another_equilibrium_is_not_accepted(
+    mast: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "one.yaml"
+    status, said, err = call(capsys, "finalize", str(mast), "--keep", "1", "--out", str(out), "--json")
+    assert status == 1
+    assert not out.exists()
+    document = json.loads(said)
+    assert document["path"] is None
+    assert re.search(
+        r"rests 1\.\d+ m \(body 'mast'\) .* at another equilibrium: .*; keep more", document["not_written"]
+    )
+    assert document["not_written"] in err
+
+
+def test_a_machine_that_rests_where_the_full_one_does_is_accepted_and_a_long_way_is_told(
+    mast: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "three.yaml"
+    status, said, _ = call(capsys, "finalize", str(mast), "--keep", "3", "--out", str(out), "--json")
+    document = json.loads(said)
+    assert (status, document["path"], document["not_written"]) == (0, str(out), None)
+    assert not [each for each in document["warnings"] if "rests" in each]
+    # a stay that just holds: it leans over by far, to the same equilibrium
+    words = ["--keep", "1", "--set", "members.stays.law.stiffness=56", "--out", str(tmp_path / "leans.yaml"), "--json"]
+    status, said, _ = call(capsys, "finalize", str(mast), *words)
+    document = json.loads(said)
+    assert (status, document["not_written"]) == (0, None)
+    (warning,) = [each for each in document["warnings"] if "rests" in each]
+    assert re.search(r"rests 0\.\d+ m \(body 'mast'\) and 0\.\d+ rad", warning)

@@ -2,11 +2,17 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from mdstopo import cli
+from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
+from mdstopo.session.callbacks import ignore, never
+from mdstopo.session.run import _Run
+from mdstopo.status import RunStatus
 from tests.front.support import CASE
 from tests.front.test_combined_runs import single
 
@@ -26,10 +32,25 @@ def test_a_run_that_finds_no_feasible_design_fails_and_names_the_constraint(caps
     status = run_group(["run", "probe.yaml", "--json"])
     content = json.loads(capsys.readouterr().out)
     assert "no design was found that keeps the constraints: constraints[1] is" in content["reason"]
+    # which of the two, and why, is a matter of rounding here
     assert (status, content["status"]) in ((1, "failed"), (1, "max_iterations"))
     assert content["constraints"][1] > 0.0
     assert run_group(["run", "probe.yaml", "--overwrite"]) == status
     assert "max displacement of torso relative to vehicle" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("status", [RunStatus.FAILED, RunStatus.CONVERGED, RunStatus.MAX_ITERATIONS])
+def test_the_violated_constraint_is_named_whatever_the_optimiser_ended_with(status):
+    case = read_case(single().replace("equals: 7.2}", "equals: 7.2}" + LIMIT))
+    run = _Run(case, None, ignore, never, ignore, "")
+    run.states = [SimpleNamespace(best_violation=0.5)]
+    run.constraints = np.array([1e-12, 0.5e-6])
+    word, reason = run.judge(0, status, "why it ended")
+    assert word is (RunStatus.FAILED if status is RunStatus.CONVERGED else status)
+    assert "no design was found that keeps the constraints: constraints[1] is 5e-07 above its limit 1e-06" in reason
+    assert reason.endswith("(why it ended)")
+    run.states = [SimpleNamespace(best_violation=0.0)]
+    assert run.judge(0, status, "why it ended") == (status, "why it ended")
 
 
 def test_constraints_and_objectives_of_the_output_are_of_one_design(capsys):

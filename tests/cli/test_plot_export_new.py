@@ -2,6 +2,7 @@
 
 import csv
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -9,11 +10,12 @@ import numpy as np
 import pytest
 
 from mdstopo.cli.group import run_group
-from mdstopo.plots.scenery import edge_at, hull, outline, start_state
+from mdstopo.plots.scenery import edge_at, hull, outline, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import styled
 from mdstopo.plots.table import PLOTS, fitting
 from mdstopo.plots.watch import response_history
+from mdstopo.report.content import content
 from tests.front.support import CASE
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -147,13 +149,64 @@ def test_tables_hold_what_the_file_holds(results, tmp_path):
         assert [float(row["alpha"]) for row in members] == file["design/alpha"][()].tolist()
 
 
+@pytest.fixture(scope="module")
+def final(results):
+    """The motion of a finalised design: every member is a group whose bounds are equal."""
+    case, motion = (results["run"].with_name(name) for name in ("run.final.yaml", "final.h5"))
+    assert run_group(["finalize", str(results["run"]), "--keep", "14", "--out", str(case), "--quiet"]) == 0
+    assert run_group(["simulate", str(case), "--out", str(motion), "--quiet"]) == 0
+    return motion
+
+
+def test_members_without_a_range_are_drawn(final):
+    source = Source(final)
+    assert all(group.lower == group.upper == 1.0 for group in source.case.members)
+    with styled() as module:
+        (axis,) = PLOTS["layout"].draw(module, source).axes
+        assert [len(each.get_segments()) for each in axis.collections] == [1] * 14
+        assert len({float(width) for each in axis.collections for width in each.get_linewidths()}) == 1
+    page = content(source)
+    rows = page["designs"][0]["members"]["rows"]
+    assert len(rows) == 14
+    assert {row[7] for row in rows} == {1.0}
+
+
+def test_a_size_is_a_share_of_the_range_or_alpha_itself_where_there_is_none(results):
+    group = Source(results["run"]).case.members[0]
+    alpha = np.linspace(0.0, 1.0, len(group))
+    assert sizes(replace(group, lower=0.2, upper=0.6), alpha) == pytest.approx(np.clip((alpha - 0.2) / 0.4, 0.0, 1.0))
+    assert np.array_equal(
+        sizes(replace(group, lower=0.3, upper=0.3), np.full(len(group), 0.3)), np.full(len(group), 0.3)
+    )
+    assert sizes(replace(group, lower=3.0, upper=3.0), np.full(len(group), 3.0)).max() == 1.0
+
+
+def test_a_legend_names_groups_only_while_it_leaves_room_for_the_picture(results, final):
+    with styled() as module:
+        few, many = (PLOTS["layout"].draw(module, Source(path)) for path in (results["run"], final))
+    assert [text.get_text() for text in few.legends[0].get_texts()] == ["torso", "vehicle", "belts"]
+    assert [text.get_text() for text in many.legends[0].get_texts()] == ["torso", "vehicle"]
+
+
+@pytest.mark.parametrize("kind", ["run", "pareto", "gradient"])
+def test_json_has_every_dataset_of_the_file_by_its_path(results, kind, tmp_path):
+    out = tmp_path / "all.json"
+    assert run_group(["export", str(results[kind]), "--json", "--out", str(out), "--quiet"]) == 0
+    found = json.loads(out.read_text())["datasets"]
+    paths: list[str] = []
+    with h5py.File(results[kind]) as file:
+        file.visititems(lambda path, node: paths.append(path) if isinstance(node, h5py.Dataset) else None)
+    assert sorted(found) == sorted(paths)
+    assert any(path.startswith("optimizer/") for path in paths) == (kind == "run")
+
+
 def test_json_holds_every_dataset_and_null_for_what_is_not_known(results, tmp_path):
     out = tmp_path / "front.json"
     assert run_group(["export", str(results["pareto"]), "--json", "--out", str(out), "--quiet"]) == 0
-    content = json.loads(out.read_text())
+    found = json.loads(out.read_text())["datasets"]
     with h5py.File(results["pareto"]) as file:
-        assert content["datasets"]["pareto/alpha"] == file["pareto/alpha"][()].tolist()
-    assert None in [value for row in content["datasets"]["pareto/visited/0"] for value in row]
+        assert found["pareto/alpha"] == file["pareto/alpha"][()].tolist()
+    assert None in [value for row in found["pareto/visited/0"] for value in row]
     assert run_group(["export", str(results["pareto"])]) == 2
 
 

@@ -3,7 +3,8 @@
 A block's title is the file that it is written to, in a folder of the page's own; later blocks find it there. A comment
 above a block says more: `<!-- part: KEY -->` (YAML that is the value of a key of a case, or has the key), `<!-- exit: 2
 -->` (how the last command of a console block ends), `<!-- wrong -->` (a case that is refused), `<!-- needs:
-pandas -->` (modules without which a Python block is left out).
+pandas -->` (modules without which a Python block is left out), `<!-- example -->` (part of a worked example of how to
+extend the program: `test_extending`).
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(DOCS.rglob("*.md"))
 
 _FENCE = re.compile(r"^(?P<indent> *)(?P<ticks>`{3,}|~{3,}) *(?P<language>[\w+-]*)(?P<rest>[^`]*)$")
-_COMMENT = re.compile(r"^\s*<!-- (part|exit|wrong|needs)(?:: (\S.*?))? -->\s*$")
+_COMMENT = re.compile(r"^\s*<!-- (part|exit|wrong|needs|example)(?:: (\S.*?))? -->\s*$")
 _NUMBER = re.compile(r"(?<![\w.])[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?![\w])")
 _ELSEWHERE = "..."
 
@@ -40,6 +41,7 @@ class Block:
     part: str = ""
     exit: int = 0
     wrong: bool = False
+    example: bool = False
     needs: tuple[str, ...] = ()
 
 
@@ -77,6 +79,7 @@ def blocks(text: str) -> list[Block]:
                 marks.get("part", ""),
                 int(marks.get("exit", "0")),
                 "wrong" in marks,
+                "example" in marks,
                 tuple(marks["needs"].split(", ")) if "needs" in marks else (),
             )
         )
@@ -194,8 +197,9 @@ def commands(text: str) -> list[tuple[str, list[str]]]:
 def occurs(shown: str, printed: str) -> bool:
     """Whether a line that a page shows is in what was printed.
 
-    Blanks count as one; `...` stands for anything. Whole numbers must be equal where both are, others agree in the
-    digits shown, of which three count.
+    Blanks count as one; `...` stands for anything. Whole numbers must be equal where both are. Others agree in the
+    digits shown, of which three count, but for one in the last of these: a value near the middle between two roundings
+    is rounded up on one processor and down on another.
     """
     return any(_same(shown.strip(), line) for line in printed.splitlines())
 
@@ -226,4 +230,4 @@ def _agree(shown: str, printed: str) -> bool:
     if value == 0.0:
         return abs(other) < 10.0 ** -len(shown.partition(".")[2])
     unit = 10.0 ** (int(f"{abs(value):e}".partition("e")[2]) - min(digits, 3) + 1)
-    return abs(value - other) <= 0.501 * unit + 1e-12 * abs(value)
+    return abs(value - other) <= 1.001 * unit

@@ -1,11 +1,32 @@
 """The Python interface: shapes, mappings, what is refused."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 import mdstopo
 from mdstopo import Case, CaseError, Evaluation, Trajectory, evaluate, load_case, simulate
 from tests.engine.scenes import CASES, paper, random_scene, read, spring_scene
+
+
+def test_dir_shows_every_call_before_any_is_used():
+    program = "import mdstopo; print(set(mdstopo.__all__) <= set(dir(mdstopo)), 'load_case' in vars(mdstopo))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "False"]
+
+
+def test_dir_of_structures_shows_the_types_that_are_made():
+    program = (
+        "from mdstopo.general import structures\n"
+        "first = dir(structures)\n"
+        "getattr(structures, 'NoStructure', None)\n"
+        "made = [name for name in dir(structures) if name.endswith('Structure') and name not in first]\n"
+        "print('bundle' in first, bool(made), all(isinstance(getattr(structures, name), type) for name in made))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True", "True"]
 
 
 def test_load_case_reads_a_file_and_overrides():

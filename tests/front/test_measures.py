@@ -1,11 +1,19 @@
 """What is dominated, hypervolume, spacing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.front.measures import dominated, hypervolume, neighbour_gaps, scaled, spacing
+from mdstopo.case.reader import read_case
+from mdstopo.front.content import front_part, quality
+from mdstopo.front.measures import dominated, hypervolume, neighbour_gaps, repeated, scaled, spacing
+from mdstopo.front.plan import Front
+from mdstopo.front.tasks import Found
+from mdstopo.status import RunStatus
+from tests.front.support import CASE
 
 sets = st.integers(1, 4).flatmap(
     lambda m: st.lists(st.lists(st.integers(0, 6), min_size=m, max_size=m), min_size=1, max_size=9)
@@ -28,13 +36,52 @@ def test_hypervolume_is_the_number_of_unit_cells_that_are_dominated(points):
 
 @settings(max_examples=100, deadline=None)
 @given(sets)
-def test_exactly_the_points_that_add_nothing_are_dominated(points):
+def test_exactly_the_points_that_another_is_better_than_are_dominated(points):
     marked = dominated(points)
     for j, point in enumerate(points):
-        others = [k for k in range(len(points)) if k != j]
-        beaten = any((points[k] <= point).all() and ((points[k] < point).any() or k < j) for k in others)
-        assert marked[j] == beaten
+        assert marked[j] == any((other <= point).all() and (other < point).any() for other in points)
+        assert repeated(points)[j] == any((other == point).all() for other in points[:j])
     assert not marked.all()
+
+
+@pytest.mark.parametrize("size", [1e-12, 1.0, 3e9])
+def test_nobody_is_beaten_by_the_last_bit(size):
+    least = np.nextafter(size, 0.0)
+    ends = np.array([[size, 5.0 * size], [least, 5.0 * size], [size, 5.0 * size], [3.0 * size, least]])
+    for points in (ends, ends[::-1], -ends[:, ::-1]):
+        assert not dominated(points).any()
+        assert repeated(points).sum() == 2
+    worse = np.array([[size, 5.0 * size], [least, 4.9 * size], [size, 4.8 * size]])
+    assert dominated(worse).tolist() == [True, False, False]
+
+
+def test_a_front_whose_points_repeat_is_as_good_as_one_without():
+    case = read_case(CASE)
+    once = np.array([[1.0, 5.0], [2.0, 3.0], [4.0, 1.0]])
+    twice = np.concatenate([once, once * (1.0 + 1e-15)])
+    one, two = (quality(case, front_of(points)) for points in (once, twice))
+    assert two.numbers() == pytest.approx(one.numbers(), rel=1e-12)
+    assert two.spacing == pytest.approx(spacing(once / [3.0, 4.0]), rel=1e-9)
+
+
+def front_of(points):
+    """A front with these objectives (W, 2)."""
+    nothing = np.zeros(0)
+    found = tuple(
+        Found(j, "k", nothing, row, 0.0, RunStatus.CONVERGED, "", 1, 0.0, 0.0, row[None])
+        for j, row in enumerate(points)
+    )
+    return Front(found, (found[0], found[2]), points.min(axis=0), points.max(axis=0))
+
+
+def test_an_end_that_others_equal_is_not_called_dominated():
+    case = read_case(CASE)
+    points = np.array([[1.0, 5.0], [np.nextafter(1.0, 0.0), 5.0], [4.0, 1.0], [4.0, 1.0], [4.0, 2.0]])
+    directions = np.array([[1.0, 0.0], [0.9, 0.1], [0.0, 1.0], [0.1, 0.9], [0.5, 0.5]])
+    front = front_of(points)
+    designs = tuple(replace(each, alpha=np.full(case.space.size, 0.1)) for each in front.points)
+    part = front_part(case, directions, replace(front, points=designs, ends=(designs[0], designs[2])), ())
+    assert part["pareto/dominated"].tolist() == [False, False, False, False, True]
 
 
 def test_what_is_not_finite_is_dominated_and_adds_no_volume():

@@ -204,7 +204,12 @@ def test_a_number_lost_anywhere_is_seen(bad):
 
 
 @pytest.mark.slow
-def test_processors_without_the_widest_vectors_get_the_same_numbers():
+@pytest.mark.parametrize(
+    "narrow",
+    [{"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}, {"NUMBA_ENABLE_AVX": "0"}],
+    ids=["generic", "without AVX"],
+)
+def test_processors_without_the_widest_vectors_get_the_same_numbers(narrow):
     program = (
         "import numpy as np\n"
         "from tests.native import test_vector as own\n"
@@ -218,6 +223,7 @@ def test_processors_without_the_widest_vectors_get_the_same_numbers():
         "own.test_vectors_are_of_their_array_s_precision(np.float32)\n"
         "own.test_a_number_lost_anywhere_is_seen(np.nan)\n"
     )
-    environment = os.environ | {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    stated = {"NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX"}
+    environment = {name: value for name, value in os.environ.items() if name not in stated} | narrow
     done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

@@ -1,0 +1,72 @@
+"""The worked examples of docs/extending.md, made in a copy of the project as the page shows them, work."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from .pages import DOCS, ROOT, Block, blocks
+from .test_pages import check_console
+
+PAGE = DOCS / "extending.md"
+EXAMPLES = [block for block in blocks(PAGE.read_text(encoding="utf-8")) if block.example]
+#: the tests that the new law and the new joint join: their own in the long ones, all of the short ones
+JOINED = [
+    ["tests/mechanics/test_laws.py", "-k", "saturating or law"],
+    ["tests/mechanics/test_joints.py", "-k", "parallel or codes"],
+    ["tests/cli/test_finalize.py", "-k", "which_keys_are_forces or forces_scaled"],
+    ["tests/docs/test_generated.py"],
+]
+
+
+def changed(text: str, block: Block) -> str:
+    """A file with the changes of a block; each place that it shows must be there once."""
+    for part in re.split(r"^@@\n", block.text, flags=re.MULTILINE):
+        lines = part.splitlines()
+        before = "".join(f"{line[1:]}\n" for line in lines if line[:1] in ("", " ", "-"))
+        after = "".join(f"{line[1:]}\n" for line in lines if line[:1] in ("", " ", "+"))
+        found = [each.start() for each in re.finditer(f"^{re.escape(before)}", text, re.MULTILINE)]
+        assert len(found) == 1, f"docs/extending.md, line {block.line}: {block.title} has {len(found)} times:\n{before}"
+        text = text[: found[0]] + after + text[found[0] + len(before) :]
+    return text
+
+
+def test_changes_are_made_where_their_surroundings_are() -> None:
+    block = Block(1, "diff", "a.py", " a\n-b\n+c\n@@\n\n d\n+e\n")
+    assert changed("b\na\nb\n\nd\n", block) == "b\na\nc\n\nd\ne\n"
+    for text in ("a\nb\na\nb\n\nd\n", "a\nc\n\nd\n", "xa\nb\n\nd\n"):
+        with pytest.raises(AssertionError, match=r"docs/extending\.md, line 1: a\.py has"):
+            changed(text, block)
+
+
+@pytest.mark.slow
+def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
+    copy = tmp_path / "project"
+    ignored = shutil.ignore_patterns("__pycache__")
+    for name in ("mdstopo", "tests", "docs", "documentation", "cases"):
+        shutil.copytree(ROOT / name, copy / name, ignore=ignored)
+    for name in ("pyproject.toml", "mkdocs.yml"):
+        shutil.copy(ROOT / name, copy)
+    for block in EXAMPLES:
+        place = copy / block.title
+        if block.language == "diff":
+            place.write_text(changed(place.read_text(encoding="utf-8"), block), encoding="utf-8")
+        elif block.title:
+            assert not place.exists(), block.title
+            place.write_text(block.text, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(copy)}
+    for words in JOINED:
+        command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words]
+        done = subprocess.run(
+            command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+    for block in EXAMPLES:
+        if block.language == "console":
+            check_console(PAGE, block, copy, copy)
