@@ -14,9 +14,6 @@ from mdstopo.limiting.program import ImpossibleError, Program, UnsolvedError
 from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row
 from mdstopo.limiting.system import System
 
-#: a peak below this share of the largest one that known motion has is none
-_NONE = 1e-9
-
 
 @dataclass(frozen=True)
 class Bound:
@@ -60,7 +57,7 @@ def bound(case: Case, objective: Objective) -> Bound:
         return Bound(None, f"nothing keeps it from falling without end. {where}")
     if not goal.one_sided and least <= 0.0:
         least = 0.0
-        if not limits.rows:
+        if not program.is_limited:
             text = f"without a limit on the {_others(objective)} nothing keeps it above 0"
             return Bound(None, f"{text}. {_left_out(limits)}".rstrip(" ."))
     return Bound(sign * least + 0.0, where)

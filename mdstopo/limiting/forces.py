@@ -17,6 +17,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.case.model import (
     ActuatorLaw,
@@ -387,25 +388,38 @@ def _first_action(
         tuple(_as_loaded(system, name, direction, force, i) for i, direction in enumerate(directions)),
     )
     latest = min(load_case.end, *(begins for *_, begins in slacks))
+    if any(np.abs((system.at(name) - system.at(other)) @ alone.free).max(initial=0.0) > 1e-9 for other, *_ in slacks):
+        return load_case.start  # the motion is not known
     t = np.unique(np.concatenate([np.linspace(load_case.start, latest, _CELLS), system.times]))
     t = t[t <= latest]
-    if len(t) < 2:
-        return load_case.start
+    until = load_case.start
+    for _ in range(3):
+        if len(t) < 2:
+            break
+        without = _without_members(system, alone, name, slacks, t)
+        stop = len(without) if without.all() else int(np.argmin(without))
+        until = float(t[stop])
+        if stop == len(without):
+            break
+        t = np.linspace(until, float(t[stop + 1]), 50)  # closer to when it is
+    return until
+
+
+def _without_members(
+    system: System, alone: System, name: str, slacks: list[tuple[str, float, float, float]], t: Floats
+) -> NDArray[np.bool_]:
+    """(T - 1,) of each cell: whether no slack is used up within it."""
     turn = _turn(system, name, t)
-    allowed = np.ones(len(t) - 1, dtype=np.bool_)
+    without = np.ones(len(t) - 1, dtype=np.bool_)
     for other, slack, arm, _ in slacks:
         between = system.at(name) - system.at(other)
-        if np.abs(between @ alone.free).max(initial=0.0) > 1e-9:
-            return load_case.start  # the motion is not known
         moved = alone.known.mapped(between)
         distance = np.hypot(*(moved.at(t) - between @ system.start).T)
         ends = moved.at_ends(t[:-1], t[1:], 2)
         bend = np.maximum(np.hypot(*ends[0].T), np.hypot(*ends[1].T)) * np.diff(t) ** 2 / 8.0
-        largest = np.maximum(distance[:-1], distance[1:]) + bend
         turns = 2.0 * arm * np.sin(0.5 * np.minimum(turn[1:], math.pi))
-        allowed &= largest + turns < slack * (1.0 - 1e-9)
-    stop = len(allowed) if allowed.all() else int(np.argmin(allowed))
-    return float(t[stop])
+        without &= np.maximum(distance[:-1], distance[1:]) + bend + turns < slack * (1.0 - 1e-9)
+    return without
 
 
 def _as_loaded(system: System, name: str, direction: Floats, force: Bounded, i: int) -> Row:
@@ -429,7 +443,7 @@ def _turn(system: System, name: str, t: Floats) -> Floats:
         if load.body == name:
             arm = math.hypot(*load.at_local)
             moment += _size(load.moment) + arm * math.hypot(_size(load.force[0]), _size(load.force[1]))
-    past = t - t[0]
+    past = t - system.load_case.start
     return np.asarray(abs(body.angular_velocity) * past + 0.5 * moment / body.inertia * past**2)
 
 

@@ -140,6 +140,20 @@ class Program:
         self.position = free.T @ system.start / self.scales.of(0)
         self.velocity = free.T @ system.rate / self.scales.of(1)
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether limits of another order concern the motion whose peak is minimised.
+
+        They do not where no direction that they see is one that the aim sees.
+        """
+        goal = [row for row in self.rows if row.radius is None]
+        others = [row.matrix for row in self.rows if row.source.order != goal[0].source.order]
+        if not others or self.k == 0:
+            return False
+        own = np.concatenate([row.matrix for row in goal])
+        ranks = [int(np.linalg.matrix_rank(each, 1e-9)) for each in (own, np.concatenate(others))]
+        return int(np.linalg.matrix_rank(np.concatenate([own, *others]), 1e-9)) < sum(ranks)
+
     def least(self) -> float:
         """The bound on the radius. Raises ImpossibleError, UnsolvedError; -inf where nothing holds it."""
         goal = [row for row in self.rows if row.radius is None]

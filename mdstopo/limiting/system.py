@@ -6,9 +6,8 @@ members do:
     prescribed motions            a coordinate is a known function;
     joints between bodies that do not turn, or at their centres of mass
                                   a component of X_B - X_A stays what it is at the start;
-    bodies tied to each other but to nothing that is held
-                                  their common centre of mass moves as loads alone move it: members between them act
-                                  and react.
+    directions in which all bodies that are tied to each other move alike, and nothing that is held
+                                  momentum changes by loads alone: members between bodies act and react.
 
 All other equations (joints between turning bodies, equations of rotation) are left out, which leaves more motions and so
 a lower bound. X = X_known(t) + Z xi(t) with a basis Z of the null space of C, and xi'' is free.
@@ -114,8 +113,7 @@ class System:
         for joint in self.case.joints:
             for vector in self.joint_vectors(joint):
                 yield Row(vector, self._constant(float(vector @ self.start)))
-        for axis in (0, 1):
-            yield from self._floating(axis)
+        yield from self._floating()
 
     def joint_vectors(self, joint: Joint) -> list[Floats]:
         """(2 n,) each: the components of X that a joint keeps as they are at the start."""
@@ -175,46 +173,48 @@ class System:
             if d % 3 < 2:
                 yield Row(self.at(self.names[d // 3])[d % 3], cubics[:, i])
 
-    def _floating(self, axis: int) -> Iterator[Row]:
-        """Bodies tied to each other, directly or through others, none of which is held along this axis."""
-        for members in self._tied(axis):
-            loads = [self.load_on(name, axis) for name in members]
-            if any(load is None for load in loads):
-                continue
-            mass = sum(self.mass(name) for name in members)
-            vector = sum((self.mass(name) / mass * self.at(name)[axis] for name in members), np.zeros(self.n))
-            second = sum((load for load in loads if load is not None), np.zeros((len(self.times) - 1, 2))) / mass
+    def _floating(self) -> Iterator[Row]:
+        """Directions w (2 n,) in which nothing but loads works on the bodies: w . M X'' = w . loads.
+
+        Members and joints act on two bodies with opposite forces, so they do no work where both move alike; a slide
+        acts only across its axis. With a load that turns with its body, the body has to rest.
+        """
+        held = [self.at(self.names[d // 2])[d % 2] for d in range(self.n) if d % 2 in self.driven_axes(self.names[d // 2])]
+        for first, second in _ties(self.case):
+            held += [*(self.at(second) - self.at(first))]
+        for joint in self.case.joints:
+            slides = isinstance(joint, PrismaticJoint) and joint.bodies[0] in self.angles
+            held += self.joint_vectors(joint) if slides else [*(self.at(joint.bodies[1]) - self.at(joint.bodies[0]))]
+        loads: list[Floats] = []
+        for name in self.names:
+            own = [self.load_on(name, axis) for axis in (0, 1)]
+            known = [each for each in own if each is not None]
+            if len(known) < 2:
+                held += [*self.at(name)]
+                known = [np.zeros((len(self.times) - 1, 2))] * 2
+            loads += known
+        masses = np.repeat([self.mass(name) for name in self.names], 2)
+        for w in _null_space(np.array(held).reshape(-1, self.n)).T:
+            total = float(np.abs(w) @ masses)
+            vector = w * masses / total
+            second = np.tensordot(w, np.array(loads), 1) / total
             start, rate = np.array([vector @ self.start]), np.array([vector @ self.rate])
             yield Row(vector, with_second_derivative(self.times, second[:, None], start, rate).coefficients[:, 0])
 
-    def _tied(self, axis: int) -> Iterator[list[str]]:
-        parent = {name: name for name in (GROUND, *self.names)}
 
-        def root(name: str) -> str:
-            while parent[name] != name:
-                parent[name] = parent[parent[name]]
-                name = parent[name]
-            return name
-
-        for first, second in ties(self.case):
-            parent[root(first)] = root(second)
-        for name in self.names:
-            if axis in self.driven_axes(name):
-                parent[root(name)] = root(GROUND)
-        groups: dict[str, list[str]] = {}
-        for name in self.names:
-            groups.setdefault(root(name), []).append(name)
-        groups.pop(root(GROUND), None)
-        yield from groups.values()
+def _null_space(matrix: Floats) -> Floats:
+    """(n, f): an orthonormal basis."""
+    if not len(matrix):
+        return np.eye(matrix.shape[1])
+    _, s, vt = np.linalg.svd(matrix)
+    return np.asarray(vt[int((s > _RANK * s[0]).sum()) :].T)
 
 
-def ties(case: Case) -> Iterator[tuple[str, str]]:
-    """Pairs of bodies between which anything can transmit a force."""
+def _ties(case: Case) -> Iterator[tuple[str, str]]:
+    """Pairs of bodies between which something other than a joint can transmit forces."""
     for group in case.members:
         if len(group):
             yield group.body_from, group.body_to
-    for joint in case.joints:
-        yield joint.bodies
     for bushing in case.bushings:
         yield bushing.bodies
     for contact in case.contacts:
