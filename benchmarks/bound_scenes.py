@@ -35,7 +35,11 @@ def case_of(made: Scene) -> Case:
     """A mapping as a case; JSON is YAML."""
     made = {**made}
     if len(made["objectives"]) > 1:
-        made["combine"] = {"method": "weighted_sum", "weights": dict.fromkeys(made["objectives"], 1), "normalize": False}
+        made["combine"] = {
+            "method": "weighted_sum",
+            "weights": dict.fromkeys(made["objectives"], 1),
+            "normalize": False,
+        }
     return read_case(json.dumps(made))
 
 
@@ -91,7 +95,10 @@ def free(rng: np.random.Generator) -> Scene:
     """A body thrown among springs and dampers on the ground."""
     speed, turn = _r(rng, 1, 8), _r(rng, 0, 6.28)
     body = _body(
-        rng, velocity=[speed * np.cos(turn), speed * np.sin(turn)], angular_velocity=_r(rng, -3, 3), angle=_r(rng, -1, 1)
+        rng,
+        velocity=[speed * np.cos(turn), speed * np.sin(turn)],
+        angular_velocity=_r(rng, -3, 3),
+        angle=_r(rng, -1, 1),
     )
     return {
         "gravity": [0, -9.81] if rng.random() < 0.5 else [0, 0],
@@ -111,7 +118,13 @@ def wires(rng: np.random.Generator) -> Scene:
     """A body hung on wires that only pull, most of them slack; loads push it about."""
     made = free(rng)
     made["gravity"] = [0, -9.81]
-    law = {"type": "gap", "stiffness": _r(rng, 500, 20000), "damping": _r(rng, 0, 200), "gap": _r(rng, 0.0, 0.15), "clip": True}
+    law = {
+        "type": "gap",
+        "stiffness": _r(rng, 500, 20000),
+        "damping": _r(rng, 0, 200),
+        "gap": _r(rng, 0.0, 0.15),
+        "clip": True,
+    }
     above = [[float(x), 4.0 + _r(rng, 0, 1)] for x in np.linspace(-1.5, 1.5, 4)]
     made["points"]["ring"] = _grid("ground", above if rng.random() < 0.7 else _anchors(rng, 5))
     made["members"]["ties"]["law"] = law
@@ -128,7 +141,12 @@ def limited(rng: np.random.Generator) -> Scene:
     """A body thrown among reels, crushed legs and pulses: forces have limits, loads may exceed them."""
     made = free(rng)
     laws = [
-        {"type": "actuator", "proportional": _r(rng, 100, 5000), "derivative": _r(rng, 0, 300), "limit": _r(rng, 20, 300)},
+        {
+            "type": "actuator",
+            "proportional": _r(rng, 100, 5000),
+            "derivative": _r(rng, 0, 300),
+            "limit": _r(rng, 20, 300),
+        },
         {"type": "crush", "stiffness": _r(rng, 1e4, 1e5), "force": _r(rng, 50, 500), "gap": _r(rng, 0, 0.05)},
         {"type": "pulse", "peak": _r(rng, -300, 300), "rate": _r(rng, 20, 400), "time": _r(rng, 0, 0.4)},
     ]
@@ -146,7 +164,17 @@ def rail(rng: np.random.Generator) -> Scene:
     angle, speed = _r(rng, -0.7, 0.7), _r(rng, 1, 6)
     axis = [float(np.cos(angle)), float(np.sin(angle))]
     body = _body(rng, velocity=[speed * axis[0], speed * axis[1]])
-    law = _spring(rng) if rng.random() < 0.4 else {"type": "gap", "stiffness": _r(rng, 1e3, 2e4), "gap": _r(rng, 0.01, 0.2), "damping": _r(rng, 0, 100), "clip": True}
+    law = (
+        _spring(rng)
+        if rng.random() < 0.4
+        else {
+            "type": "gap",
+            "stiffness": _r(rng, 1e3, 2e4),
+            "gap": _r(rng, 0.01, 0.2),
+            "damping": _r(rng, 0, 100),
+            "clip": True,
+        }
+    )
     behind = [[-3.0 * axis[0] + _r(rng, -0.5, 0.5), -3.0 * axis[1] + _r(rng, -0.5, 0.5)] for _ in range(3)]
     component = ["norm", "x"][int(rng.integers(2))]
     return {
@@ -169,7 +197,9 @@ def base(rng: np.random.Generator) -> Scene:
     made: Scene = {
         "time": {"end": start + width + _r(rng, 0.05, 0.5)},
         "bodies": {"load": _body(rng, position=[0, 0.6]), "sled": {"mass": 500, "inertia": 100, "position": [0, 0]}},
-        "motions": [{"body": "sled", "x": {"acceleration": {"table": table}}, "y": {"velocity": 0}, "angle": {"velocity": 0}}],
+        "motions": [
+            {"body": "sled", "x": {"acceleration": {"table": table}}, "y": {"velocity": 0}, "angle": {"velocity": 0}}
+        ],
         "points": {
             "shell": _shell(rng, "load", (0.0, 0.6)),
             "floor": {"body": "sled", "grid": {"line": {"from": [-1.5, 0], "to": [1.5, 0], "count": 5}}},
@@ -188,7 +218,10 @@ def pair(rng: np.random.Generator) -> Scene:
         "load": _body(rng, velocity=[_r(rng, 1, 5), 0]),
         "sled": _body(rng, position=[1.5, 0]),
     }
-    slides = [{"type": "prismatic", "bodies": ["ground", name], "at": body["position"], "axis": [1, 0]} for name, body in bodies.items()]
+    slides = [
+        {"type": "prismatic", "bodies": ["ground", name], "at": body["position"], "axis": [1, 0]}
+        for name, body in bodies.items()
+    ]
     other = ["ground", "sled"][int(rng.integers(2))]
     return {
         "time": {"end": _r(rng, 0.2, 1.0)},

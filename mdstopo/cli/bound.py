@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 @click.command("bound")
 @click.argument("case_path", metavar="CASE", type=CASE_FILE)
-@click.option("--result", "result_file", type=RESULT_FILE, metavar="FILE", help="Compare with a result of run or pareto.")
+@click.option(
+    "--result", "result_file", type=RESULT_FILE, metavar="FILE", help="Compare with a result of run or pareto."
+)
 @set_option
 @output_options
-def command(
-    case_path: Path, result_file: Path | None, overrides: dict[str, str], as_json: bool, quiet: bool
-) -> int:
+def command(case_path: Path, result_file: Path | None, overrides: dict[str, str], as_json: bool, quiet: bool) -> int:
     """Bound peaks of acceleration and travel from below, for all members that could be.
 
     Members are replaced by forces that are free in time. What these cannot do under the limits of the case, no design

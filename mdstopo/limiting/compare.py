@@ -24,8 +24,8 @@ TOLERATED = 1e-6
 class Compared:
     """A bound and what was reached.
 
-    best: the best value among the designs in a result that keep all limits, None where there is none. gap: how far it is
-    from the bound, as a share of it; 0 at the bound; None where either is missing.
+    best: the best value among the designs in a result that keep all limits, None where there is none. gap: how far it
+    is from the bound, as a share of it; 0 at the bound; None where either is missing.
     """
 
     bound: float | None
@@ -34,7 +34,9 @@ class Compared:
     gap: float | None = None
 
 
-def compared(case: Case, view: ResultView | None = None, found: Mapping[str, Bound] | None = None) -> dict[str, Compared]:
+def compared(
+    case: Case, view: ResultView | None = None, found: Mapping[str, Bound] | None = None
+) -> dict[str, Compared]:
     """The bounds of a case's objectives by name, beside a result's best. found: the bounds, where they are known.
 
     Raises StoreError where the result has other objectives, or is of no optimisation.
@@ -95,4 +97,3 @@ def _kept(case: Case, view: ResultView) -> NDArray[np.bool_]:
 
         good &= np.asarray(view.array("iterations/stage")) == stage_count(case) - 1
     return good
-

@@ -93,9 +93,7 @@ def _directions(system: System, name: str) -> Floats:
 # -- strength
 
 
-def _limit_strength(
-    system: System, name: str, groups: list[MemberGroup], force: Bounded, found: Restrictions
-) -> None:
+def _limit_strength(system: System, name: str, groups: list[MemberGroup], force: Bounded, found: Restrictions) -> None:
     single = [_strength(system.case, group) for group in groups]
     if any(each is None for each in single):
         return
@@ -125,9 +123,9 @@ def _strength(case: Case, group: MemberGroup) -> float | None:
 def _range(case: Case, group: MemberGroup, index: int, parameter: str, stated: float) -> tuple[float, float]:
     """Between what a law's parameter is: its own value, or the bounds of the variable that has its place."""
     for each in case.variables:
-        if each.parameter == parameter and group.name in each.groups:
-            if each.laws[each.groups.index(group.name)] == index:
-                return each.lower, each.upper
+        own = group.name in each.groups and each.laws[each.groups.index(group.name)] == index
+        if own and each.parameter == parameter:
+            return each.lower, each.upper
     return stated, stated
 
 
@@ -137,11 +135,12 @@ def _largest(case: Case, group: MemberGroup, index: int, parameter: str, stated:
 
 def _most(case: Case, groups: list[MemberGroup], single: list[float]) -> float:
     """The largest sum of alpha^mu f over the members of some groups, each volume row by itself considered, N."""
-    totals = [_spend(case, groups, single, None)]
-    for row in case.constraints:
-        if isinstance(row, VolumeRow) and row.sense in ("limit", "equals") and not np.any(row.prices):
-            totals.append(_spend(case, groups, single, row))
-    return min(totals)
+    rows = [
+        row
+        for row in case.constraints
+        if isinstance(row, VolumeRow) and row.sense in ("limit", "equals") and not np.any(row.prices)
+    ]
+    return min(_spend(case, groups, single, row) for row in (None, *rows))
 
 
 def _spend(case: Case, groups: list[MemberGroup], single: list[float], row: VolumeRow | None) -> float:
@@ -213,7 +212,7 @@ def _limit_direction(
 
 
 def cone_of(middles: Floats, halves: Floats, directions: Floats) -> Floats | None:
-    """(c, r) rows n with n . (E F) >= 0 for all non-negative sums F of vectors whose angles are within middles +- halves.
+    """(c, r) rows n with n . (E F) >= 0 for all sums F of vectors whose angles are within middles +- halves.
 
     directions (r, 2): E. None where the sums are not within a half-plane.
     """
@@ -283,7 +282,11 @@ def travel(system: System, limits: Limits, name: str, other: str) -> float:
         else:
             strips.append((seen[0], -math.inf if row.one_sided else -row.radius, row.radius))
     for joint in system.case.joints:
-        if isinstance(joint, PrismaticJoint) and set(joint.bodies) == {name, other} and joint.bodies[0] in system.angles:
+        if (
+            isinstance(joint, PrismaticJoint)
+            and set(joint.bodies) == {name, other}
+            and joint.bodies[0] in system.angles
+        ):
             axis = turned(joint.axis, system.angles[joint.bodies[0]])
             strips.append((np.array([-axis[1], axis[0]]), 0.0, 0.0))
     return min(radius, _box(strips))

@@ -12,9 +12,9 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cubics:
-    """n functions of time. times (S + 1,): ends of the segments, s; coefficients (S, n, 4): of the powers of t - times[k].
+    """n functions of time. times (S + 1,): ends of the segments, s.
 
-    A function may jump from one segment to the next.
+    coefficients (S, n, 4): of the powers of t - times[k] in segment k. A function may jump from one segment to the next.
     """
 
     times: Floats

@@ -9,8 +9,8 @@ with which positions and velocities at the ends follow exactly,
     x_i+1 = x_i + h v_i + h^2/2 a_i,      v_i+1 = v_i + h/2 (a_i + b_i).
 
 Both weights are positive with integral 1, so what is in a convex set at all times has its averages there too (Jensen).
-Limits on positions and velocities are asked for at the ends only. So every motion that keeps the limits gives a point of
-the program with the same radius or less: nothing is above the true value, and only what happens within cells is lost.
+Limits on positions and velocities are asked for at the ends only. So every motion that keeps the limits gives a point
+of the program with the same radius or less: nothing is above the true value, only what happens within cells is lost.
 A norm in the plane is a polygon around the circle, refined by further tangents where the solution asks for them.
 
 What is returned is computed from the multipliers (weak duality), with their residual times a generous range of the
@@ -172,7 +172,8 @@ class Program:
         span = self.times[-1] - self.times[0]
         grid = np.unique(np.concatenate([np.linspace(self.times[0], self.times[-1], FIRST + 1), self.times]))
         grid = grid[np.append(True, np.diff(grid) > 1e-9 * span)]
-        best, still, tangents = -math.inf, 0, ()
+        best, still = -math.inf, 0
+        tangents: tuple[Tangent, ...] = ()
         while True:
             found, tangents = self._with_tangents(grid, tangents, elastic)
             gain = found.bound - best
@@ -485,8 +486,10 @@ class _Solve:
             else:
                 xi = begin + slope * share
             ends = self.grid[:-1] + share * np.diff(self.grid)
-            known = row.known.at_ends(self.grid[:-1], ends, row.source.order)[1] if share else row.known.at(
-                self.grid[:-1], row.source.order
+            known = (
+                row.known.at_ends(self.grid[:-1], ends, row.source.order)[1]
+                if share
+                else row.known.at(self.grid[:-1], row.source.order)
             )
             y = xi @ row.matrix.T + known / row.unit
             if row.source.until is not None:
@@ -496,7 +499,7 @@ class _Solve:
         return found
 
 
-def zero_wide(n: int, k: int) -> "csr_matrix":
+def zero_wide(n: int, k: int) -> csr_matrix:
     """(n k, (n + 1) k) zeros."""
     from scipy.sparse import csr_matrix
 

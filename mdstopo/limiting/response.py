@@ -122,7 +122,7 @@ def _centred(system: System, response: Response) -> None:
     at = response.at_local or (0.0, 0.0)
     if response.body not in system.angles and math.hypot(*at) > 0.0:
         raise NoBoundError(
-            f"the point is not the centre of mass of {response.body}, which may turn: its motion is not linear in forces"
+            f"the point is not the centre of mass of {response.body}, which may turn: not linear in forces"
         )
     if response.relative_to not in system.angles:
         raise NoBoundError(f"{response.relative_to} may turn, and what is seen from it turns with it")
@@ -172,9 +172,7 @@ def _limit_rows(system: System, row: ResponseRow, turns: dict[str, float]) -> tu
     return rows, remark
 
 
-def _widened(
-    system: System, response: Response, row: Bounded, turns: dict[str, float]
-) -> tuple[float, Bounded, str]:
+def _widened(system: System, response: Response, row: Bounded, turns: dict[str, float]) -> tuple[float, Bounded, str]:
     """By how much the centre of mass may exceed what its point may not, the row then meant, and a remark.
 
     A point s of a body that has turned by psi is displaced by its centre and by (R - 1) s, of length
@@ -216,8 +214,10 @@ def _note_angle(system: System, row: ResponseRow, found: Limits) -> None:
         return
     start = {body.name: body.angle for body in system.load_case.bodies}
     # the response is the difference of angles, not its change; the start keeps the limit, too
-    apart = row.bound if system.case.solver.settle else abs(
-        start[response.body] - system.angles[response.relative_to or GROUND]
+    apart = (
+        row.bound
+        if system.case.solver.settle
+        else abs(start[response.body] - system.angles[response.relative_to or GROUND])
     )
     reach = row.bound + min(row.bound, apart)
     found.turns[response.body] = min(found.turns.get(response.body, math.inf), reach)

@@ -9,8 +9,8 @@ members do:
     directions in which all bodies that are tied to each other move alike, and nothing that is held
                                   momentum changes by loads alone: members between bodies act and react.
 
-All other equations (joints between turning bodies, equations of rotation) are left out, which leaves more motions and so
-a lower bound. X = X_known(t) + Z xi(t) with a basis Z of the null space of C, and xi'' is free.
+All other equations (joints between turning bodies, equations of rotation) are left out, which leaves more motions and
+so a lower bound. X = X_known(t) + Z xi(t) with a basis Z of the null space of C, and xi'' is free.
 """
 
 from __future__ import annotations
@@ -53,12 +53,14 @@ class Row:
 class System:
     """The translation of all bodies of one load case.
 
-    names: bodies as declared; times (S + 1,): segments in which all known functions are cubic; start, rate (2 n,): X and
-    its derivative at the start. angles: body -> angle, of those that cannot turn (ground included).
+    names: bodies as declared; times (S + 1,): segments in which all known functions are cubic; start, rate (2 n,): X
+    and its derivative at the start. angles: body -> angle, of those that cannot turn (ground included).
     more: times that shall be ends of segments too; extra: further equations.
     """
 
-    def __init__(self, case: Case, load_case: LoadCase, more: tuple[float, ...] = (), extra: tuple[Row, ...] = ()) -> None:
+    def __init__(
+        self, case: Case, load_case: LoadCase, more: tuple[float, ...] = (), extra: tuple[Row, ...] = ()
+    ) -> None:
         self.case, self.load_case = case, load_case
         self.names = tuple(body.name for body in load_case.bodies)
         self.times = breakpoints(load_case, [*motion_times(load_case), *more])
@@ -179,9 +181,11 @@ class System:
         Members and joints act on two bodies with opposite forces, so they do no work where both move alike; a slide
         acts only across its axis. With a load that turns with its body, the body has to rest.
         """
-        held = [self.at(self.names[d // 2])[d % 2] for d in range(self.n) if d % 2 in self.driven_axes(self.names[d // 2])]
-        for first, second in _ties(self.case):
-            held += [*(self.at(second) - self.at(first))]
+        held = [
+            self.at(self.names[d // 2])[d % 2] for d in range(self.n) if d % 2 in self.driven_axes(self.names[d // 2])
+        ]
+        for pair in _ties(self.case):
+            held += [*(self.at(pair[1]) - self.at(pair[0]))]
         for joint in self.case.joints:
             slides = isinstance(joint, PrismaticJoint) and joint.bodies[0] in self.angles
             held += self.joint_vectors(joint) if slides else [*(self.at(joint.bodies[1]) - self.at(joint.bodies[0]))]
@@ -197,7 +201,7 @@ class System:
         for w in _null_space(np.array(held).reshape(-1, self.n)).T:
             total = float(np.abs(w) @ masses)
             vector = w * masses / total
-            second = np.tensordot(w, np.array(loads), 1) / total
+            second: Floats = np.tensordot(w, np.array(loads), 1) / total
             start, rate = np.array([vector @ self.start]), np.array([vector @ self.rate])
             yield Row(vector, with_second_derivative(self.times, second[:, None], start, rate).coefficients[:, 0])
 
@@ -236,7 +240,10 @@ def _motion(load_case: LoadCase, body: str) -> Motion | None:
 
 
 def _unturned(case: Case, load_case: LoadCase) -> dict[str, float]:
-    """The bodies that cannot turn: ground, those whose angle is prescribed as constant, those that joints tie to them."""
+    """The bodies that cannot turn, and their angles.
+
+    Ground, those whose angle is prescribed as constant, and those that a slide or a fixed joint ties to one of these.
+    """
     found = {GROUND: 0.0}
     for body in load_case.bodies:
         motion = _motion(load_case, body.name)

@@ -22,7 +22,9 @@ def case_of(**sections: Any) -> Case:
         "format": 1,
         "time": {"end": 1},
         "bodies": {"load": load},
-        "members": {"tie": {"from": {"body": "ground", "at": [-1, 0]}, "to": {"body": "load", "at": [0, 0]}, "law": law}},
+        "members": {
+            "tie": {"from": {"body": "ground", "at": [-1, 0]}, "to": {"body": "load", "at": [0, 0]}, "law": law}
+        },
         "objectives": {"G": peak("acceleration")},
     }
     case |= sections
@@ -48,6 +50,8 @@ def sled(table: list[list[float]], **more: Any) -> Section:
         "motions": [
             {"body": "sled", "x": {"acceleration": {"table": table}}, "y": {"velocity": 0}, "angle": {"velocity": 0}}
         ],
-        "members": {"tie": {"from": {"body": "sled", "at": [-1, 0]}, "to": {"body": "load", "at": [0, 0]}, "law": SPRING}},
+        "members": {
+            "tie": {"from": {"body": "sled", "at": [-1, 0]}, "to": {"body": "load", "at": [0, 0]}, "law": SPRING}
+        },
         **more,
     }

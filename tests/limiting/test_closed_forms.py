@@ -78,7 +78,7 @@ def test_the_largest_least_value_is_bounded_from_above():
 
 @pytest.mark.parametrize("start", [0.0, 0.07])
 def test_a_rectangular_pulse_of_the_base(start):
-    """a / (1 + 2 D / (a tau^2)): the body gains the sled's speed with a constant acceleration, and lags D behind then."""
+    """a / (1 + 2 D / (a tau^2)): the body gains the sled's speed at a constant rate, and lags D behind then."""
     a, tau, travel = 100.0, 0.05, 0.04
     table = [[start, a], [start + tau, a], [start + tau, 0]]
     table = [[start, 0], *table] if start else table
@@ -97,8 +97,8 @@ def test_a_rectangular_pulse_of_the_base(start):
 def independent(table, travel, end, guess, cells=600):
     """The best force that is constant in each cell, by cumulative sums: a motion that keeps the limits at all times.
 
-    Between the ends of a cell the displacement is off the chord by at most (|u| + |sled|) h^2 / 8, which is taken off the
-    travel: what is found can be reached, so it is an upper bound of what the bound approximates from below.
+    Between the ends of a cell the displacement is off the chord by at most (|u| + |sled|) h^2 / 8, which is taken off
+    the travel: what is found can be reached, so it is an upper bound of what the bound approximates from below.
     """
     t = np.linspace(0.0, end, cells + 1)
     h = t[1]
@@ -160,7 +160,8 @@ def test_a_rail_turns_a_limit_along_one_axis_into_one_along_the_rail():
 def test_bodies_that_float_together_share_the_work():
     """Two carriages of which one runs into the other: relative deceleration V^2 / (2 D), shared by the masses."""
     slides = [
-        {"type": "prismatic", "bodies": ["ground", name], "at": [x, 0], "axis": [1, 0]} for name, x in (("load", 0), ("sled", 1))
+        {"type": "prismatic", "bodies": ["ground", name], "at": [x, 0], "axis": [1, 0]}
+        for name, x in (("load", 0), ("sled", 1))
     ]
     sections = {
         "bodies": {
@@ -170,7 +171,11 @@ def test_bodies_that_float_together_share_the_work():
         "joints": slides,
         "constraints": [peak("displacement", "x", "max_abs", relative_to="sled", limit=0.1)],
     }
-    tie = {"from": {"body": "load", "at": [0, 0]}, "to": {"body": "sled", "at": [1, 0]}, "law": {"type": "spring", "stiffness": 9}}
+    tie = {
+        "from": {"body": "load", "at": [0, 0]},
+        "to": {"body": "sled", "at": [1, 0]},
+        "law": {"type": "spring", "stiffness": 9},
+    }
     just_below(bound_of(case_of(**sections, members={"tie": tie})), 20.0 * 30.0 / 40.0)
     # with a member from the ground to the other one, that can do all the work
     post = {**tie, "to": {"body": "ground", "at": [1, 0]}}
@@ -221,7 +226,13 @@ def test_wires_from_above_do_not_push_down():
     }
     just_below(bound_of(case_of(**sections, members=wires)), 0.5 * (15.0 - 9.81) * 0.25)
     # with a strut that also pushes they could
-    strut = {"strut": {"from": {"body": "ground", "at": [0, -2]}, "to": {"body": "load", "at": [0, 0]}, "law": {"type": "spring", "stiffness": 9}}}
+    strut = {
+        "strut": {
+            "from": {"body": "ground", "at": [0, -2]},
+            "to": {"body": "load", "at": [0, 0]},
+            "law": {"type": "spring", "stiffness": 9},
+        }
+    }
     assert bounds(case_of(**sections, members=wires | strut))["G"].value is None
 
 
