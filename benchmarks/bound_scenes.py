@@ -16,7 +16,7 @@ def scene(rng: np.random.Generator, kind: str) -> Scene:
     made: Scene = KINDS[kind](rng)
     made.setdefault("format", 1)
     made.setdefault("design", {"initial": 0.5, "lower": 1e-3, "upper": 1})
-    made.setdefault("solver", {"tolerance": 1e-9})
+    made.setdefault("solver", {"tolerance": 1e-7})
     return made
 
 

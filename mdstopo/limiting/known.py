@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 class Cubics:
     """n functions of time. times (S + 1,): ends of the segments, s.
 
-    coefficients (S, n, 4): of the powers of t - times[k] in segment k. A function may jump from one segment to the next.
+    coefficients (S, n, 4): of the powers of t - times[k] in segment k. A function may jump between segments.
     """
 
     times: Floats

@@ -34,10 +34,8 @@ from mdstopo.limiting.system import System
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-#: cells at first
-FIRST = 32
-#: cells at most, along a line and in the plane, where there are many more rows
-MOST = {1: 400, 2: 150}
+#: cells at first and at most, along a line and in the plane, where there are many more rows
+FIRST, MOST = {1: 64, 2: 32}, {1: 400, 2: 150}
 #: what a norm may exceed its circle by, and what a refinement has to gain, relative
 TANGENT, GAIN = 3e-4, 2e-4
 #: rounds of tangents for one grid
@@ -169,8 +167,8 @@ class Program:
 
     def _refine(self, elastic: bool) -> float:
         """Solve on finer and finer cells until nothing is gained; the best of all bounds."""
-        span = self.times[-1] - self.times[0]
-        grid = np.unique(np.concatenate([np.linspace(self.times[0], self.times[-1], FIRST + 1), self.times]))
+        span, plane = self.times[-1] - self.times[0], min(self.k, 2)
+        grid = np.unique(np.concatenate([np.linspace(self.times[0], self.times[-1], FIRST[plane] + 1), self.times]))
         grid = grid[np.append(True, np.diff(grid) > 1e-9 * span)]
         best, still = -math.inf, 0
         tangents: tuple[Tangent, ...] = ()
@@ -181,7 +179,7 @@ class Program:
             if best == -math.inf or (elastic and best > 1e-3):
                 return best
             still = still + 1 if gain <= GAIN * max(abs(best), 1e-9) else 0
-            if still == 2 or not found.split.any() or len(grid) > MOST[min(self.k, 2)]:
+            if still == 3 or not found.split.any() or len(grid) > MOST[plane]:
                 return best
             grid = np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])[found.split]]))
 
