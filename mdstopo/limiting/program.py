@@ -36,10 +36,14 @@ if TYPE_CHECKING:
 
 #: cells at first and at most, along a line and in the plane, where there are many more rows
 FIRST, MOST = {1: 64, 2: 32}, {1: 400, 2: 150}
+#: refinements without gain after which it ends
+PATIENCE = {1: 3, 2: 2}
 #: what a norm may exceed its circle by, and what a refinement has to gain, relative
 TANGENT, GAIN = 3e-4, 2e-4
 #: rounds of tangents for one grid
-ROUNDS = 8
+ROUNDS = 12
+#: new tangents of a row in one round, and how far their directions are apart at least, rad
+NEW, APART = 4, 0.01
 #: directions of a polygon at first
 CORNERS = 16
 #: the range of a variable, in sizes of the largest value of its kind in the solution, that residuals are taken times
@@ -102,11 +106,9 @@ class Reduced:
 
 @dataclass(frozen=True)
 class Tangent:
-    """A further half-plane of a row, at the places whose times lie within [first, last]."""
+    """A further half-plane of a row, at all of its places."""
 
     row: int
-    first: float
-    last: float
     normal: tuple[float, ...]
 
 
@@ -179,7 +181,7 @@ class Program:
             if best == -math.inf or (elastic and best > 1e-3):
                 return best
             still = still + 1 if gain <= GAIN * max(abs(best), 1e-9) else 0
-            if still == 3 or not found.split.any() or len(grid) > MOST[plane]:
+            if still == PATIENCE[plane] or not found.split.any() or len(grid) >= MOST[plane]:
                 return best
             grid = np.sort(np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])[found.split]]))
 
@@ -192,9 +194,9 @@ class Program:
             found = _Solve(self, grid, tangents, elastic).solution()
             still = still + 1 if found.bound - best <= 0.1 * GAIN * max(abs(best), 1e-9) else 0
             best = found.bound
-            if not found.missing or still == 2:
+            if not found.missing or still == 3:
                 break
-            tangents = (*tangents, *found.missing)
+            tangents = tuple(dict.fromkeys((*tangents, *found.missing)))
         return found, found.tangents
 
     def _known_peak(self, row: Reduced) -> float:
@@ -286,7 +288,7 @@ class _Solve:
         price = np.maximum(-found.ineqlin.marginals, 0.0)
         bound = self._certified(found, cost, (upper, right, price), (equal, level), low[-1])
         unit = 1.0 if self.elastic else self._unit()
-        return Solution(bound * unit, self._split(found.x, price), self._kept(price), self._missing(found.x))
+        return Solution(bound * unit, self._split(found.x, price), self._kept(price), self._missing(found.x, price))
 
     def _signed(self) -> bool:
         """Whether what is minimised may be negative."""
@@ -338,14 +340,6 @@ class _Solve:
         none = csr_matrix((count * r, 1))
         return vstack([hstack([before, own, other, none]), hstack([before, other, own, none])]).tocsr(), averages
 
-    def _places(self, row: Reduced, count: int) -> tuple[Floats, Floats]:
-        """First and last time of every place of a row."""
-        if row.source.order < 2:
-            t = self.grid[-1:] if row.source.final else self.grid
-            return t, t
-        half = count // 2
-        return np.tile(self.grid[:half], 2), np.tile(self.grid[1 : half + 1], 2)
-
     def _ask(self, index: int) -> None:
         """The half-planes of a row: those everywhere, then its tangents."""
         row, (_, known) = self.p.rows[index], self.y[index]
@@ -354,14 +348,9 @@ class _Solve:
         every = np.arange(len(known))
         for normal in row.directions():
             self._add(index, every, np.tile(normal, (len(every), 1)))
-        early, late = self._places(row, len(known))
-        middle = 0.5 * (early + late)
-        own = [tangent for tangent in self.tangents if tangent.row == index]
-        if not own:
-            return
-        spans = np.array([(tangent.first, tangent.last) for tangent in own])
-        which, near = np.nonzero((middle >= spans[:, :1]) & (middle <= spans[:, 1:]))
-        self._add(index, near, np.array([tangent.normal for tangent in own])[which])
+        for tangent in self.tangents:
+            if tangent.row == index:
+                self._add(index, every, np.tile(tangent.normal, (len(every), 1)))
 
     def _add(self, index: int, places: Any, normals: Floats) -> None:
         from scipy.sparse import csr_matrix
@@ -406,9 +395,10 @@ class _Solve:
         matrix, known = self.y[index]
         return np.asarray((matrix @ x).reshape(known.shape) + known)
 
-    def _missing(self, x: Floats) -> tuple[Tangent, ...]:
-        """Tangents where a norm exceeds its radius."""
+    def _missing(self, x: Floats, price: Floats) -> tuple[Tangent, ...]:
+        """Tangents for what exceeds the circles most, where it matters: at places that have a multiplier."""
         found = []
+        weights = self._weights(price)
         for index, row in enumerate(self.p.rows):
             if not row.round or (self.elastic and row.radius is None):
                 continue
@@ -416,25 +406,34 @@ class _Solve:
             size = np.hypot(*y.T)
             z = x[-1]
             radius = z if row.radius is None else row.radius * (1.0 + (z if self.elastic else 0.0))
-            early, late = self._places(row, len(y))
-            for place in np.flatnonzero(size > radius + TANGENT * max(radius, 1e-9)):
-                normal = y[place] / size[place]
-                found.append(Tangent(index, float(early[place]), float(late[place]), tuple(normal.tolist())))
+            over = (size - radius) * (weights[index] > 1e-10 * max(weights[index].max(), 1e-300))
+            angles = np.arctan2(y[:, 1], y[:, 0])
+            chosen: list[float] = []
+            for place in np.argsort(-over * weights[index], kind="stable"):
+                if over[place] <= TANGENT * max(radius, 1e-9) or len(chosen) == NEW:
+                    break
+                if all(abs(math.remainder(angles[place] - other, 2.0 * math.pi)) > APART for other in chosen):
+                    chosen.append(float(angles[place]))
+            found += [Tangent(index, (math.cos(angle), math.sin(angle))) for angle in chosen]
         return tuple(found)
 
+    def _weights(self, price: Floats) -> list[Floats]:
+        """(places,) of each row: the sum of its multipliers."""
+        weights = [np.zeros(len(known)) for _, known in self.y]
+        first = 0
+        for index, places, _ in self.marks:
+            weights[index][places] += price[first : first + len(places)]
+            first += len(places)
+        return weights
+
     def _kept(self, price: Floats) -> tuple[Tangent, ...]:
-        """The tangents that hold the solution, for the next grid."""
+        """The tangents that hold the solution anywhere, for the next grid."""
         kept, first = [], 0
         for index, places, normals in self.marks:
-            own = price[first : first + len(places)]
+            if np.any(price[first : first + len(places)] > 1e-12):
+                kept.append(Tangent(index, tuple(normals[0].tolist())))
             first += len(places)
-            if not self.p.rows[index].round:
-                continue
-            early, late = self._places(self.p.rows[index], len(self.y[index][1]))
-            for i in np.flatnonzero(own > 1e-12):
-                place = places[i]
-                kept.append(Tangent(index, float(early[place]), float(late[place]), tuple(normals[i].tolist())))
-        return tuple(kept)
+        return tuple(tangent for tangent in kept if tangent in self.tangents)
 
     def _split(self, x: Floats, price: Floats) -> NDArray[np.bool_]:
         """The cells within which a limit is exceeded by the motion that the averages suggest, or the aim is.
