@@ -20,6 +20,7 @@ SECTIONS = {
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
+    "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",
     "ring": "a closed loop of bodies beside other programs, forward runs too",
@@ -31,7 +32,7 @@ SECTIONS = {
 PEERS = ("peers", "ring", "forward", "million")
 
 #: what has no place in the README
-ELSEWHERE = (*PEERS, "applications")
+ELSEWHERE = (*PEERS, "applications", "bound")
 
 
 def main() -> int:
@@ -49,7 +50,7 @@ def main() -> int:
     parser.add_argument(
         "--pages",
         action="store_true",
-        help="write the tables of the applications and of other programs into docs, designs into cases/designs",
+        help="write the tables of applications, bounds and other programs into docs, designs into cases/designs",
     )
     chosen = parser.parse_args()
     unknown = [name for name in chosen.sections if name not in SECTIONS]
@@ -74,6 +75,8 @@ def main() -> int:
             replace_block(Path("README.md"), name, "\n".join([*printed, machine]))
         if chosen.pages and name == "applications":
             write_pages(printed, machine)
+        if chosen.pages and name == "bound":
+            replace_block(Path("docs/theory/bound.md"), name, "\n".join([*printed, machine]))
         if chosen.pages and name in PEERS:
             replace_block(Path("docs/comparison.md"), name, "\n".join([*summary, machine]))
     return 0

@@ -5,6 +5,7 @@ COMMANDS: dict[str, str] = {
     "pareto": "Trace the front of several objectives.",
     "sweep": "Run a case over weights, or over values of any keys.",
     "check": "Read a case and say what is in it, without running it.",
+    "bound": "Bound peaks of acceleration and travel over all members that could be.",
     "simulate": "Compute the motion of one design.",
     "gradient": "Compare sensitivity methods on one design.",
     "finalize": "Keep the members of a result that count, size them anew, write their case.",

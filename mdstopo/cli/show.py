@@ -44,6 +44,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     _say_trajectories(output, view)
     _say_sensitivities(output, view)
     _say_members(output, view, count)
+    known = _say_bounds(output, view)
     for title, pairs in (("settings", view.settings), ("made with", view.provenance)):
         output.say(title)
         output.table([[key, str(value)] for key, value in pairs.items()])
@@ -51,7 +52,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
         output.say(f"warning: {warning}")
     if not view.finished:
         output.say(f"to go on: {resume_command(view)}")
-    output.document(_document(view))
+    output.document(_document(view) | ({"bounds": known} if known else {}))
     return 0
 
 
@@ -182,6 +183,19 @@ def _say_members(output: Output, view: "ResultView", count: int) -> None:
     rows = [["number", "group", "alpha", "from x", "y", "to x", "y"]]
     rows += [[str(i), str(groups[i]), *(number(v) for v in (alpha[i], *p[i], *q[i]))] for i in order]
     output.table(rows)
+
+
+def _say_bounds(output: Output, view: "ResultView") -> dict[str, Any]:
+    """What no members do better, where theory gives a bound; the same for machines."""
+    from mdstopo.cli.bound import document, result_bounds, say_bounds
+
+    known = result_bounds(view)
+    if known is None:
+        return {}
+    case, found = known
+    output.say("bounds over all members")
+    say_bounds(output, case, found)
+    return {name: document(each) for name, each in found.items()}
 
 
 def _document(view: "ResultView") -> dict[str, Any]:

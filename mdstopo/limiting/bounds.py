@@ -1,0 +1,99 @@
+"""A bound for each objective of a case, with the words that say over what."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from mdstopo.case.aims import Objective
+from mdstopo.case.model import Case
+from mdstopo.case.units import unit_of_value, words
+from mdstopo.limiting.forces import restrictions
+from mdstopo.limiting.program import ImpossibleError, Program, UnsolvedError
+from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row
+from mdstopo.limiting.system import System
+
+
+@dataclass(frozen=True)
+class Bound:
+    """What no design of a case does better.
+
+    value: in the objective's unit, never above what the best of all members reaches (never below, where the objective
+    is maximised); None where theory gives none. why: which members it is over and what it counts, or why there is none.
+    """
+
+    value: float | None
+    why: str
+
+
+def bounds(case: Case) -> Mapping[str, Bound]:
+    """The bounds of all objectives of a case, by name."""
+    return {objective.name: bound(case, objective) for objective in case.objectives}
+
+
+def bound(case: Case, objective: Objective) -> Bound:
+    """The bound of one objective."""
+    if case.uncertainty is not None:
+        return Bound(None, "the case has uncertain values: a bound would hold for one sample alone")
+    load_case = case.load_case(objective.load_case)
+    try:
+        if case.solver.assemble and case.joints:
+            raise NoBoundError("solver.assemble moves the start to where joints fit: state a start that fits")
+        system = System(case, load_case)
+        goal, sign = objective_row(system, objective)
+        limits = limits_of(system, case.constraints)
+        forces = restrictions(system, limits)
+        program = Program(system, [goal, *limits.rows, *forces.rows], forces.more)
+        least = program.least()
+    except NoBoundError as reason:
+        return Bound(None, str(reason))
+    except ImpossibleError as found:
+        return Bound(None, _impossible(limits, forces.counted, found.excess))
+    except UnsolvedError as reason:
+        return Bound(None, f"the linear program was not solved: {reason}")
+    where = _what(limits, forces.counted, _goal_words(objective))
+    if not math.isfinite(least):
+        return Bound(None, f"nothing keeps it from falling without end. {where}")
+    if not goal.one_sided and least <= 0.0:
+        least = 0.0
+        if not program.is_limited:
+            text = f"without a limit on the {_others(objective)} nothing keeps it above 0"
+            return Bound(None, f"{text}. {_left_out(limits)}".rstrip(" ."))
+    return Bound(sign * least + 0.0, where)
+
+
+def _goal_words(objective: Objective) -> str:
+    return f"{objective.over_time} of {words(objective.response)}"
+
+
+def _others(objective: Objective) -> str:
+    """What has to be limited for the objective to have a bound."""
+    response = objective.response
+    return f"{'peak acceleration' if response.kind == 'displacement' else 'travel'} of {response.body}"
+
+
+def _what(limits: Limits, forces: list[str], goal: str) -> str:
+    """Over which members, and what is counted."""
+    text = f"no forces in time, of whatever members between the bodies that the case ties, have a lower {goal}"
+    if limits.counted:
+        text += f" and keep {', '.join(limits.counted)}"
+    if forces:
+        text += f"; of the case's own members is used: {', '.join(forces)}"
+    rest = _left_out(limits)
+    return f"{text}. {rest}" if rest else text
+
+
+def _left_out(limits: Limits) -> str:
+    return f"not counted: {', '.join(limits.left_out)}" if limits.left_out else ""
+
+
+def _impossible(limits: Limits, forces: list[str], excess: float) -> str:
+    text = f"no forces keep all limits: one is exceeded by at least {100.0 * excess:.3g} %"
+    parts = [*limits.counted, *forces]
+    return f"{text} ({', '.join(parts)})" if parts else text
+
+
+def unit(objective: Objective) -> str:
+    """The unit of an objective's bound."""
+    return unit_of_value(objective)

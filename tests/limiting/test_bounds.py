@@ -1,0 +1,137 @@
+"""Bounds of whole cases: where there is one, where there is none and why, and that no design is beyond one."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdstopo.limiting.bounds import bounds
+
+from .scenes import SPRING, case_of, peak, sled
+
+ROOT = str(Path(__file__).resolve().parents[2])
+
+
+def why(**sections):
+    found = bounds(case_of(**sections))["G"]
+    assert found.value is None
+    return found.why
+
+
+def test_without_a_limit_there_is_no_bound_and_it_says_what_is_missing():
+    assert "without a limit on the travel of load" in why(load={"velocity": [2, 0]})
+    limit = peak("displacement", limit=1)
+    assert "limit on the peak acceleration of load" in why(objectives={"G": peak("displacement")}, constraints=[limit])
+
+
+@pytest.mark.parametrize(
+    ("objective", "word"),
+    [
+        ({"response": "energy"}, "stored energy depends on what the members are"),
+        ({"response": {"member_force": {"group": "tie"}}}, "member force"),
+        ({"response": {"angle": {"body": "load"}}}, "an angle depends on where forces act"),
+        (peak("acceleration", at=[0.1, 0]), "not the centre of mass of load"),
+        (peak("acceleration", over="mean"), "mean over time is no peak"),
+        (peak("acceleration", over="final"), "the acceleration at one instant can be anything"),
+        (peak("acceleration", "x", "min"), "no convex problem"),
+        (peak("acceleration", sense="maximize"), "no convex problem"),
+        (peak("acceleration", "x", "max"), "falling without end"),
+    ],
+)
+def test_what_theory_does_not_bound_is_none_with_a_reason(objective, word):
+    assert word in why(objectives={"G": objective}, load={"velocity": [2, 0]})
+
+
+def test_an_observer_that_may_turn_sees_no_bound():
+    sections = sled([[0, 50], [0.1, 0]])
+    del sections["motions"][0]["angle"]
+    aim = {"G": peak("displacement", relative_to="sled")}
+    assert "sled may turn" in why(**sections, objectives=aim)
+
+
+def test_a_case_with_uncertain_values_has_none():
+    uncertain = {"parameters": {"bodies.load.mass": {"normal": {"deviation": 1}}}}
+    case = {"uncertainty": uncertain, "constraints": [peak("displacement", limit=0.1)]}
+    tie = {"from": {"body": "ground", "at": [-1, 0]}, "to": {"body": "load", "at": [0, 0]}, "law": SPRING}
+    assert "uncertain" in why(**case, members={"tie": tie})
+
+
+def test_limits_that_no_force_keeps_are_told_with_the_least_excess():
+    """From 2 m/s within 0.1 m at no more than 10 m/s^2; both limits exceeded by a share s: (1 + s)^2 = 2."""
+    said = why(
+        load={"velocity": [2, 0]},
+        objectives={"G": peak("velocity", "x", "final")},
+        constraints=[peak("displacement", limit=0.1), peak("acceleration", limit=10)],
+    )
+    assert "no forces keep all limits" in said
+    excess = float(said.partition("at least ")[2].partition(" %")[0]) / 100.0
+    assert 0.0 < excess <= np.sqrt(2.0) - 1.0
+
+
+def test_what_is_counted_and_what_is_not_is_told():
+    found = bounds(
+        case_of(
+            load={"velocity": [2, 0]},
+            constraints=[
+                peak("displacement", limit=0.1),
+                {"response": {"member_force": {"group": "tie"}}, "limit": 5},
+            ],
+        )
+    )["G"]
+    assert found.value == pytest.approx(20.0, rel=1e-2)
+    counted, _, rest = found.why.partition("not counted")
+    assert "displacement of load at most 0.1" in counted
+    assert "member force in tie at most 5" in rest
+
+
+def test_each_load_case_has_the_limits_of_its_own():
+    limit = peak("displacement", limit=0.1)
+    cases = {"slow": {"time": {"end": 0.04}}, "long": {}}
+    aims = {"A": peak("acceleration", load_case="slow"), "B": peak("acceleration", load_case="long")}
+    rows = [limit | {"load_case": "slow"}, limit | {"load_case": "long", "limit": 0.2}]
+    found = bounds(case_of(load={"velocity": [2, 0]}, load_cases=cases, objectives=aims, constraints=rows))
+    assert found["A"].value == 0.0  # 0.08 m in all, without any force
+    assert found["B"].value == pytest.approx(10.0, rel=1e-2)
+
+
+def test_a_limit_off_the_centre_counts_as_far_as_the_body_may_turn():
+    """0.1 m at 0.5 m from the centre, turned by at most 0.2: the centre keeps 0.1 + 2 * 0.5 sin(0.1)."""
+    limits = [
+        peak("displacement", at=[0, 0.5], limit=0.1),
+        {"response": {"angle": {"body": "load"}}, "over_time": "max_abs", "limit": 0.2},
+    ]
+    wide = 0.1 + 2.0 * 0.5 * np.sin(0.1)
+    found = bounds(case_of(load={"velocity": [2, 0]}, constraints=limits))["G"]
+    assert 0.99 <= found.value / (4.0 / (2.0 * wide)) <= 1.0 + 1e-9
+    wide = 0.1 + 2.0 * 0.5  # it may turn over
+    found = bounds(case_of(load={"velocity": [2, 0]}, time={"end": 2}, constraints=limits[:1]))["G"]
+    assert 0.99 <= found.value / (4.0 / (2.0 * wide)) <= 1.0 + 1e-9
+
+
+def test_motion_that_joints_leave_no_freedom_is_bounded_by_itself():
+    """On a slide across the sled's way the load has to go along with it."""
+    sections = sled([[0, 50], [0.1, 0]])
+    slide = {"type": "prismatic", "bodies": ["sled", "load"], "at": [0, 0], "axis": [0, 1]}
+    found = bounds(case_of(**sections, joints=[slide], objectives={"G": peak("acceleration", "x", "max_abs")}))["G"]
+    assert found.value == pytest.approx(50.0, rel=1e-9)
+
+
+def test_a_start_that_is_moved_gives_no_bound():
+    slide = {"type": "prismatic", "bodies": ["ground", "load"], "at": [0, 0], "axis": [1, 0]}
+    assert "solver.assemble" in why(
+        joints=[slide], solver={"assemble": True}, constraints=[peak("displacement", limit=0.1)]
+    )
+
+
+@pytest.mark.parametrize("seed", range(14))
+def test_no_random_design_is_beyond_the_bound(seed, monkeypatch):
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmarks.bound import tries
+
+    assert sys.modules["benchmarks.bound"]
+    found = list(tries(seed, 24))
+    assert found
+    for each in found:
+        assert each.bound is None or each.bound <= each.best
+    assert any(each.bound is not None and each.bound > 0.0 for each in found)
