@@ -77,9 +77,9 @@ def rows_of(case: Case, design: Floats, found: Evaluation) -> Rows:
     objective: list[int] = []
     for k, (each, weight) in enumerate(zip(case.objectives, weights, strict=True)):
         sign = -1.0 if each.sense == "maximize" else 1.0
-        own = _competing(each, sign, found.peaks[each.name])
+        own = competing(each, sign, found.peaks[each.name])
         peaks += [weight * sign * peak.value for peak in own]
-        slopes += [weight * sign * space.pull(_gradient(peak)) for peak in own]
+        slopes += [weight * sign * space.pull(gradient_of(peak)) for peak in own]
         objective += [0 if together else k] * len(own)
     owners, values = np.array(objective), np.array(peaks)
     for k in set(objective):
@@ -103,19 +103,21 @@ def _constraints(case: Case, found: Evaluation) -> tuple[Floats, Floats]:
             continue
         scale = abs(row.bound) or 1.0
         for sign in {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}[row.sense]:
-            for peak in _competing(row, sign, found.constraint_peaks[i]):
+            for peak in competing(row, sign, found.constraint_peaks[i]):
                 c.append(sign * (peak.value - row.bound) / scale)
-                held.append(sign * case.space.pull(_gradient(peak)) / scale)
+                held.append(sign * case.space.pull(gradient_of(peak)) / scale)
     return np.array(c), np.array(held).reshape(len(c), case.space.size)
 
 
-def _competing(looked: Objective | ResponseRow, sign: float, peaks: Sequence[Peak]) -> Sequence[Peak]:
+def competing(looked: Objective | ResponseRow, sign: float, peaks: Sequence[Peak]) -> Sequence[Peak]:
+    """The peaks that bound sign times a response over time from above: all of a maximum, else the value."""
     several = looked.over_time in (UPPER if sign > 0.0 else LOWER)
     last = looked.over_time == "final" and looked.response.kind == "member_force" and sign > 0.0
     return peaks if several or last else peaks[:1]
 
 
-def _gradient(peak: Peak) -> Floats:
+def gradient_of(peak: Peak) -> Floats:
+    """A peak's gradient by the design. Raises ValueError where it was not computed."""
     if peak.gradient is None:
         raise ValueError("the evaluation has no gradients")
     return peak.gradient

@@ -16,6 +16,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.optimum import linkages
+from benchmarks.optimum.motions import (
+    acceleration,
+    angle,
+    arm,
+    belts,
+    displacement,
+    force,
+    isolator,
+    jerked,
+    larger,
+    limit,
+    machine,
+    most,
+    product,
+    restraint,
+    shaken,
+    stopped,
+    wires,
+)
 from mdstopo import Case
 from mdstopo.case.reader import read_case
 
@@ -96,15 +115,92 @@ CONVEX: Mapping[str, Callable[[], Document]] = {
 }
 
 
+_OCCUPANT = displacement("occupant", "vehicle")
+_TIGHT: Document = {"f": most(force("wires0")), "g": most(force("wires1"))}
+
+DYNAMIC: Mapping[str, Callable[[], Document]] = {
+    "isolator": isolator,
+    "machine": lambda: machine(
+        [limit(displacement("machine", "floor"), 0.09), limit(angle("machine", "floor"), 0.045)],
+        {"shock": shaken(30, 20)},
+        objectives={"a": most(acceleration("machine"))},
+    ),
+    "machine two shocks": lambda: machine(
+        [
+            limit(displacement("machine", "floor"), 0.11, load_case="side"),
+            limit(angle("machine", "floor"), 0.02, load_case="turn"),
+            limit(displacement("machine", "floor"), 0.02, load_case="turn"),
+        ],
+        {"side": shaken(40, 0), "turn": shaken(10, 20, 15)},
+        objectives={
+            "a": most(acceleration("machine"), load_case="side"),
+            "b": most(acceleration("machine", at=[0.05, 0.6]), load_case="turn"),
+        },
+        **larger({"a": 1, "b": 1}),
+    ),
+    "belts": lambda: belts({"a": most(acceleration("occupant"))}, [limit(_OCCUPANT, 0.1)]),
+    "belts turn": lambda: belts(
+        {"a": most(acceleration("occupant"))}, [limit(_OCCUPANT, 0.15), limit(angle("occupant", "vehicle"), 0.03)]
+    ),
+    "belts force": lambda: belts({"f": most(force("belts"))}, [limit(_OCCUPANT, 0.15)]),
+    "belts two stops": lambda: belts(
+        {"a": most(acceleration("occupant"), load_case="front"), "b": most(acceleration("occupant"), load_case="side")},
+        [limit(_OCCUPANT, 0.15, load_case="front"), limit(_OCCUPANT, 0.1, load_case="side")],
+        {"front": stopped(-100), "side": stopped(-30, -60, 40)},
+        **larger({"a": 1, "b": 1.5}),
+    ),
+    "belts product": lambda: belts(
+        {"a": most(acceleration("occupant")), "d": most(_OCCUPANT)},
+        [limit(angle("occupant", "vehicle"), 0.06)],
+        **product({"a": 1, "d": 1}),
+    ),
+    "six wires": lambda: wires({"f": most(force("wires0"))}, []),
+    "wires travel": lambda: wires({"f": most(force("wires0"))}, [limit(displacement("block"), 0.05)], 9),
+    "wires groups": lambda: wires(
+        _TIGHT, [limit(displacement("block"), 0.06), limit(angle("block"), 0.05)], 8, 2, **larger({"f": 1, "g": 1})
+    ),
+    "arm": lambda: arm(
+        {"r": most({"joint_force": {"joint": "root"}})}, [limit(angle("lower", "base"), 0.15)], **jerked(60, 10)
+    ),
+    "arm members": lambda: arm(
+        {"f": most(force("stays")), "g": most(force("guys")), "h": most(force("ties"))},
+        [limit(angle("lower", "base"), 0.1), most({"joint_force": {"joint": "elbow"}}, limit=100)],
+        **jerked(60, 10),
+        **larger({"f": 1, "g": 2, "h": 1}),
+    ),
+    "arm two jerks": lambda: arm(
+        {
+            "r": most({"joint_force": {"joint": "root"}}, load_case="left"),
+            "s": most({"joint_force": {"joint": "root"}}, load_case="right"),
+        },
+        [limit(angle("lower", "base"), 0.15, load_case=name) for name in ("left", "right")],
+        load_cases={"left": jerked(60, 10), "right": jerked(-40, -30)},
+        **larger({"r": 1, "s": 1}),
+    ),
+    "restraint": lambda: restraint({"G": most("energy")}, [limit(angle("torso", "vehicle"), 0.2)], 8),
+    "thousand": lambda: restraint(
+        {"G": most("energy")}, [limit(angle("torso", "vehicle"), 0.3), limit(displacement("torso", "vehicle"), 0.15)]
+    ),
+}
+#: optima of dynamic problems that are known in closed form
+CLOSED = {"isolator": 0.5205986 * 4.0**2 / 0.1}
+
+
 def all() -> list[Problem]:
     """All problems, with what is known of their optima."""
-    return [*convex()]
+    return [*convex(), *dynamic()]
 
 
 @cache
 def convex() -> tuple[Problem, ...]:
     """The driven linkages."""
     return tuple(_known(Problem(name, "convex", json.dumps(make()))) for name, make in CONVEX.items())
+
+
+@cache
+def dynamic() -> tuple[Problem, ...]:
+    """The motions that depend on the design."""
+    return tuple(Problem(name, "dynamic", json.dumps(make()), CLOSED.get(name)) for name, make in DYNAMIC.items())
 
 
 def named(names: "list[str] | None") -> list[Problem]:

@@ -115,3 +115,72 @@ def test_an_untrue_word_is_found():
     far = {**failed, "reason": "infeasible: least excess 90 %", "excess": 0.9}
     assert "least" in untrue(impossible, Run(**far), 1e-6)
     assert not untrue(problem, Run(**{**said, "status": "stalled", "kkt": 0.1}), 1e-6)
+
+
+def test_the_dynamic_problems_are_many_and_can_be_computed():
+    assert len(problems.dynamic()) >= 15
+    for problem in problems.dynamic():
+        case = problem.case()
+        found = evaluate(case, gradient=False)
+        assert found.status.ok, problem.name
+        assert np.isfinite(value_of(case, found.objectives))
+    assert any(
+        problem.case().n_design >= 1000 and len(problem.case().constraints) == 3 for problem in problems.dynamic()
+    )
+
+
+def test_improvements_are_feasible_and_counted_over_all_starts():
+    from benchmarks.optimum.race import improvements, within
+
+    visited = [(1, 5.0, 0.1), (2, 6.0, 0.0), (3, 7.0, 0.0), (4, 4.0, 0.0)]
+    found = improvements(visited, before=10)
+    assert found == [(12, 6.0), (14, 4.0)]
+    assert within(found, 4.0) == 14
+    assert within(found, 5.95) == 12
+    assert within(found, 3.0) is None
+
+
+@pytest.mark.parametrize("name", ["belts two stops", "belts product", "machine"])
+def test_what_other_optimisers_get_has_the_gradients_of_its_rows(name):
+    from benchmarks.optimum.rivals import Smooth
+
+    problem = next(each for each in problems.dynamic() if each.name == name)
+    smooth = Smooth(problem.case(), budget=50)
+    x = smooth.space.reduce(smooth.case.start)
+    v = smooth.begin(x)
+    rows, slopes = smooth.held(v)
+    value, slope = smooth.objective(v)
+    along = np.random.default_rng(1).standard_normal(len(v))
+    h = 1e-6
+    ahead, behind = smooth.held(v + h * along)[0], smooth.held(v - h * along)[0]
+    assert (ahead - behind) / (2.0 * h) == pytest.approx(slopes @ along, rel=2e-3, abs=2e-3)
+    change = smooth.objective(v + h * along)[0] - smooth.objective(v - h * along)[0]
+    assert change / (2.0 * h) == pytest.approx(slope @ along, rel=1e-4)
+    assert rows[: len(rows)].shape == (len(slopes),)
+    assert np.isfinite(value)
+    assert len(smooth.visited) == 3
+
+
+def test_what_other_optimisers_visit_is_counted_and_ends_with_the_budget():
+    from benchmarks.optimum.rivals import Smooth, SpentError
+
+    problem = next(each for each in problems.dynamic() if each.name == "isolator")
+    smooth = Smooth(problem.case(), budget=2)
+    v = smooth.begin(np.array([0.3, 0.2]))
+    smooth.held(v)
+    smooth.held(v)
+    smooth.held(v + 0.1)
+    assert [count for count, _, _ in smooth.visited] == [1, 2]
+    with pytest.raises(SpentError):
+        smooth.held(v + 0.2)
+
+
+@pytest.mark.parametrize(("method", "module"), [("SLSQP", "nlopt"), ("IPOPT", "casadi")])
+def test_other_optimisers_find_the_isolator(method, module):
+    pytest.importorskip(module)
+    from benchmarks.optimum.rivals import attempt
+
+    problem = next(each for each in problems.dynamic() if each.name == "isolator")
+    case = problem.case()
+    visited = attempt(case, method, case.space.reduce(case.start), 60)
+    assert min(value for _, value, over in visited if over < 1e-5) == pytest.approx(problem.exact, rel=1e-4)
