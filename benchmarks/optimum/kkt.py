@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from benchmarks.forces import whole_forces
 from benchmarks.optimum.measure import slopes_of
 from mdstopo import Case, Evaluation
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
@@ -66,8 +67,12 @@ class Residual(NamedTuple):
     linear: Floats
 
 
-def rows_of(case: Case, design: Floats, found: Evaluation) -> Rows:
-    """The rows at a design (alpha, with the values of variables behind it), from its evaluation with gradients."""
+def rows_of(case: Case, design: Floats, found: Evaluation, driven: bool = False) -> Rows:
+    """The rows at a design (alpha, with the values of variables behind it), from its evaluation with gradients.
+
+    driven: the motion is prescribed, so that a member's largest force is alpha_i times a constant: then every member of
+    a group whose largest force is asked for has its row, not only the few that an evaluation tells of.
+    """
     space = case.space
     x = space.reduce(design)
     lower, upper = space.bounds(case.lower, case.upper)
@@ -77,14 +82,15 @@ def rows_of(case: Case, design: Floats, found: Evaluation) -> Rows:
     objective: list[int] = []
     for k, (each, weight) in enumerate(zip(case.objectives, weights, strict=True)):
         sign = -1.0 if each.sense == "maximize" else 1.0
-        own = competing(each, sign, found.peaks[each.name])
+        own = _members(case, design, each, found.peaks[each.name]) if driven else found.peaks[each.name]
+        own = competing(each, sign, own)
         peaks += [weight * sign * peak.value for peak in own]
         slopes += [weight * sign * space.pull(gradient_of(peak)) for peak in own]
         objective += [0 if together else k] * len(own)
     owners, values = np.array(objective), np.array(peaks)
     for k in set(objective):
         values[owners == k] -= values[owners == k].max()
-    c, held = _constraints(case, found)
+    c, held = _constraints(case, design, found, driven)
     volumes = [row for row in case.constraints if isinstance(row, VolumeRow)]
     signs = np.array([-1.0 if row.sense == "at_least" else 1.0 for row in volumes])
     own_rows = [space.row(row) for row in volumes]
@@ -94,7 +100,25 @@ def rows_of(case: Case, design: Floats, found: Evaluation) -> Rows:
     return Rows(values, np.array(slopes), owners, c, held, slack, A, equal, x - lower, upper - x)
 
 
-def _constraints(case: Case, found: Evaluation) -> tuple[Floats, Floats]:
+def _members(case: Case, design: Floats, looked: Objective | ResponseRow, peaks: Sequence[Peak]) -> Sequence[Peak]:
+    """A peak for every member of a group in a driven scene; other responses' peaks as they are.
+
+    None is higher than the highest that the evaluation found: the residual is that of the function that it computes.
+    """
+    name = looked.response.group
+    if looked.response.kind != "member_force" or looked.over_time not in UPPER or name is None:
+        return peaks
+    group = next(each for each in case.design_groups if each.name == name)
+    whole = whole_forces(case, design[: case.n_design], group, looked.load_case)
+    highest, found = peaks[0].value, []
+    for i, force in zip(range(*case.group_slices[name].indices(case.n_design)), whole.tolist(), strict=True):
+        gradient = np.zeros(case.space.length)
+        gradient[i] = force
+        found.append(Peak(float("nan"), min(float(design[i]) * force, highest), gradient))
+    return found
+
+
+def _constraints(case: Case, design: Floats, found: Evaluation, driven: bool) -> tuple[Floats, Floats]:
     """Excesses relative to the bounds and their gradients, a row a peak."""
     c: list[float] = []
     held: list[Floats] = []
@@ -103,7 +127,8 @@ def _constraints(case: Case, found: Evaluation) -> tuple[Floats, Floats]:
             continue
         scale = abs(row.bound) or 1.0
         for sign in {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}[row.sense]:
-            for peak in competing(row, sign, found.constraint_peaks[i]):
+            peaks = found.constraint_peaks[i]
+            for peak in competing(row, sign, _members(case, design, row, peaks) if driven else peaks):
                 c.append(sign * (peak.value - row.bound) / scale)
                 held.append(sign * case.space.pull(gradient_of(peak)) / scale)
     return np.array(c), np.array(held).reshape(len(c), case.space.size)

@@ -83,7 +83,7 @@ def judged(
         reached=_reached(problem, visited, best),
         status=str(result.status),
         reason=result.reason,
-        kkt=kkt_of(case, design),
+        kkt=kkt_of(case, design, problem.kind == "convex"),
         stated=float(state.kkt),
         untrue="",
         seconds=seconds,
@@ -108,11 +108,11 @@ def visits(case: Case, result: Result) -> list[tuple[int, float, float]]:
     ]
 
 
-def kkt_of(case: Case, design: Floats) -> float:
-    """The scaled KKT residual at a design, from an evaluation of its own."""
+def kkt_of(case: Case, design: Floats, driven: bool = False) -> float:
+    """The scaled KKT residual at a design, from an evaluation of its own. driven: as of `rows_of`."""
     alpha, values = design[: case.n_design], case.space.named(design)
     found = evaluate(case, alpha, variables=values)
-    return residual(rows_of(case, design, found)).scaled if found.status.usable else float("nan")
+    return residual(rows_of(case, design, found, driven)).scaled if found.status.usable else float("nan")
 
 
 def untrue(problem: Problem, run: Run, tolerance: float, best: float | None = None) -> str:
