@@ -22,6 +22,7 @@ SECTIONS = {
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
+    "optimum": "does the optimiser find the optimum, is its last word true; beside other optimisers",
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",
     "ring": "a closed loop of bodies beside other programs, forward runs too",
     "forward": "forward runs of the paper's bodies beside other programs",
@@ -31,8 +32,11 @@ SECTIONS = {
 #: what compares with other programs is no part of a run without names: they compile for minutes
 PEERS = ("peers", "ring", "forward", "million")
 
+#: sections that take an hour are run where they are named
+NAMED = (*PEERS, "optimum")
+
 #: what has no place in the README
-ELSEWHERE = (*PEERS, "applications", "bound")
+ELSEWHERE = (*NAMED, "applications", "bound")
 
 
 def main() -> int:
@@ -43,7 +47,9 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but those with other programs")
+    parser.add_argument(
+        "sections", nargs="*", metavar="SECTION", help="default: all but those with other programs and optimum"
+    )
     parser.add_argument("--peers", metavar="DIR", help="a folder of other programs to compare with, with its bench.py")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
@@ -56,7 +62,7 @@ def main() -> int:
     unknown = [name for name in chosen.sections if name not in SECTIONS]
     if unknown:
         parser.error(f"no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}")
-    sections = chosen.sections or ([] if chosen.peers else [name for name in SECTIONS if name not in PEERS])
+    sections = chosen.sections or ([] if chosen.peers else [name for name in SECTIONS if name not in NAMED])
     machine = f"Measured on: {description()}."
     print(machine + "\n", flush=True)
     for table in outside(chosen.peers, chosen.peers_python) if chosen.peers else ():

@@ -23,7 +23,9 @@ def whole_forces(case: Case, alpha: Floats, group: MemberGroup, load_case: str) 
     for law in group.laws:
         until = np.inf if law.active_until is None else law.active_until
         acts = (times >= (-np.inf if law.active_from is None else law.active_from)) & (times < until)
-        total += np.where(acts[:, None], _force(law, x, rate), 0.0)
+        free = getattr(law, "free_length", None)
+        beyond = x if free is None else x + (group.length - free)
+        total += np.where(acts[:, None], _force(law, beyond, rate), 0.0)
     return np.asarray(np.abs(total).max(axis=0))
 
 
