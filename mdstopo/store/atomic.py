@@ -6,13 +6,16 @@ the file system; whatever kills the process, a reader finds the old file or the 
 
 import os
 import secrets
+from collections.abc import Callable
 from pathlib import Path
 
 from mdstopo.store.errors import WriteError
 
 
-def replace_file(path: Path, data: bytes) -> None:
+def replace_file(path: Path, data: bytes, check: Callable[[Path], None] | None = None) -> None:
     """Make `path` hold `data`, atomically and durably.
+
+    check: is given the file that is about to take the place; what it raises keeps that from happening.
 
     Raises
     ------
@@ -29,6 +32,8 @@ def replace_file(path: Path, data: bytes) -> None:
                 while rest:  # a raw write may take less than it is given
                     rest = rest[stream.write(rest) :]
                 os.fsync(stream.fileno())
+            if check is not None:
+                check(temporary)
             os.replace(temporary, path)
         except BaseException:
             temporary.unlink(missing_ok=True)
