@@ -19,12 +19,16 @@ def prepare_place(path: Path) -> Path:
 
     Raises StoreError where that is impossible.
     """
-    place = path.resolve()
+    try:
+        place = path.resolve()
+    except (OSError, RuntimeError) as error:  # the folder that this process is in is gone; links that lead in a circle
+        raise StoreError(f"{path}: there is no such place: {getattr(error, 'strerror', None) or error}") from error
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
+        there = place.is_dir()
     except OSError as error:
         raise StoreError(f"{path}: its directory cannot be made: {error.strerror}") from error
-    if place.is_dir():
+    if there:
         raise StoreError(f"{path}: a directory, not a file")
     return place
 

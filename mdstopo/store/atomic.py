@@ -7,6 +7,7 @@ the file system; whatever kills the process, a reader finds the old file or the 
 import os
 import secrets
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from mdstopo.store.errors import WriteError
@@ -36,7 +37,8 @@ def replace_file(path: Path, data: bytes, check: Callable[[Path], None] | None =
                 check(temporary)
             os.replace(temporary, path)
         except BaseException:
-            temporary.unlink(missing_ok=True)
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
             raise
         _sync_directory(path.parent)
     except OSError as error:
@@ -51,11 +53,13 @@ def remove_leftovers(path: Path) -> int:
     """
     prefix = _prefix(path)
     count = 0
-    with os.scandir(path.parent) as entries:
+    leftovers: list[str] = []
+    with suppress(OSError), os.scandir(path.parent) as entries:  # a folder whose contents may not be listed
         leftovers = [e.path for e in entries if e.name.startswith(prefix) and e.name.endswith(".tmp")]
     for leftover in leftovers:
-        Path(leftover).unlink(missing_ok=True)
-        count += 1
+        with suppress(OSError):  # a folder of that name, which is none of ours
+            os.unlink(leftover)
+            count += 1
     return count
 
 
