@@ -4,10 +4,10 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-import llvmlite.binding as llvm
 from llvmlite import ir
 from numba import config, types
 from numba.core import cgutils
+from numba.core.codegen import get_host_cpu_features
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin, models, register_model
 
@@ -15,9 +15,9 @@ from mdstopo.native import vector
 
 
 def _features() -> str:
-    """Features of the processor that is compiled for."""
+    """Features of the processor that Numba compiles for: fewer than it has under NUMBA_ENABLE_AVX=0."""
     asked: str | None = config.CPU_FEATURES  # type: ignore[attr-defined]  # set by its reader of the environment
-    return str(llvm.get_host_cpu_features().flatten()) if asked is None else asked
+    return str(get_host_cpu_features()) if asked is None else asked
 
 
 _AVX512 = "+avx512f" in _features().split(",")
