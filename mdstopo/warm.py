@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mdstopo.children import command, end_with_parent
 from mdstopo.native.store import cache_folder
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ def is_compiled(integrator: str) -> bool:
 def mark_compiled(integrator: str) -> None:
     """Remember that they are on the disk. A disk that cannot be written to is no reason to stop."""
     with contextlib.suppress(OSError):
-        _marker(integrator).parent.mkdir(parents=True, exist_ok=True)
+        _marker(integrator).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         _marker(integrator).touch()
 
 
@@ -60,8 +61,8 @@ class Beside:
         if self.due:
             with contextlib.suppress(OSError):
                 self._child = subprocess.Popen(
-                    [sys.executable, "-m", "mdstopo.warm", integrator, *share],
-                    stdin=subprocess.DEVNULL,
+                    command("mdstopo.warm", integrator, *share),
+                    stdin=subprocess.PIPE,  # its end is how the other process knows of ours
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
                 )
@@ -77,6 +78,8 @@ class Beside:
                 child.kill()
                 child.wait()
                 raise
+            finally:
+                _let_go(child)
         if self.due:
             self.due = False
             if compiled:
@@ -88,6 +91,14 @@ class Beside:
         if child is not None:
             child.kill()
             child.wait()
+            _let_go(child)
+
+
+def _let_go(child: "subprocess.Popen[bytes]") -> None:
+    """Close our end of its input."""
+    assert child.stdin is not None
+    with contextlib.suppress(OSError):
+        child.stdin.close()
 
 
 def compile_looking(integrator: str) -> None:
@@ -107,6 +118,7 @@ def tiny(integrator: str) -> "Case":
 
 
 if __name__ == "__main__":
+    end_with_parent(sys.stdin.buffer)
     gc.disable()  # as in `session.ready`
     for module in sys.argv[2:]:
         importlib.import_module(module).compile_share()

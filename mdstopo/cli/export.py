@@ -20,6 +20,8 @@ def command(result_path: Path, kind: str | None, out: Path | None, quiet: bool) 
     """Write what a result file holds as --csv tables or as one --json document."""
     if kind is None:
         raise click.UsageError("say --csv or --json")
+    from mdstopo.store.admit import made_from
+    from mdstopo.store.atomic import replace_file
     from mdstopo.store.errors import StoreError
     from mdstopo.store.export import as_csv, as_json, tables
     from mdstopo.store.reader import read_result
@@ -28,18 +30,18 @@ def command(result_path: Path, kind: str | None, out: Path | None, quiet: bool) 
     output = Output(json=False, quiet=quiet)
     view = read_result(result_path, leave_out=_NOT_IN_TABLES if kind == "csv" else ())
     place = out or result_path.with_suffix(f".{kind}")
+    if kind == "json":
+        goal = made_from(view, place)
+        replace_file(goal, "".join(as_json(view)).encode(errors="replace"))
+        output.say(str(place))
+        return 0
     try:
-        if kind == "json":
-            place.parent.mkdir(parents=True, exist_ok=True)
-            with place.open("w", encoding="utf-8") as stream:
-                stream.writelines(as_json(view))
-            output.say(str(place))
-            return 0
         place.mkdir(parents=True, exist_ok=True)
-        for name, table in tables(view, case_of(view)).items():
-            file = place / f"{name}.csv"
-            file.write_text(as_csv(table), encoding="utf-8")
-            output.say(str(file))
     except OSError as error:
         raise StoreError(f"{place}: cannot be written: {error.strerror}") from error
+    for name, table in tables(view, case_of(view)).items():
+        file = place / f"{name.replace('/', '_')}.csv"
+        goal = made_from(view, file)
+        replace_file(goal, as_csv(table).encode(errors="replace"))
+        output.say(str(file))
     return 0

@@ -1,5 +1,6 @@
 """The group of commands, each loaded when it is called, and the way from errors to exit statuses."""
 
+import contextlib
 import sys
 from importlib import import_module
 
@@ -7,8 +8,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from mdstopo._version import __version__
-from mdstopo.cli import COMPLETE
+from mdstopo.cli import COMPLETE, OutputError
 from mdstopo.cli.commands import COMMANDS, help_text
+from mdstopo.cli.output import write
 
 
 class LazyGroup(click.Group):
@@ -77,13 +79,16 @@ def run_group(arguments: list[str]) -> int:
     except click.Abort:
         raise KeyboardInterrupt from None
     except click.ClickException as error:
-        error.show()
+        with contextlib.suppress(OSError):  # a standard error that cannot be written
+            error.show()
         return error.exit_code
+    except (BrokenPipeError, OutputError):
+        raise
     except Exception as error:
         sentence, status = _explain(error)
         if sentence is None:
             raise
-        print(sentence, file=sys.stderr)
+        write(sys.stderr, sentence)
         return status
     return status if isinstance(status, int) else 0
 

@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM: at once while nothing would be lost, after the iteration while a run is going."""
+"""Ctrl-C, SIGTERM and SIGHUP: at once while nothing would be lost, after the iteration while a run is going."""
 
 import os
 import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import click
@@ -12,7 +12,7 @@ from mdstopo.cli.output import Output
 
 
 class Interrupts:
-    """Handles both signals of this process.
+    """Handles these signals of this process.
 
     Before `stop_requested` is first asked, and at the second request, a signal raises KeyboardInterrupt; in
     between it is only noted, so that the iteration can be finished and saved.
@@ -22,8 +22,9 @@ class Interrupts:
         self.requested = False
         self._gentle = False
         self._quiet = quiet
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._handle)
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            if number != signal.SIGHUP or signal.getsignal(number) is not signal.SIG_IGN:  # as `nohup` has it
+                signal.signal(number, self._handle)
 
     def stop_requested(self) -> bool:
         """Whether to stop; from now on a signal waits until this is asked again."""
@@ -37,7 +38,8 @@ class Interrupts:
         self.requested = True
         if not self._quiet:
             # Not print: the signal may have come while the stream was being written.
-            os.write(2, b"\nfinishing the iteration (once more to end at once)\n")
+            with suppress(OSError):  # the terminal is gone
+                os.write(2, b"\nfinishing the iteration (once more to end at once)\n")
 
 
 @contextmanager

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
+from mdstopo.cli import lost
+
 
 class Output:
     """How much a command says, and in which form.
@@ -37,15 +39,33 @@ class Output:
     def document(self, content: Mapping[str, Any]) -> None:
         """The result, for machines."""
         if self.json:
-            write(sys.stdout, json.dumps(plain(content), ensure_ascii=False, allow_nan=False))
+            plainly = (sys.stdout.encoding or "").lower().replace("-", "") != "utf8"
+            write(sys.stdout, json.dumps(plain(content), ensure_ascii=plainly, allow_nan=False))
+
+
+#: what a terminal would obey, and what turns the order of letters around, in letters that JSON reads as the same
+_OBEYED = {
+    code: f"\\u{code:04x}"
+    for code in [*range(32), *range(127, 160), 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+    if chr(code) not in "\n\t"
+}
+
+
+def harmless(text: str) -> str:
+    """A text without anything that a terminal obeys: titles and names come from files of anybody."""
+    return text.translate(_OBEYED)
 
 
 def write(stream: TextIO, text: str) -> None:
-    """A line; quietly nowhere once the reader has gone."""
+    """A line; quietly nowhere once the reader has gone. Raises OutputError where standard output cannot be written."""
     try:
-        print(text, file=stream, flush=True)
+        print(harmless(text), file=stream, flush=True)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+    except OSError as error:  # a full disk; nothing can be said of a standard error that cannot be written
+        failure = lost(stream, error)
+        if stream is sys.stdout:
+            raise failure from None
 
 
 def aligned(rows: Iterable[Sequence[str]], indent: str = "  ") -> list[str]:

@@ -17,14 +17,12 @@ def command(result_path: Path, out: Path | None, quiet: bool) -> int:
     from mdstopo.plots.source import Source
     from mdstopo.report.content import content
     from mdstopo.report.page import page
-    from mdstopo.store.errors import StoreError
+    from mdstopo.store.admit import made_from
+    from mdstopo.store.atomic import replace_file
 
     place = out or result_path.with_suffix(".html")
-    text = page(content(Source(result_path)))
-    try:
-        place.parent.mkdir(parents=True, exist_ok=True)
-        place.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise StoreError(f"{place}: cannot be written: {error.strerror}") from error
+    source = Source(result_path)
+    goal = made_from(source.view, place)
+    replace_file(goal, page(content(source)).encode(errors="replace"))
     Output(json=False, quiet=quiet).say(str(place))
     return 0

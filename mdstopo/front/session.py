@@ -26,12 +26,13 @@ from mdstopo.session.ready import compile_apart
 from mdstopo.session.starts import NOTHING_VARIES, first_design, replaced, unshared
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
-from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.atomic import remove_leftovers
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
-from mdstopo.store.contents import Datasets, case_part, result_image
+from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.errors import WriteError
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.writing import write_result
 
 Floats = NDArray[np.float64]
 Stop = Callable[[], bool]
@@ -335,12 +336,9 @@ class _FrontRun:
             assert self.quality is not None
             settings |= self.quality.numbers()
             datasets |= {"pareto/ideal": self.quality.ideal, "pareto/nadir": self.quality.nadir}
-        replace_file(
-            path,
-            result_image(
-                self.case, "pareto", status.value, reason, datasets, self.provenance, settings, self.warnings
-            ),
-        )  # fmt: skip
+        write_result(
+            path, self.case, "pareto", status.value, reason, datasets, self.provenance, settings, self.warnings
+        )
 
     def so_far(self) -> Front:
         """What the plan has reached; utopia and maxima are not known before the ends are."""

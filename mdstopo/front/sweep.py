@@ -22,12 +22,13 @@ from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.ready import compile_apart
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
-from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.atomic import remove_leftovers
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
-from mdstopo.store.contents import Datasets, case_part, result_image
+from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.errors import WriteError
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.writing import write_result
 
 
 @dataclass(frozen=True)
@@ -215,8 +216,7 @@ class _Sweep:
                 part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
-        image = result_image(self.base, "sweep", status.value, reason, datasets, self.provenance, {}, ())
-        replace_file(path, image)
+        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, {})
 
 
 def shortest(value: float) -> str:

@@ -103,19 +103,14 @@ class Kernel:
 
     def _inside(self) -> Any:
         """Numba's object for the function where compiled functions call it."""
-        compiler = numba()
+        numba()
         from mdstopo.native.library import LEFT, OPTIMISED, ROLLED, Cache
-        from mdstopo.native.store import cache_folder
 
         # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
         library = OPTIMISED if self._fastmath else LEFT if self._inner else ROLLED
         made = self._made(no_cpython_wrapper=True, pipeline_class=library)
         if self._inner:  # an entry's machine code is kept by `native.store`
-            kept, compiler.config.CACHE_DIR = compiler.config.CACHE_DIR, str(cache_folder())
-            try:
-                made._cache = Cache(self.py_func)  # type: ignore[no-untyped-call]
-            finally:
-                compiler.config.CACHE_DIR = kept
+            made._cache = Cache(self.py_func)
         return made
 
     def _made(self, **options: Any) -> Any:

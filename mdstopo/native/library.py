@@ -6,13 +6,22 @@ level (`jit.kernel`) is optimised in its entry only: a quarter of the compile ti
 optimised by itself too, so that its vectors do not depend on who calls it. Loops of entries are not unrolled.
 """
 
+import functools
+import hashlib
+import inspect
+import pickle
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numba
 from llvmlite import binding as llvm
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
+from numba.core.caching import FunctionCache, _Cache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult
+from numba.core.serialize import dumps
+
+from mdstopo.native.store import cache_folder, read_checked, write_checked
 
 #: versions of Numba whose insides `passes`, `lowering` and `sparing` are known to fit; others compile in their own way
 KNOWN = ("0.68.",)
@@ -119,12 +128,68 @@ class _Reader:
         return library
 
 
-class _Entries(CompileResultCacheImpl):
-    def rebuild(self, target_context: Any, payload: Any) -> Any:
-        return CompileResult._rebuild(_Reader(target_context), *payload)  # type: ignore[no-untyped-call]
+@functools.cache
+def _source(path: str) -> bytes:
+    return hashlib.sha256(Path(path).read_bytes()).digest()
 
 
-class Cache(FunctionCache):
-    """Functions inside entries on the disk, for other processes that compile entries which call them."""
+class Cache(_Cache):
+    """Functions inside entries on the disk, for other processes that compile entries which call them.
 
-    _impl_class = _Entries
+    In the place of Numba's own, which ends the program where a file is damaged or the disk full: one file for a
+    function, with a checksum; whatever is wrong with it means that the function is compiled once more.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._py_func = function
+        code = function.__code__
+        names = f"{code.co_filename} {function.__qualname__} {code.co_firstlineno}"
+        self._path = cache_folder() / f"inside-{hashlib.sha256(names.encode()).hexdigest()[:24]}.kept"
+
+    @property
+    def cache_path(self) -> str:
+        """Where it is kept."""
+        return str(self._path.parent)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The function compiled for these types; nothing where it has not been kept."""
+        target_context.refresh()
+        try:
+            kept = self._read().get(self._key(sig, target_context.codegen()))
+            if kept is None:
+                return None
+            return CompileResult._rebuild(_Reader(target_context), *pickle.loads(kept))  # type: ignore[no-untyped-call]
+        except Exception:
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep it where that is possible."""
+        if any(not each.can_cache for each in data.lifted) or data.library.has_dynamic_globals:
+            return
+        try:
+            whole = self._read()
+            whole[self._key(sig, data.codegen)] = dumps(data._reduce())  # type: ignore[no-untyped-call]
+            write_checked(self._path, dumps(whole))  # type: ignore[no-untyped-call]
+        except Exception:
+            return
+
+    def _read(self) -> dict[Any, bytes]:
+        """All that is kept of the function, by its key."""
+        data = read_checked(self._path)
+        found = {} if data is None else pickle.loads(data)
+        return found if isinstance(found, dict) else {}
+
+    def _key(self: Any, sig: Any, codegen: Any) -> Any:
+        """Types, processor, the function's bytecode and closure, and the file that it stands in."""
+        key = FunctionCache._index_key(self, sig, codegen)  # type: ignore[no-untyped-call]
+        return (*key, _source(inspect.getfile(self._py_func)))
+
+    def enable(self) -> None:
+        """It always is."""
+
+    def disable(self) -> None:
+        """Not needed."""
+
+    def flush(self) -> None:
+        """Forget it."""
+        self._path.unlink(missing_ok=True)

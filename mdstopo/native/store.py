@@ -7,17 +7,25 @@ import json
 import os
 import sys
 import tempfile
+import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from mdstopo.installed import version_of
+from mdstopo.native.trusted import make_private, open_lock, read_private, write_private
 
-_ROOMS = ("general", "mechanics", "integrators", "responses", "sensitivity", "optimizer", "scene", "native")
+#: folders of the package that hold no kernels and that no kernel takes a number from; `tests/native` looks after that
+WITHOUT_KERNELS = ("bench", "cli", "finalize", "front", "plots", "report", "store")
 _COMPILER = ("numba", "llvmlite", "numpy")
 _SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
-_MAGIC = b"mdstopo code 1\n"
+_MAGIC = b"mdstopo code 2\n"
+#: folders of other sources and versions: how many are kept, and how long after their last use, in seconds
+_KEPT, _LASTING = 12, 30 * 86400.0
+_DAY = 86400.0
+#: how long, in seconds, another process is waited for that compiles the same
+_PATIENCE = 600.0
 
 #: the functions in the glue that Python calls: with what `Native.block_of` fills, and with what is prepared
 CALL, PREPARED = "mdstopo_call", "mdstopo_prepared"
@@ -35,26 +43,62 @@ class Code(NamedTuple):
     result: str
 
 
+@functools.cache
 def cache_root() -> Path:
-    """The first of the stated, the user's and the temporary folder that can be written to."""
+    """The first of the stated, the user's and the temporary folder that can be written to and that nobody else can.
+
+    Where there is none, a fresh folder, which this process shares with those that it starts and removes in the end.
+    """
     stated = os.environ.get("MDSTOPO_CACHE_DIR") or os.environ.get("NUMBA_CACHE_DIR")
     base = os.environ.get("XDG_CACHE_HOME") or os.path.join(os.path.expanduser("~"), ".cache")
-    last = Path(tempfile.gettempdir()) / f"mdstopo-{os.getuid() if hasattr(os, 'getuid') else 'cache'}"
-    for folder in ([Path(stated)] if stated else []) + [Path(base) / "mdstopo"]:
-        with contextlib.suppress(OSError):
-            folder.mkdir(parents=True, exist_ok=True)
-            if os.access(folder, os.W_OK):
+    places = ([Path(stated)] if stated else []) + [Path(base) / "mdstopo"]
+    with contextlib.suppress(OSError):  # a computer without any folder for temporary files
+        places.append(Path(tempfile.gettempdir()) / f"mdstopo-{os.getuid()}")
+    for place in places:
+        with contextlib.suppress(OSError, RuntimeError, ValueError):
+            folder = place.resolve()
+            if make_private(folder) and os.access(folder, os.W_OK | os.X_OK):
                 return folder
-    return last
+    return _fresh()
+
+
+def _fresh() -> Path:
+    """A folder of this process."""
+    try:
+        folder = Path(tempfile.mkdtemp(prefix="mdstopo-")).resolve()
+    except OSError:
+        return Path(os.devnull) / "mdstopo"  # nothing can be kept anywhere: every process compiles for itself
+    os.environ["MDSTOPO_CACHE_DIR"] = str(folder)
+    import atexit
+    import shutil
+
+    def remove(maker: int = os.getpid()) -> None:
+        if os.getpid() == maker:
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder
 
 
 @functools.cache
 def cache_folder() -> Path:
     """Folder of the machine code that belongs to exactly this source, these versions and this processor.
 
-    The name is a hash over every source file that holds kernels: a changed line anywhere means a fresh folder, never
-    stale code.
+    The name is a hash over the sources: a changed line anywhere means a fresh folder, never stale code.
     """
+    folder = cache_root() / f"kernels-{_key()}"
+    new = not folder.exists()
+    if not make_private(folder):
+        return _fresh() if folder.exists() else folder  # what others could write to is left alone
+    with contextlib.suppress(OSError):
+        if new:
+            remove_old(folder)
+        elif time.time() - folder.stat().st_mtime > _DAY:
+            os.utime(folder)
+    return folder
+
+
+def _key() -> str:
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
     package = Path(__file__).parent.parent
@@ -65,9 +109,33 @@ def cache_folder() -> Path:
         digest.update(f"{name} {version_of(name)}".encode())
     for setting in _SETTINGS:
         digest.update(f"{setting}={os.environ.get(setting)}".encode())
-    for source in [package / "jit.py", *(path for room in _ROOMS for path in sorted((package / room).glob("**/*.py")))]:
-        digest.update(source.read_bytes())
-    return cache_root() / f"kernels-{digest.hexdigest()[:16]}"
+    for source in _sources(package):
+        digest.update(source.encode())
+        with open(os.path.join(package, source), "rb") as stream:
+            digest.update(stream.read())
+    return digest.hexdigest()[:16]
+
+
+def _sources(package: Path) -> list[str]:
+    """The package's modules that may hold kernels, or numbers that kernels take, in one order."""
+    found = []
+    for folder, inner, names in os.walk(package):
+        if folder == str(package):
+            inner[:] = [name for name in inner if name not in WITHOUT_KERNELS]
+        place = os.path.relpath(folder, package)
+        found += [os.path.join(place, name) for name in names if name.endswith(".py")]
+    return sorted(found)
+
+
+def remove_old(current: Path) -> None:
+    """Remove folders beside this one that belong to other sources, and have not been used for long or are many."""
+    import shutil
+
+    others = [each for each in current.parent.glob("kernels-*") if each != current and not each.is_symlink()]
+    used = sorted(((each.stat().st_mtime, each) for each in others), reverse=True)
+    for k, (last, folder) in enumerate(used):
+        if k >= _KEPT or time.time() - last > _LASTING:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 def path_of(module: str, name: str, types: str) -> Path:
@@ -77,53 +145,66 @@ def path_of(module: str, name: str, types: str) -> Path:
 
 def read(path: Path) -> Code | None:
     """The code in a file; nothing where there is none, or where it is not what was written."""
+    data = read_checked(path)
+    if data is None:
+        return None
+    start, _, rest = data.partition(b"\n")
     try:
-        data = path.read_bytes()
-    except OSError:
+        size, result = json.loads(start)
+        return Code(rest[:size], rest[size:], result)
+    except (ValueError, TypeError):
         return None
-    start, _, rest = data[len(_MAGIC) :].partition(b"\n")
-    if not data.startswith(_MAGIC):
+
+
+def write(path: Path, code: Code) -> None:
+    """Keep code on the disk, whole or not at all. A disk that cannot be written to is no reason to stop."""
+    write_checked(path, json.dumps([len(code.body), code.result]).encode() + b"\n" + code.body + code.glue)
+
+
+def read_checked(path: Path) -> bytes | None:
+    """What `write_checked` has put in a file; nothing where there is none, or anything else."""
+    data = read_private(path)
+    if data is None or not data.startswith(_MAGIC) or len(data) < len(_MAGIC) + 4:
         return None
-    try:
-        head = json.loads(start)
-        size, checksum, result = head["body"], head["checksum"], head["result"]
-    except (ValueError, KeyError, TypeError):
-        return None
-    if zlib.crc32(rest) != checksum:
-        return None
-    return Code(rest[:size], rest[size:], result)
+    rest = data[len(_MAGIC) + 4 :]
+    return rest if zlib.crc32(rest).to_bytes(4, "little") == data[len(_MAGIC) : len(_MAGIC) + 4] else None
+
+
+def write_checked(path: Path, data: bytes) -> None:
+    """Keep bytes with a checksum over all of them, where that is possible."""
+    if make_private(path.parent):
+        write_private(path, [_MAGIC, zlib.crc32(data).to_bytes(4, "little"), data])
 
 
 @contextlib.contextmanager
 def alone(path: Path) -> Iterator[None]:
     """The right to compile what belongs in a file: whoever comes second waits, and then finds it there.
 
-    Where nothing can be locked, everybody compiles.
+    Where nothing can be locked, and where the first one takes too long (it may have been halted), everybody compiles.
     """
     import fcntl
 
     lock = path.with_suffix(".lock")
     try:
-        lock.parent.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(lock, os.O_RDWR | os.O_CREAT, 0o666)
+        make_private(lock.parent)
+        descriptor = open_lock(lock)
     except OSError:
         yield
         return
+    held = False
     try:
-        with contextlib.suppress(OSError):
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        until = time.monotonic() + _PATIENCE
+        while not held and time.monotonic() < until:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                held = True
+            except BlockingIOError:
+                time.sleep(0.05)
+            except OSError:  # a file system without locks
+                break
         yield
     finally:
-        lock.unlink(missing_ok=True)
+        if held:
+            with contextlib.suppress(OSError):
+                lock.unlink(missing_ok=True)
         os.close(descriptor)
-
-
-def write(path: Path, code: Code) -> None:
-    """Keep code on the disk, whole or not at all. A disk that cannot be written to is no reason to stop."""
-    rest = code.body + code.glue
-    head = {"body": len(code.body), "checksum": zlib.crc32(rest), "result": code.result}
-    with contextlib.suppress(OSError):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
-            file.write(_MAGIC + json.dumps(head).encode() + b"\n" + rest)
-        os.replace(file.name, path)

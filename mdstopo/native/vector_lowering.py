@@ -15,9 +15,8 @@ from mdstopo.native import vector
 
 
 def _features() -> str:
-    """Features of the processor that is compiled for."""
+    """Features of the processor that Numba compiles for: fewer than it has under NUMBA_ENABLE_AVX=0."""
     asked: str | None = config.CPU_FEATURES  # type: ignore[attr-defined]  # set by its reader of the environment
-    # what Numba itself asks: it allows for NUMBA_ENABLE_AVX and for processors that LLVM does not know
     return str(get_host_cpu_features()) if asked is None else asked
 
 

@@ -1,6 +1,7 @@
 """The page itself: template, style and script from the files beside this one, and the data in it."""
 
 import json
+import re
 from html import escape
 from importlib.resources import files
 from typing import Any
@@ -10,11 +11,7 @@ def page(data: dict[str, Any]) -> str:
     """HTML that needs nothing else."""
     folder = files("mdstopo.report")
     style, script, body = ((folder / name).read_text(encoding="utf-8") for name in ("page.css", "page.js", "page.html"))
-    # "</script" in a case file must not end the script
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-    return (
-        body.replace("{title}", escape(str(data["title"])))
-        .replace("{style}", style)
-        .replace("{data}", text)
-        .replace("{script}", script)
-    )
+    # neither "</script" nor "<!--<script" in a case file may mean anything to the page
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+    parts = {"title": escape(str(data["title"])), "style": style, "data": text, "script": script}
+    return re.sub(r"\{(title|style|data|script)\}", lambda found: parts[found[1]], body)

@@ -14,12 +14,13 @@ import threading
 from contextlib import suppress
 from typing import IO, Any
 
+from mdstopo.children import command
 from mdstopo.native.threads import VARIABLE, cores
 
 
 def streams() -> tuple[IO[bytes], IO[bytes]]:
     """In a worker: where messages come from and where answers go. Signals are for the parent to act on."""
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     # Whatever prints by mistake must not disturb the messages.
     answers = os.fdopen(os.dup(1), "wb")
@@ -36,7 +37,7 @@ class WorkerProcess:
     def __init__(self, module: str, job: object, crew: int, inbox: "queue.Queue[tuple[WorkerProcess, Any]]") -> None:
         threads = str(max(1, cores() // crew))
         self._process = subprocess.Popen(
-            [sys.executable, "-m", module],
+            command(module),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env={**os.environ, "NUMBA_NUM_THREADS": threads, VARIABLE: threads},

@@ -6,6 +6,7 @@ or spread over workers, must not depend on that. So nothing that counts is compu
 kernels are not known to be cached, another process compiles them first, and every process then loads them alike.
 """
 
+import contextlib
 import os
 import pickle
 import subprocess
@@ -17,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
+from mdstopo.children import command, end_with_parent
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
 from mdstopo.optimizer.wide import MANY, WIDE
 from mdstopo.scene.family import beyond_springs
@@ -36,7 +38,7 @@ def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
     if marker.exists():
         return
     try:
-        marker.parent.mkdir(parents=True, exist_ok=True)
+        marker.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         writable = os.access(marker.parent, os.W_OK)
     except OSError:
         writable = False
@@ -45,13 +47,28 @@ def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
         notify(f"{marker.parent} cannot be written: kernels are compiled anew in every run, which is slow")
         return
     # What it complains of, this process will find as well, and say better.
-    subprocess.run(
-        [sys.executable, "-m", "mdstopo.session.ready"],
-        input=pickle.dumps(case),
+    with contextlib.suppress(OSError):  # no process can be started, or it has ended
+        _compile_in_child(pickle.dumps(case))
+
+
+def _compile_in_child(message: bytes) -> None:
+    """Have a process of its own compile; it ends with this one, however that ends, as its input is then closed."""
+    child = subprocess.Popen(
+        command("mdstopo.session.ready"),
+        stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        check=False,
     )
+    assert child.stdin is not None
+    try:
+        child.stdin.write(message)
+        child.stdin.flush()
+        child.wait()
+    finally:
+        child.kill()
+        child.wait()
+        with contextlib.suppress(OSError):
+            child.stdin.close()
 
 
 def get_ready(
@@ -129,6 +146,7 @@ def _main() -> None:
     gc.disable()  # what the compiler makes lives on: looking through it again and again takes a tenth of the time
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
+    end_with_parent(sys.stdin.buffer)
     many = case.space.size >= MANY
     engine = evaluator_of(case, share=["mdstopo.session.ready"] if many else [])
     if many:
@@ -136,7 +154,8 @@ def _main() -> None:
     problem = problem_of(engine, even(case))
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
-    _marker(case).touch()
+    with contextlib.suppress(OSError):  # a full disk
+        _marker(case).touch()
     gc.freeze()  # it would be looked through at the end as well
 
 

@@ -29,12 +29,11 @@ from mdstopo.session.stages import first_row, is_done, iterations_of, run_stages
 from mdstopo.session.starts import NOTHING_VARIES, is_moved, replaced, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
-from mdstopo.store.atomic import remove_leftovers, replace_file
+from mdstopo.store.atomic import remove_leftovers
 from mdstopo.store.checkpoint import Checkpointer
 from mdstopo.store.contents import (
     Datasets,
     case_part,
-    result_image,
     sensitivity_part,
     trajectory_part,
 )
@@ -42,6 +41,7 @@ from mdstopo.store.errors import DifferentCaseError, WriteError
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.reader import ResultView
+from mdstopo.store.writing import write_result
 
 if TYPE_CHECKING:
     from mdstopo.robust.conclusion import Conclusion
@@ -384,18 +384,8 @@ class _Run:
             visited = np.asarray(part["iterations/objectives"], dtype=np.float64)
         if len(self.case.objectives) > 1:
             datasets |= self.combining.part(visited)
-        replace_file(
-            path,
-            result_image(
-                self.case,
-                "run",
-                status.value,
-                reason,
-                datasets,
-                self.provenance,
-                self.settings,
-                self.warnings,
-            ),
+        write_result(
+            path, self.case, "run", status.value, reason, datasets, self.provenance, self.settings, self.warnings
         )
 
     def outcome(

@@ -1,6 +1,7 @@
 """May this file be written? The rules for a place where there is a file already."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from mdstopo.case.model import Case
@@ -19,14 +20,36 @@ def prepare_place(path: Path) -> Path:
 
     Raises StoreError where that is impossible.
     """
-    place = path.resolve()
+    try:
+        place = path.resolve()
+    except (OSError, RuntimeError) as error:  # the folder that this process is in is gone; links that lead in a circle
+        raise StoreError(f"{path}: there is no such place: {getattr(error, 'strerror', None) or error}") from error
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
+        there = place.is_dir()
     except OSError as error:
         raise StoreError(f"{path}: its directory cannot be made: {error.strerror}") from error
-    if place.is_dir():
+    if there:
         raise StoreError(f"{path}: a directory, not a file")
     return place
+
+
+def made_from(view: ResultView, place: Path) -> Path:
+    """The file that something made from a result will be written to, made ready as by `prepare_place`.
+
+    Raises StoreError where it is the result itself, its case, or a file that the case includes.
+    """
+    case = Path(view.case_path) if view.case_path else None
+    included = [path.removeprefix("files/") for path in view.texts if path.startswith("files/")]
+    kept = {view.path: "the result itself"}
+    if case is not None:
+        kept |= {case: "the case that the result was made from"}
+        kept |= {case.parent / name: "a file that its case includes" for name in included}
+    for path, what in kept.items():
+        with suppress(OSError):
+            if path.samefile(place):
+                raise StoreError(f"{place}: this is {what}; choose another place with --out")
+    return prepare_place(place)
 
 
 def admit(path: Path, case: Case, kind: str, overwrite: bool, notify: Notify) -> None:

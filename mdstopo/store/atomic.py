@@ -6,13 +6,17 @@ the file system; whatever kills the process, a reader finds the old file or the 
 
 import os
 import secrets
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from mdstopo.store.errors import WriteError
 
 
-def replace_file(path: Path, data: bytes) -> None:
+def replace_file(path: Path, data: bytes, check: Callable[[Path], None] | None = None) -> None:
     """Make `path` hold `data`, atomically and durably.
+
+    check: is given the file that is about to take the place; what it raises keeps that from happening.
 
     Raises
     ------
@@ -29,9 +33,12 @@ def replace_file(path: Path, data: bytes) -> None:
                 while rest:  # a raw write may take less than it is given
                     rest = rest[stream.write(rest) :]
                 os.fsync(stream.fileno())
+            if check is not None:
+                check(temporary)
             os.replace(temporary, path)
         except BaseException:
-            temporary.unlink(missing_ok=True)
+            with suppress(OSError):
+                temporary.unlink(missing_ok=True)
             raise
         _sync_directory(path.parent)
     except OSError as error:
@@ -46,11 +53,13 @@ def remove_leftovers(path: Path) -> int:
     """
     prefix = _prefix(path)
     count = 0
-    with os.scandir(path.parent) as entries:
+    leftovers: list[str] = []
+    with suppress(OSError), os.scandir(path.parent) as entries:  # a folder whose contents may not be listed
         leftovers = [e.path for e in entries if e.name.startswith(prefix) and e.name.endswith(".tmp")]
     for leftover in leftovers:
-        Path(leftover).unlink(missing_ok=True)
-        count += 1
+        with suppress(OSError):  # a folder of that name, which is none of ours
+            os.unlink(leftover)
+            count += 1
     return count
 
 

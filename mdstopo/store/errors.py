@@ -39,3 +39,9 @@ class WriteError(StoreError):
     """The file could not be written (a full disk, a directory that is gone)."""
 
     exit_status = 1
+
+
+class UnreadableError(StoreError):
+    """What was just written cannot be read again: a run that went on would be lost."""
+
+    exit_status = 1

@@ -1,9 +1,10 @@
 """A result file as bytes: HDF5 made in memory, so that the disk sees one plain write.
 
 HDF5 is never open on a file that is being written: errors of the disk come from the write itself, and
-nothing is held open between writes. Arrays carry checksums, so that damage is found on reading.
+nothing is held open between writes. Arrays carry checksums, and so does the whole, so that damage is found on reading.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,8 @@ import h5py
 import numpy as np
 from h5py import h5a, h5d, h5ds, h5g, h5o, h5p, h5s, h5t
 from numpy.typing import NDArray
+
+from mdstopo.store.seal import seal
 
 Value = NDArray[np.generic] | str | Sequence[str]
 Attribute = str | int | float | bool
@@ -25,7 +28,7 @@ def encode(
     datasets: Mapping[str, Value],
     scales: Mapping[str, Sequence[str]] | None = None,
 ) -> bytes:
-    """The bytes of an HDF5 file.
+    """The bytes of an HDF5 file, sealed with its attributes (`store.seal`).
 
     Parameters
     ----------
@@ -48,14 +51,40 @@ def encode(
         writer.attach(scales or {})
         file.flush()
         image: bytes = file.id.get_file_image()
-    return image
+    return seal(image, head_of(attributes).encode())
+
+
+def head_of(attributes: Mapping[str, Mapping[str, Attribute]]) -> str:
+    """Attributes of groups as JSON, {path: {name: value}}."""
+    plain = {path: {key: _plain(value) for key, value in pairs.items()} for path, pairs in attributes.items()}
+    return json.dumps(plain)
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def texts(values: Sequence[str]) -> NDArray[np.bytes_]:
     """Texts as one array of fixed length: a million group names take no million allocations."""
-    encoded = [value.encode() for value in values]
+    encoded = [_encoded(value) for value in values]
     length = max((len(value) for value in encoded), default=1) or 1
     return np.array(encoded, dtype=f"S{length}")
+
+
+def as_array(value: Value) -> NDArray[np.generic]:
+    """A dataset's value as the array that the file holds, texts with a fixed length."""
+    if isinstance(value, str):
+        array: NDArray[np.generic] = texts([value]).reshape(())
+    elif not isinstance(value, np.ndarray):
+        array = texts(value)
+    else:
+        array = value if value.ndim == 0 else np.ascontiguousarray(value)
+    return array.astype(h5py.string_dtype(length=array.dtype.itemsize)) if array.dtype.kind == "S" else array
+
+
+def _encoded(text: str) -> bytes:
+    """UTF-8 for HDF5, whose texts end at the first NUL; what is no Unicode (from a file's name) becomes a mark."""
+    return text.replace("\0", "\N{REPLACEMENT CHARACTER}").encode(errors="replace")
 
 
 class _Writer:
@@ -76,16 +105,7 @@ class _Writer:
 
     def write(self, path: str, value: Value) -> None:
         """One dataset, the groups above it included."""
-        if isinstance(value, str):
-            dataset = h5d.create(self._file, None, self._words, self._one)
-            dataset.write(h5s.ALL, h5s.ALL, np.array(value, dtype=h5py.string_dtype()))
-            self._enter(path, dataset)
-            return
-        array = np.ascontiguousarray(value if isinstance(value, np.ndarray) else texts(value))
-        if isinstance(value, np.ndarray) and value.ndim == 0:
-            array = value
-        if array.dtype.kind == "S":
-            array = array.astype(h5py.string_dtype(length=array.dtype.itemsize))
+        array = as_array(value)
         kind = h5t.py_create(array.dtype, logical=True)
         space = self._one if array.ndim == 0 else h5s.create_simple(array.shape)
         layout = self._plain
@@ -99,7 +119,7 @@ class _Writer:
         self._enter(path, dataset)
 
     def _enter(self, path: str, made: Any) -> None:
-        h5o.link(made, self._file, path.encode(), self._links)
+        h5o.link(made, self._file, path.encode(errors="surrogateescape"), self._links)
         self._made[path] = made
 
     def describe(self, path: str, attributes: Mapping[str, Attribute]) -> None:
@@ -111,7 +131,7 @@ class _Writer:
                 self._enter(path, h5g.create(self._file, None))
         for key, value in attributes.items():
             words = isinstance(value, str)
-            data = np.array(value, dtype=h5py.string_dtype()) if words else np.array(value)
+            data = np.array(_encoded(str(value)), dtype=h5py.string_dtype()) if words else np.array(value)
             kind = self._words if words else h5t.py_create(data.dtype, logical=True)
             h5a.create(self._made[path], key.encode(), kind, self._one).write(data)
 

@@ -13,8 +13,10 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
+from mdstopo.native.trusted import NotOursError, open_lock
 from mdstopo.store.errors import InUseError, StoreError
 
+_LONGEST = 300  # bytes of a holder's name
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS}
 
 
@@ -26,7 +28,8 @@ class Lock:
     InUseError
         on entering, if another process holds it; the message names its process id.
     StoreError
-        on entering, if no file can be made beside the result.
+        on entering, if no file can be made beside the result, or what is there is no file of this user's: a symbolic
+        link is not followed, as what it points to would be overwritten.
     """
 
     def __init__(self, path: Path) -> None:
@@ -40,8 +43,10 @@ class Lock:
             try:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
-                os.close(descriptor)
-                raise self._in_use() from error
+                try:
+                    raise self._in_use(descriptor) from error
+                finally:
+                    os.close(descriptor)
             except OSError as error:
                 if error.errno not in _UNSUPPORTED:
                     os.close(descriptor)
@@ -65,39 +70,40 @@ class Lock:
     ) -> None:
         if self._descriptor is not None:
             # Removed while still held: whoever opened it meanwhile sees that it is gone and makes a new one.
-            self._path.unlink(missing_ok=True)
+            with suppress(OSError):
+                self._path.unlink(missing_ok=True)
             os.close(self._descriptor)
             self._descriptor = None
 
     def _open(self) -> int:
         try:
-            return os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+            return open_lock(self._path)
+        except NotOursError as error:
+            raise StoreError(f"{self._path}: cannot be the lock on {self._result.name}: {error}") from error
         except OSError as error:
             raise StoreError(f"{self._result}: no file can be made in {self._path.parent}: {error.strerror}") from error
 
-    def _in_use(self) -> InUseError:
-        pid, host = self._holder()
+    def _in_use(self, descriptor: int) -> InUseError:
+        pid, host = _holder(descriptor)
         where = f" on {host}" if host not in (None, os.uname().nodename) else ""
         who = f"process {pid}{where}" if pid is not None else "another process"
         return InUseError(f"{self._result} is in use by {who}", pid, host)
 
-    def _holder(self) -> tuple[int | None, str | None]:
-        # The holder may have the lock and not yet have written its name.
-        for _ in range(20):
-            try:
-                words = self._path.read_text(encoding="utf-8").split()
-            except OSError:
-                words = []
-            if len(words) == 2 and words[0].isdigit():
-                return int(words[0]), words[1]
-            time.sleep(0.01)
-        return None, None
+
+def _holder(descriptor: int) -> tuple[int | None, str | None]:
+    # The holder may have the lock and not yet have written its name.
+    for _ in range(20):
+        words = os.pread(descriptor, _LONGEST, 0).split()
+        if len(words) == 2 and words[0].isdigit():
+            return int(words[0]), words[1].decode(errors="replace")
+        time.sleep(0.01)
+    return None, None
 
 
 def _is_at(descriptor: int, path: Path) -> bool:
     """Is the open file still the one that has this name?"""
     try:
-        named = os.stat(path)
+        named = os.lstat(path)
     except FileNotFoundError:
         return False
     held = os.fstat(descriptor)

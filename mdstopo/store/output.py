@@ -6,11 +6,12 @@ from pathlib import Path
 
 from mdstopo.case.model import Case
 from mdstopo.store.admit import admit, prepare_place
-from mdstopo.store.atomic import remove_leftovers, replace_file
-from mdstopo.store.contents import Datasets, case_part, result_image
+from mdstopo.store.atomic import remove_leftovers
+from mdstopo.store.contents import Datasets, case_part
 from mdstopo.store.image import Attribute
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.writing import write_result
 
 
 class OutputFile:
@@ -31,7 +32,8 @@ class OutputFile:
         warnings: tuple[str, ...] = (),
     ) -> None:
         """Write the result, the case with it. Raises WriteError if the disk refuses."""
-        image = result_image(
+        write_result(
+            self._path,
             self._case,
             self._kind,
             status,
@@ -41,7 +43,6 @@ class OutputFile:
             settings,
             warnings,
         )
-        replace_file(self._path, image)
 
 
 @contextmanager

@@ -1,5 +1,8 @@
 """Result files, read back: what `show`, `--alpha` and resuming look at."""
 
+import json
+import os
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +14,8 @@ from numpy.typing import NDArray
 
 from mdstopo.store.contents import FORMAT
 from mdstopo.store.errors import DamagedError, StoreError
+from mdstopo.store.seal import Seal, read_seal
+from mdstopo.store.untrusted import check_heaps, contents_of, integer_attribute
 
 Array = NDArray[np.generic]
 
@@ -98,19 +103,17 @@ def read_result(path: Path | str, leave_out: tuple[str, ...] = ()) -> ResultView
         if it is no result of this program, is cut off or damaged, or was written in a later format.
     """
     path = Path(path)
-    _check_signature(path)
-    arrays: dict[str, Array] = {}
-    texts: dict[str, str | tuple[str, ...]] = {}
+    seal = _sealed(path)
     with _reading(path), h5py.File(path, "r", locking=False) as file:
-        root = dict(file.attrs)
-        _check_format(path, root)
-        for name, dataset in _datasets(file, leave_out):
-            if h5py.check_string_dtype(dataset.dtype) is not None:
-                value = dataset.asstr()[()]
-                texts[name] = value if isinstance(value, str) else tuple(value.tolist())
-            else:
-                # An own copy in native order, free of the file.
-                arrays[name] = np.asarray(dataset[()])
+        if not seal.head:  # an earlier version's, or another program has changed it
+            _check_number(path, integer_attribute(file.id, b"format"))
+            check_heaps(path.read_bytes())
+        head = json.loads(seal.head) if seal.head else _attributes(file)
+        root = head[""]
+        _check_number(path, root.get("format"))
+        if "case_sha256" not in root or "mdstopo" not in root:
+            raise DamagedError(f"{path}: not a result file of mdstopo")
+        arrays, texts = contents_of(file.id, path.stat().st_size, leave_out, varying=not seal.head)
         view = ResultView(
             path=path,
             kind=str(root["kind"]),
@@ -123,35 +126,50 @@ def read_result(path: Path | str, leave_out: tuple[str, ...] = ()) -> ResultView
             case_sha256=str(root["case_sha256"]),
             arrays=arrays,
             texts=texts,
-            provenance={key: str(value) for key, value in file["provenance"].attrs.items()},
-            settings={key: _plain(value) for key, value in file["settings"].attrs.items()},
+            provenance={key: str(value) for key, value in head["provenance"].items()},
+            settings={key: _plain(value) for key, value in head["settings"].items()},
         )
     if view.status not in _STATUS:
         raise DamagedError(f"{path}: damaged: its status is {view.status!r}")
     return view
 
 
-def _check_signature(path: Path) -> None:
+def _sealed(path: Path) -> Seal:
+    """The seal of a file that is HDF5 and as it was written. Raises StoreError, DamagedError."""
     try:
-        with path.open("rb") as stream:
+        with open(path, "rb", opener=_open_at_once) as stream:
+            if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                raise StoreError(f"{path}: cannot be read: it is no file on a disk")
             start = stream.read(len(_SIGNATURE))
+            seal = read_seal(stream)
     except OSError as error:
         raise StoreError(f"{path}: cannot be read: {error.strerror}") from error
     if start != _SIGNATURE:
         what = "is empty" if not start else "is no HDF5 file"
         raise DamagedError(f"{path}: not a result file of mdstopo: it {what}")
+    if seal.whole is False:
+        raise DamagedError(f"{path}: damaged or cut off: its length or its checksum is not that of its contents")
+    return seal
 
 
-def _check_format(path: Path, root: Mapping[str, object]) -> None:
-    number = root.get("format")
-    if number is None or "case_sha256" not in root or "mdstopo" not in root:
+def _open_at_once(path: str, flags: int) -> int:
+    """As `open` does, without waiting for whoever writes to a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def _check_number(path: Path, number: object) -> None:
+    """Refuse another program's file, and a later format."""
+    if number is None:
         raise DamagedError(f"{path}: not a result file of mdstopo")
     if not isinstance(number, (int, np.integer)) or number < 1:
         raise DamagedError(f"{path}: damaged: its format is {number!r}")
     if number > FORMAT:
-        raise DamagedError(
-            f"{path}: written in format {number} by mdstopo {root['mdstopo']}; this version reads up to format {FORMAT}"
-        )
+        raise DamagedError(f"{path}: written in format {number}; this version of mdstopo reads up to format {FORMAT}")
+
+
+def _attributes(file: "h5py.File") -> dict[str, dict[str, object]]:
+    """The attributes of groups in a file of an earlier version, or that another program changed."""
+    return {path: dict(file[path or "/"].attrs) for path in ("", "provenance", "settings")}
 
 
 @contextmanager
@@ -159,23 +177,11 @@ def _reading(path: Path) -> Iterator[None]:
     """Whatever HDF5 makes of a broken file becomes one sentence."""
     try:
         yield
+    except DamagedError as error:
+        raise (error if error.args[0].startswith(str(path)) else DamagedError(f"{path}: {error}")) from None
     except _TROUBLE as error:
         sentence = " ".join(str(error).split())
         raise DamagedError(f"{path}: damaged or cut off: {sentence}") from error
-
-
-def _datasets(
-    group: "h5py.Group", leave_out: tuple[str, ...], prefix: str = ""
-) -> Iterator[tuple[str, "h5py.Dataset"]]:
-    for key in group:
-        path = f"{prefix}{key}"
-        if path in leave_out:
-            continue
-        node = group[key]  # not .items(), which gives None for what is broken
-        if isinstance(node, h5py.Group):
-            yield from _datasets(node, leave_out, f"{path}/")
-        elif isinstance(node, h5py.Dataset):
-            yield path, node
 
 
 def _plain(value: object) -> str | int | float | bool:

@@ -5,12 +5,12 @@ import json
 import math
 import select
 import subprocess
-import sys
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import TracebackType
 
+from mdstopo.children import command
 from mdstopo.stress.scene import Outcome, Scene
 
 #: s that a scene may take beside its limit where kernels have still to be compiled for it
@@ -90,6 +90,4 @@ class Watch:
 
 
 def _started() -> "subprocess.Popen[str]":
-    return subprocess.Popen(
-        [sys.executable, "-m", "mdstopo.stress.worker"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    return subprocess.Popen(command("mdstopo.stress.worker"), stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)

@@ -169,3 +169,46 @@ def test_the_first_checkpoint_of_a_large_case_waits_for_work_worth_it() -> None:
     assert not saver.offer()
     clock.now = 10.5
     assert saver.offer()
+
+
+@pytest.mark.parametrize("how", ["symbolic", "dangling", "hard"])
+def test_a_lock_is_never_another_file(how: str, tmp_path: Path) -> None:
+    """What a link in its place points to would be emptied."""
+    precious, lock = tmp_path / "precious", tmp_path / ".a.h5.lock"
+    if how != "dangling":
+        precious.write_text("mine")
+    if how == "hard":
+        lock.hardlink_to(precious)
+    else:
+        lock.symlink_to(precious)
+    with (
+        pytest.raises(StoreError, match=r"\.a\.h5\.lock: cannot be the lock on a\.h5: .*remove it"),
+        Lock(tmp_path / "a.h5"),
+    ):
+        pass
+    assert precious.exists() == (how != "dangling")
+    assert how == "dangling" or precious.read_text() == "mine"
+
+
+def test_a_pipe_in_the_place_of_a_lock_is_a_sentence(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / ".a.h5.lock")
+    with pytest.raises(StoreError, match="no plain file"), Lock(tmp_path / "a.h5"):
+        pass
+
+
+@pytest.mark.parametrize("content", [b"\xff\xfe\0\n", b"9" * 9999, "² host".encode(), b""])
+def test_whatever_is_in_a_lock_file_nobody_stumbles_over_it(content: bytes, tmp_path: Path) -> None:
+    lock = tmp_path / ".a.h5.lock"
+    with Lock(tmp_path / "a.h5"):
+        lock.write_bytes(content)
+        with pytest.raises(InUseError, match="in use by another process"), Lock(tmp_path / "a.h5"):
+            pass
+    lock.write_bytes(content)
+    with Lock(tmp_path / "a.h5"):
+        assert lock.read_text().split()[0] == str(os.getpid())
+
+
+def test_a_folder_with_the_name_of_a_leftover_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / ".a.h5.folder.tmp").mkdir()
+    assert remove_leftovers(tmp_path / "a.h5") == 0
+    assert (tmp_path / ".a.h5.folder.tmp").is_dir()
