@@ -15,7 +15,7 @@ from mdstopo.optimizer.conic import Lines, Norms
 from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample
 
 #: numbers that the rows may take, and rows that are kept at least and at most
-ROOM, LEAST, MOST = 2e7, 8, 120
+ROOM, LEAST, MOST = 2e7, 8, 160
 #: a row within this of another of its group, in slope and in value relative to the steepest, is the same
 SAME = 1e-9
 

@@ -43,6 +43,9 @@ FORGETS, SMALLER = 3, 0.2
 ROUNDING, CHEAPEST = 1e-8, 1e-2
 #: what is left of the bend from trial to trial
 BEND_FALL = 0.9
+#: iterates whose violation has not fallen to this share of what it was, after which limits are restored first; and the
+#: factor on prices when that is done
+RESISTS, FALLS, DEARER = 6, 0.8, 10.0
 #: share of the box below which a step leaves it too wide
 NARROW = 0.1
 
@@ -68,6 +71,7 @@ class BundleMethod:
         else:
             state.price = self.first_price(rows)
         state.bend = np.zeros(len(state.price) + 1)
+        state.resisted, state.mark = 0, float("inf")
         state.kkt = float("nan")
 
     def first_price(self, rows: Bundle) -> Floats:
@@ -98,6 +102,7 @@ class BundleMethod:
         state.small = state.small + 1 if small else 0
         accepted = ratio >= settings.number("accept_ratio")
         if accepted:
+            self._mark(state, there)
             state.bundle = moved.joined(new)
             state.kkt = float("nan")
             if ratio > settings.number("good_ratio") and size > 0.5 * state.trust:
@@ -200,6 +205,14 @@ class BundleMethod:
             np.maximum(np.maximum(MARGIN * carried, 0.5 * state.price), CHEAPEST * self.first_price(rows)),
         )
         return trial
+
+    def _mark(self, state: State, there: Floats) -> None:
+        """Count iterates whose largest violation is not much below that of the one that the count began with."""
+        violation = float(there[1:].max(initial=0.0))
+        if violation <= self.settings.tolerance or violation < FALLS * state.mark:
+            state.resisted, state.mark = 0, violation if violation > self.settings.tolerance else float("inf")
+        else:
+            state.resisted += 1
 
     def _bend(self, state: State, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
         """How much each group was seen to bend downwards: a row from one end of a step above the value at the other."""

@@ -101,7 +101,8 @@ class _Point:
 
 def solve(program: Program) -> Solution:
     """Solve the program; see `Solution` for how well that went."""
-    return _Interior(program).solve()
+    with np.errstate(all="ignore"):  # what is not finite ends the iteration
+        return _Interior(program).solve()
 
 
 class _Scaling:

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.bundle_method import FORGETS, FRESH_TRUST, PATIENCE, SMALLER, BundleMethod
+from mdstopo.optimizer.bundle_method import DEARER, FORGETS, FRESH_TRUST, PATIENCE, RESISTS, SMALLER, BundleMethod
 from mdstopo.optimizer.interior import Optimum
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.optimizer.projection import project
-from mdstopo.optimizer.rows import DEAREST, NOTHING
+from mdstopo.optimizer.rows import NOTHING
 from mdstopo.optimizer.rows import Space as BundleSpace
 from mdstopo.optimizer.safeguards import (
     CUT_SHRINK,
@@ -118,6 +118,8 @@ class Gsao:
             restoring=False,
             forgets=0,
             bend=np.zeros(1),
+            resisted=0,
+            mark=float("inf"),
             iteration=0,
             evaluations=1,
             small=0,
@@ -249,11 +251,11 @@ class Gsao:
             if plain_violation(state.sample) <= NOTHING * tolerance:
                 state.restoring = False
                 self._begin_bundle(state, max(state.trust, 1e-3))
+                state.price = DEARER * state.price
                 self._propose(state)
             return
         resists = len(state.price) > 0 and state.violation > tolerance
-        dear = resists and bool((state.price > DEAREST * self.bundle.first_price(state.bundle)).any())
-        if resists and (stuck or done or dear):
+        if resists and (stuck or done or state.resisted >= RESISTS):
             state.restoring = True
             self._begin_bundle(state, max(state.trust, FRESH_TRUST))
             self._propose(state)

@@ -26,8 +26,6 @@ from mdstopo.optimizer.projection import repair
 #: what violations cost, in multipliers; the least share of the violation that could go which has to go; the factor on
 #: prices until it does, and how often
 MARGIN, STEER, RAISE, RAISES = 2.0, 0.3, 5.0, 8
-#: a price that is this much larger than at the start says that violation resists
-DEAREST = 1e5
 #: steps that curvature is learnt from, where B is a matrix and where it is not
 STEPS, FEW_STEPS = 60, 12
 #: the least curvature, of the largest gradient entry over the range

@@ -9,21 +9,22 @@ Each objective G_i (negated where it is to be maximised) is the maximum of its p
     nbi                    U = 1 + max_i (g_i - a_i) / r_i                     one row a peak
     nc                     U = g_k,  and rows  sum_i n_i (g_i - a_i) <= 0      one row a peak; one for each choice
 
-so that the bound formulation sees every peak. `nbi` is normal boundary intersection (Das and Dennis 1998) in the form
-of Pascoletti and Serafini, whose inequalities reach every point of a front; 1 keeps U away from zero, to which
+or those that differ from the highest in one peak where choices are many, so that the bound formulation sees every peak.
+`nbi` is normal boundary intersection (Das and Dennis 1998) in the form of Pascoletti and Serafini, whose inequalities reach every point of a front; 1 keeps U away from zero, to which
 tolerances are relative. `nc` is the normal constraint (Messac, Ismail-Yahaya and Mattson 2003).
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from math import prod
 
 import numpy as np
 
 from mdstopo.optimizer.problem import Floats
 
-#: rows that one U has at most, and peaks of one objective that are combined
-ROWS, PEAKS = 36, 6
+#: rows that one U has at most, choices of peaks that are all taken, and peaks of one objective in a plane of `nc`
+ROWS, CHOICES, PEAKS = 120, 36, 6
 
 #: values (P,) of an objective's peaks, highest first, and their gradients (P, N); no rows where none were asked for
 Part = tuple[Floats, Floats]
@@ -102,12 +103,10 @@ class Scalarisation:
         """
         if self.method in ("weighted_min_max", "nbi", "nc"):
             return _sorted(*self._single(parts))
-        terms = [
-            self._term(i, values[:PEAKS], k) for k, (i, (values, _)) in enumerate(zip(self.active, parts, strict=True))
-        ]
+        terms = [self._term(i, values, k) for k, (i, (values, _)) in enumerate(zip(self.active, parts, strict=True))]
         rows, gradients = [], []
         wanted = all(len(part[1]) for part in parts)
-        for choice in product(*(range(len(values)) for values, _ in terms)):
+        for choice in _choices([len(values) for values, _ in terms]):
             total = sum(float(terms[k][0][p]) for k, p in enumerate(choice))
             slopes = [float(terms[k][1][p]) for k, p in enumerate(choice)]
             if self.method == "weighted_product":
@@ -146,14 +145,14 @@ class Scalarisation:
         for i, (values, slopes) in zip(self.active, parts, strict=True):
             if self.method == "nc" and i != len(self.weights) - 1:
                 continue
-            g, factor = self.transformed(values[:PEAKS], i)
+            g, factor = self.transformed(values, i)
             scale, shift = float(self.weights[i]), 0.0
             if self.method == "nbi":
                 scale, shift = 1.0 / float(self.normal[i]), 1.0 - float(self.anchor[i]) / float(self.normal[i])
             elif self.method == "nc":
                 scale = 1.0
             rows.append(scale * g + shift)
-            gradients.append(scale * factor * slopes[:PEAKS])
+            gradients.append(scale * factor * slopes)
         return np.concatenate(rows), np.concatenate(gradients)
 
     def _term(self, i: int, values: Floats, k: int) -> tuple[Floats, Floats]:
@@ -169,6 +168,17 @@ class Scalarisation:
         with np.errstate(divide="ignore"):
             slope = np.ones_like(g) if p == 1.0 else p * size ** (p - 1.0)
         return weight * np.sign(g) * size**p, weight * slope * factor
+
+
+def _choices(counts: Sequence[int]) -> list[tuple[int, ...]]:
+    """Which peak of each objective: all choices where they are few, else those in which one is not the highest.
+
+    What the others would add, trials tell as they come: their highest choice is always among these.
+    """
+    if prod(counts) <= CHOICES:
+        return list(product(*(range(count) for count in counts)))
+    top = (0,) * len(counts)
+    return [top] + [(*top[:k], p, *top[k + 1 :]) for k, count in enumerate(counts) for p in range(1, count)]
 
 
 def _sorted(rows: Floats, gradients: Floats) -> tuple[Floats, Floats]:

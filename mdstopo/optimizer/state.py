@@ -157,7 +157,8 @@ class State:
     shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the trust box in
     ranges, `competing` which piece makes the steps: `bundle` with the `multipliers` (K,) of its rows, `steps` and
     `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
-    objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards;
+    objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards,
+    `resisted` how many iterates the largest violation has not fallen well below `mark`;
     or else `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge`
     (C,) in the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row,
     `seconds`.
@@ -193,6 +194,8 @@ class State:
     restoring: bool
     forgets: int
     bend: Floats
+    resisted: int
+    mark: float
     iteration: int
     evaluations: int
     small: int

@@ -5,13 +5,16 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 (bound formulation); elsewhere the one value is.
 """
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.engine import Evaluator
-from mdstopo.evaluation import Evaluation
+from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals
@@ -19,8 +22,9 @@ from mdstopo.status import Status
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
-#: peaks of one constraint that are rows of their own, where all is certain
-COMPETITORS = 6
+#: how far below the highest a peak may be to be a row, and how many of one response; of many members' forces more,
+#: because a design that lowers the largest raises others that are far below it
+NEAR, ALL = (0.3, 12), (0.6, 60)
 
 
 class StructureProblem:
@@ -41,8 +45,6 @@ class StructureProblem:
         #: rows that may compete, where the optimiser's settings shall not say it
         one = scalarisation is None and case.uncertainty is None
         self.competitors: int | None = None if one else ROWS
-        #: rows of each side of a constraint
-        self._rivals = COMPETITORS if case.uncertainty is None else ROWS
         active = [0] if scalarisation is None else scalarisation.active
         self._count = len(case.objectives)
         self._places = active
@@ -62,11 +64,16 @@ class StructureProblem:
         self.competes = bool(self._responses) or not one or self.even > 0 or any(
             objective.response.kind != "energy" for objective in self._objectives
         )
+        looked: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
+        members = any(each.response.kind == "member_force" for each in looked)
+        few, many = Rows(*NEAR, cones=True), Rows(*ALL, cones=True)
+        #: the peaks that an evaluation is asked for
+        self.rows = (many if members else few) if self.competes else USUAL
         self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], self.space)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows of U at x; a design that cannot be computed comes back with its status."""
-        evaluation = self._evaluator.evaluate(self.space.expand(x), gradient)
+        evaluation = self._evaluator.evaluate(self.space.expand(x), gradient, rows=self.rows)
         info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
         for place, objective in zip(self._places, self._objectives, strict=True):
             info["objectives"][place] = evaluation.objectives[objective.name]
@@ -76,9 +83,11 @@ class StructureProblem:
         if not evaluation.status.usable:
             return Sample(np.inf, status=evaluation.status, message=evaluation.message, info=info)
         parts = [self._part(o, s, evaluation) for o, s in zip(self._objectives, self._signs, strict=True)]
-        limits, slopes, groups = self._limits(evaluation)
+        limits, slopes, groups, own_cones = self._limits(evaluation)
+        cones = Cones.none()
         if self.scalarisation is None:
             rows, gradients = parts[0]
+            cones = self._cones(self._objectives[0], self._signs[0], evaluation)
         else:
             try:
                 rows, gradients = self.scalarisation.rows(parts)
@@ -93,9 +102,16 @@ class StructureProblem:
                 groups = np.concatenate([groups, first + np.repeat(np.arange(planes), len(own) // planes)])
                 limits = np.concatenate([limits, own])
                 slopes = np.concatenate([slopes.reshape(-1, len(x)), own_slopes.reshape(-1, len(x))])
+                own_cones = own_cones.extended(len(own))
         if not gradient:
             return Sample(float(rows[0]), rows, constraint_rows=limits, constraint_groups=groups, info=info)
-        return Sample(float(rows[0]), rows, gradients, limits, slopes, groups, info=info)
+        return Sample(float(rows[0]), rows, gradients, limits, slopes, groups, *cones, *own_cones, info=info)
+
+    def _cones(self, objective: Objective, sign: float, evaluation: Evaluation) -> "Cones":
+        """What the rows of the only objective are norms of."""
+        if not (sign > 0.0 and competes(objective, sign)) or evaluation.all_compete:
+            return Cones.none()
+        return Cones.of([(peak, 1.0, 0.0) for peak in evaluation.peaks[objective.name]], self.space)
 
     def _part(self, objective: Objective, sign: float, evaluation: Evaluation) -> Part:
         peaks = evaluation.peaks[objective.name]
@@ -106,14 +122,15 @@ class StructureProblem:
             return values, slopes[0][None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
 
-    def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats, Ints]:
-        """Rows, gradients and groups of the constraints on responses, feasible where <= 0, relative to their bounds.
+    def _limits(self, evaluation: Evaluation) -> tuple[Floats, Floats, Ints, "Cones"]:
+        """Rows, gradients, groups and cones of constraints on responses, feasible where <= 0, relative to their bounds.
 
         Every competing peak is a row (bound formulation); an equality makes two groups.
         """
         rows: list[float] = []
         slopes: list[Floats] = []
         groups: list[int] = []
+        shapes: list[tuple[Peak, float, float]] = []
         for i, row in self._responses:
             peaks = evaluation.constraint_peaks[i]
             scale = abs(row.bound) if row.bound != 0.0 else 1.0
@@ -122,11 +139,47 @@ class StructureProblem:
                 group = groups[-1] + 1 if groups else 0
                 for peak in peaks if compete else peaks[:1]:
                     groups.append(group)
+                    round_ = sign > 0.0 and compete and not evaluation.all_compete
+                    shapes.append((peak, 1.0 / scale if round_ else np.nan, row.bound / scale))
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
                         slopes.append(sign * self.space.pull(peak.gradient) / scale)
         matrix = np.array(slopes).reshape(len(slopes), len(self.initial))
-        return np.array(rows), matrix, np.array(groups, dtype=np.int64)
+        return np.array(rows), matrix, np.array(groups, dtype=np.int64), Cones.of(shapes, self.space)
+
+
+class Cones(NamedTuple):
+    """`excess` (R,) and `across` (R, N) of rows; see `problem.Sample`."""
+
+    excess: Floats
+    across: Floats
+
+    @classmethod
+    def none(cls) -> "Cones":
+        """No row is a norm."""
+        return cls(np.zeros(0), np.zeros((0, 0)))
+
+    @classmethod
+    def of(cls, rows: Sequence[tuple[Peak, float, float]], space: DesignSpace) -> "Cones":
+        """Those of rows (peak, scale, excess): scale |w| - excess, or of none of them (scale NaN)."""
+        shaped = [peak.gradient is not None and peak.shape != "plain" and scale == scale for peak, scale, _ in rows]
+        if not any(shaped):
+            return cls.none()
+        excess = np.array([c if is_norm else np.nan for is_norm, (_, _, c) in zip(shaped, rows, strict=True)])
+        across = np.zeros((len(rows), space.size))
+        for i, (is_norm, (peak, scale, _)) in enumerate(zip(shaped, rows, strict=True)):
+            if is_norm and peak.across is not None:
+                across[i] = scale * space.pull(peak.across)
+        return cls(excess, across)
+
+    def extended(self, more: int) -> "Cones":
+        """With so many more rows that are no norms."""
+        if not len(self.excess):
+            return self
+        width = self.across.shape[1]
+        return Cones(
+            np.concatenate([self.excess, np.full(more, np.nan)]), np.concatenate([self.across, np.zeros((more, width))])
+        )
 
 
 def _signed(sign: float, slope: Floats) -> Floats:
