@@ -10,8 +10,9 @@ Each objective G_i (negated where it is to be maximised) is the maximum of its p
     nc                     U = g_k,  and rows  sum_i n_i (g_i - a_i) <= 0      one row a peak; one for each choice
 
 or those that differ from the highest in one peak where choices are many, so that the bound formulation sees every peak.
-`nbi` is normal boundary intersection (Das and Dennis 1998) in the form of Pascoletti and Serafini, whose inequalities reach every point of a front; 1 keeps U away from zero, to which
-tolerances are relative. `nc` is the normal constraint (Messac, Ismail-Yahaya and Mattson 2003).
+`nbi` is normal boundary intersection (Das and Dennis 1998) in the form of Pascoletti and Serafini, whose inequalities
+reach every point of a front; 1 keeps U away from zero, to which tolerances are relative. `nc` is the normal constraint
+(Messac, Ismail-Yahaya and Mattson 2003).
 """
 
 from collections.abc import Sequence
