@@ -140,9 +140,7 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
             rows.append([f"  {title}", ", ".join(f"{name} {number(value)}" for name, value in named)])
     rows.append(["iterations", f"{outcome.iterations}, {outcome.evaluations} evaluations"])
     if len(outcome.states) > 1:
-        begun = [each for each in outcome.states if each is not None]
-        values = ", ".join(number(each.best_objective, 6) for each in begun)
-        rows.append(["starts", f"{len(begun)} of {len(outcome.states)}; best is {outcome.best_start + 1}: {values}"])
+        rows += _optima(outcome)
     rows += [[name, sentence] for name, sentence in _material(outcome)]
     rows.append(["integrator", f"{outcome.integrator}: {outcome.integrator_reason}"])
     rows.append(
@@ -153,6 +151,28 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
     )
     rows.append(["result", str(path)])
     output.table(rows)
+
+
+def _optima(outcome: "Outcome") -> list[list[str]]:
+    """The distinct optima that several starts have come to: U, which starts, their evaluations, how the best ended."""
+    from mdstopo.optimizer.starts import family_of
+    from mdstopo.session.quotas import distinct
+
+    tolerance, count = outcome.case.optimizer.tolerance, len(outcome.states)
+    begun = sum(each is not None for each in outcome.states)
+    family = family_of(outcome.best_start, count)
+    rows = [["starts", f"{begun} of {count}; best is {outcome.best_start + 1}, from {family}"]]
+    for found in distinct(outcome.states, tolerance):
+        starts = ", ".join(str(index + 1) for index in found.starts)
+        broken = f", violation {number(found.violation, 3)}" if found.violation > tolerance else ""
+        rows.append(
+            [
+                f"  {number(found.objective, 7)}{broken}",
+                f"start{'s' if len(found.starts) > 1 else ''} {starts}, {found.evaluations} evaluations, "
+                f"{found.status.replace('_', ' ')}",
+            ]
+        )
+    return rows
 
 
 def _material(outcome: "Outcome") -> list[tuple[str, str]]:

@@ -120,6 +120,7 @@ class Gsao:
             bend=np.zeros(1),
             resisted=0,
             mark=float("inf"),
+            left=False,
             iteration=0,
             evaluations=1,
             small=0,

@@ -1,9 +1,10 @@
-"""Several independent runs from different designs: these problems are multimodal.
+"""First designs of several independent runs: these problems are multimodal.
 
-Start 0 is the problem's own initial design, the others are random feasible designs that depend on the seed and their
-number alone, so that a run is the same whatever process does it (`session.workers`).
+Start 0 is the problem's own initial design. The others belong to families that take turns; each depends on the seed,
+its number and, for neighbours, on the best design so far alone: a run is the same whatever process does it.
 """
 
+import enum
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,6 +14,51 @@ from mdstopo.optimizer.projection import project
 from mdstopo.optimizer.state import State
 
 SHARPNESS = 4
+#: share of the members that a sparse design has, and of those that a neighbour exchanges
+SPARSE, EXCHANGED = 0.1, 0.15
+#: starts from which on the last of them is a neighbour of the best
+NEIGHBOUR_FROM = 4
+
+
+class Family(enum.StrEnum):
+    """Where a start begins."""
+
+    STATED = "the stated design"
+    SOFTENED = "the stated design, optimised with a quarter of the strengths"
+    RANDOM = "a random design of few thick members and many thin ones"
+    SPARSE = "a few whole members"
+    UNIFORM = "a random design"
+    NEIGHBOUR = "near the best design so far"
+
+
+#: the families that take turns after the first two starts
+TURNS = (Family.RANDOM, Family.SPARSE, Family.UNIFORM)
+#: the share of the strengths with which a softened start begins
+SHARE = 0.25
+
+
+def family_of(index: int, starts: int) -> Family:
+    """The family of start `index` of so many."""
+    if index == 0:
+        return Family.STATED
+    if starts >= NEIGHBOUR_FROM and index == starts - 1:
+        return Family.NEIGHBOUR
+    return Family.SOFTENED if index == 1 else TURNS[(index - 2) % len(TURNS)]
+
+
+def design_of_family(
+    problem: Problem, seed: int, index: int, family: Family, best: Floats | None = None
+) -> Floats | None:
+    """The design (N,) with which a start begins; None for the problem's own. best: of all starts so far."""
+    if family in (Family.STATED, Family.SOFTENED):
+        return None
+    if family is Family.SPARSE:
+        return sparse(problem, seed, index)
+    if family is Family.UNIFORM:
+        return uniform(problem, seed, index)
+    if family is Family.NEIGHBOUR and best is not None:
+        return neighbour(problem, seed, index, best)
+    return random_feasible(problem, seed, index)
 
 
 def random_feasible(problem: Problem, seed: int, index: int) -> Floats:
@@ -23,10 +69,37 @@ def random_feasible(problem: Problem, seed: int, index: int) -> Floats:
     problem that has such are uniform: there is no reason for a parameter of a law to be near its lower bound.
     """
     drawn = np.random.default_rng([seed, index]).uniform(size=len(problem.lower))
-    share = drawn**SHARPNESS
+    return _feasible(problem, drawn**SHARPNESS, drawn)
+
+
+def sparse(problem: Problem, seed: int, index: int) -> Floats:
+    """A few whole members and no others, projected on the linear rows; parameters of laws uniform."""
+    drawn = np.random.default_rng([seed, index]).uniform(size=len(problem.lower))
+    return _feasible(problem, (drawn < SPARSE).astype(np.float64), drawn)
+
+
+def uniform(problem: Problem, seed: int, index: int) -> Floats:
+    """Uniform shares of the ranges, projected on the linear rows."""
+    drawn = np.random.default_rng([seed, index]).uniform(size=len(problem.lower))
+    return _feasible(problem, drawn, drawn)
+
+
+def neighbour(problem: Problem, seed: int, index: int, best: Floats) -> Floats:
+    """The best design with some of its values exchanged, projected on the linear rows."""
+    rng = np.random.default_rng([seed, index])
+    out = best.copy()
+    some = np.flatnonzero(rng.uniform(size=len(out)) < EXCHANGED)
+    width = problem.upper - problem.lower
+    share = np.divide(best - problem.lower, width, out=np.zeros(len(out)), where=width > 0.0)
+    out[some] = problem.lower[some] + rng.permutation(share[some]) * width[some]
+    return project(out, problem.lower, problem.upper, problem.linear)
+
+
+def _feasible(problem: Problem, share: Floats, uniform: Floats) -> Floats:
+    share = share.copy()
     even = getattr(problem, "even", 0)
     if even:
-        share[-even:] = drawn[-even:]
+        share[-even:] = uniform[-even:]
     draw = problem.lower + share * (problem.upper - problem.lower)
     return project(draw, problem.lower, problem.upper, problem.linear)
 

@@ -158,7 +158,8 @@ class State:
     ranges, `competing` which piece makes the steps: `bundle` with the `multipliers` (K,) of its rows, `steps` and
     `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
     objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards,
-    `resisted` how many iterates the largest violation has not fallen well below `mark`;
+    `resisted` how many iterates the largest violation has not fallen well below `mark`,
+    `left` whether others of several starts go on instead;
     or else `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge`
     (C,) in the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row,
     `seconds`.
@@ -196,6 +197,7 @@ class State:
     bend: Floats
     resisted: int
     mark: float
+    left: bool
     iteration: int
     evaluations: int
     small: int

@@ -5,7 +5,8 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 (bound formulation); elsewhere the one value is.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,7 @@ class StructureProblem:
         self._objectives = [case.objectives[i] for i in active]
         self._signs = [sign_of(objective) for objective in self._objectives]
         self._evaluator = evaluator.looking_at([objective.name for objective in self._objectives])
+        self._factor: Floats | None = None
         #: what x stands for
         self.space = case.space
         #: how many of the last x are values of variables, of which all parts of their range are alike
@@ -73,7 +75,7 @@ class StructureProblem:
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows of U at x; a design that cannot be computed comes back with its status."""
-        evaluation = self._evaluator.evaluate(self.space.expand(x), gradient, rows=self.rows)
+        evaluation = self._evaluator.evaluate(self._design(x), gradient, rows=self.rows)
         info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
         for place, objective in zip(self._places, self._objectives, strict=True):
             info["objectives"][place] = evaluation.objectives[objective.name]
@@ -111,13 +113,27 @@ class StructureProblem:
         """What the rows of the only objective are norms of."""
         if not (sign > 0.0 and competes(objective, sign)) or evaluation.all_compete:
             return Cones.none()
-        return Cones.of([(peak, 1.0, 0.0) for peak in evaluation.peaks[objective.name]], self.space)
+        return Cones.of([(peak, 1.0, 0.0) for peak in evaluation.peaks[objective.name]], self._pull)
+
+    def softened(self, share: float) -> "StructureProblem":
+        """The same problem with members that have only a share of their strength: alpha^mu f, times the share."""
+        other = copy(self)
+        case = self._evaluator.case
+        other._factor = np.concatenate([share ** (1.0 / case.power), np.ones(case.space.length - case.n_design)])
+        return other
+
+    def _design(self, x: Floats) -> Floats:
+        design = self.space.expand(x)
+        return design if self._factor is None else design * self._factor
+
+    def _pull(self, gradient: Floats) -> Floats:
+        return self.space.pull(gradient if self._factor is None else gradient * self._factor)
 
     def _part(self, objective: Objective, sign: float, evaluation: Evaluation) -> Part:
         peaks = evaluation.peaks[objective.name]
         chosen = peaks if evaluation.all_compete or competes(objective, sign) else peaks[:1]
         values = sign * np.array([peak.value for peak in chosen])
-        slopes = [_signed(sign, self.space.pull(peak.gradient)) for peak in chosen if peak.gradient is not None]
+        slopes = [_signed(sign, self._pull(peak.gradient)) for peak in chosen if peak.gradient is not None]
         if len(slopes) == 1:  # of very many members a copy takes as long as a few steps of the motion
             return values, slopes[0][None]
         return values, np.array(slopes).reshape(len(slopes), len(self.initial))
@@ -143,9 +159,9 @@ class StructureProblem:
                     shapes.append((peak, 1.0 / scale if round_ else np.nan, row.bound / scale))
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
-                        slopes.append(sign * self.space.pull(peak.gradient) / scale)
+                        slopes.append(sign * self._pull(peak.gradient) / scale)
         matrix = np.array(slopes).reshape(len(slopes), len(self.initial))
-        return np.array(rows), matrix, np.array(groups, dtype=np.int64), Cones.of(shapes, self.space)
+        return np.array(rows), matrix, np.array(groups, dtype=np.int64), Cones.of(shapes, self._pull)
 
 
 class Cones(NamedTuple):
@@ -160,17 +176,19 @@ class Cones(NamedTuple):
         return cls(np.zeros(0), np.zeros((0, 0)))
 
     @classmethod
-    def of(cls, rows: Sequence[tuple[Peak, float, float]], space: DesignSpace) -> "Cones":
+    def of(cls, rows: Sequence[tuple[Peak, float, float]], pull: Callable[[Floats], Floats]) -> "Cones":
         """Those of rows (peak, scale, excess): scale |w| - excess, or of none of them (scale NaN)."""
         shaped = [peak.gradient is not None and peak.shape != "plain" and scale == scale for peak, scale, _ in rows]
         if not any(shaped):
             return cls.none()
         excess = np.array([c if is_norm else np.nan for is_norm, (_, _, c) in zip(shaped, rows, strict=True)])
-        across = np.zeros((len(rows), space.size))
-        for i, (is_norm, (peak, scale, _)) in enumerate(zip(shaped, rows, strict=True)):
-            if is_norm and peak.across is not None:
-                across[i] = scale * space.pull(peak.across)
-        return cls(excess, across)
+        found = [
+            scale * pull(peak.across) if is_norm and peak.across is not None else None
+            for is_norm, (peak, scale, _) in zip(shaped, rows, strict=True)
+        ]
+        first = next(peak.gradient for peak, _, _ in rows if peak.gradient is not None)
+        nothing = np.zeros(len(pull(first)))
+        return cls(excess, np.array([nothing if each is None else each for each in found]))
 
     def extended(self, more: int) -> "Cones":
         """With so many more rows that are no norms."""

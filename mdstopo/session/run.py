@@ -23,6 +23,7 @@ from mdstopo.session.combining import Combining, even, problem_of
 from mdstopo.session.engine import Engine, MakeEngine, make_engine
 from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.quotas import rounds
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.stages import first_row, is_done, iterations_of, run_stages, stage_of
@@ -282,21 +283,24 @@ class _Run:
             if saver is not None:
                 saver.offer()
 
-        if workers > 1 and chosen.starts > 1:
-            from mdstopo.session.workers import run_in_workers  # most runs need no other process
-
-            job = (self.case, self.initial, make, scalarisation)
-            run_in_workers(job, self.states, workers, keep, self.stop_requested)
-            return
-        if workers > 1:
+        if workers > 1 and chosen.starts == 1:
             self.notify("one start needs one process: the other workers are not used")
-        for index in range(chosen.starts):
+        for legs in rounds(self.case, self.states, keep):
             if self.stop_requested():
                 break
-            state = self.states[index]
-            self.states[index] = run_stages(
-                self.case, make, problem, index, state, self.initial, keep, self.stop_requested
-            )
+            if workers > 1 and len(legs) > 1:
+                from mdstopo.session.workers import run_in_workers  # most runs need no other process
+
+                job = (self.case, self.initial, make, scalarisation)
+                run_in_workers(job, self.states, legs, workers, keep, self.stop_requested)
+                continue
+            for leg in legs:
+                if self.stop_requested():
+                    break
+                state = self.states[leg.index]
+                self.states[leg.index] = run_stages(
+                    self.case, make, problem, leg, state, self.initial, keep, self.stop_requested
+                )
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""

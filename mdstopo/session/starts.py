@@ -1,6 +1,7 @@
 """One start of the optimiser, from its first design (or its last state) to its end."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,13 @@ from mdstopo.optimizer.driver import Gsao, run
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.projection import InfeasibleRows, project
-from mdstopo.optimizer.starts import random_feasible
+from mdstopo.optimizer.starts import SHARE, Family, design_of_family
 from mdstopo.optimizer.state import State
 
 NOTHING_VARIES = "an optimisation needs members with `design: true`, or `design.variables`"
+
+#: iterations with a quarter of the strengths at most
+SOFT_ITERATIONS = 30
 
 Floats = NDArray[np.float64]
 Keep = Callable[[int, State], None]
@@ -77,25 +81,69 @@ def unshared(case: Case, initial: Floats | None) -> str:
     )
 
 
-def run_start(
-    case: Case,
-    problem: Problem,
-    index: int,
-    state: State | None,
-    initial: Floats | None,
-    keep: Keep,
-    stop: Stop,
-) -> State:
-    """Step until the optimiser ends or `stop` says so; `keep` gets every state. Returns the last one.
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A part of a start's way. index: which start; family: where it begins; quota: iterations after which it pauses,
+    None: it goes on to its end; best: the best design of all starts so far (N,), for a neighbour of it."""
 
-    initial: a design to begin the first start with.
+    index: int
+    family: Family
+    quota: int | None = None
+    best: Floats | None = None
+
+
+def run_start(
+    case: Case, problem: Problem, leg: Leg, state: State | None, initial: Floats | None, keep: Keep, stop: Stop
+) -> State | None:
+    """Step until the optimiser ends, the quota is used or `stop` says so; `keep` gets every state.
+
+    initial: a design to begin the first start with. Returns the last state; None where the start was stopped before
+    it had one.
     """
     optimizer = make_optimizer(case, problem)
     if state is None:
         own = None if initial is None else case.space.reduce(case.whole(initial))
-        first = own if index == 0 else random_feasible(problem, case.optimizer.seed, index)
-        state = optimizer.start(first)
-        keep(index, state)
-    else:
+        first = design_of_family(problem, case.optimizer.seed, leg.index, leg.family, leg.best)
+        first = own if first is None else first
+        before = 0
+        if leg.family is Family.SOFTENED and hasattr(problem, "softened"):
+            soft = _soften(case, problem, first, stop)
+            if soft is None:
+                return None
+            first, before = soft.best_alpha, soft.evaluations
+        state = _counted(optimizer.start(first), before)
+        keep(leg.index, state)
+    elif not state.left:
         state = optimizer.reopen(state)
-    return run(optimizer, state, on_iteration=lambda reached: keep(index, reached), stop_requested=stop)
+    latest = state
+
+    def reached(new: State) -> None:
+        nonlocal latest
+        latest = new
+        keep(leg.index, new)
+
+    def paused() -> bool:
+        return stop() or (leg.quota is not None and latest.iteration >= leg.quota)
+
+    if latest.left or paused():
+        return latest
+    return run(optimizer, latest, on_iteration=reached, stop_requested=paused)
+
+
+def _soften(case: Case, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
+    """The end of a short run with a quarter of the strengths; None where it was stopped."""
+    optimizer = make_optimizer(case, problem.softened(SHARE))  # type: ignore[attr-defined]
+    state = optimizer.start(first)
+    while state.running and state.iteration < SOFT_ITERATIONS:
+        if stop():
+            return None
+        state = optimizer.step(state)
+    return state
+
+
+def _counted(state: State, before: int) -> State:
+    """A first state, behind so many evaluations of another problem."""
+    if before:
+        state.evaluations += before
+        state.history.evaluations[:] = [count + before for count in state.history.evaluations]
+    return state

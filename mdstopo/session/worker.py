@@ -25,11 +25,11 @@ def main() -> None:
     get_ready(case, engine, problem_of(engine, even(case)), initial)
     problem = problem_of(engine, scalarisation)
     while (task := inbox.get()) is not None:
-        index, arrays = task
+        leg, arrays = task
         sender = _Sender(output)
         state = None if arrays is None else State.from_arrays(arrays)
-        last = run_stages(case, make_engine, problem, index, state, initial, sender.keep, stopped.is_set)
-        sender.send("done", index, last)
+        last = run_stages(case, make_engine, problem, leg, state, initial, sender.keep, stopped.is_set)
+        sender.send("done", leg.index, last)
         if stopped.is_set():
             return
 
@@ -46,8 +46,8 @@ class _Sender:
         self._latest = (index, state)
         self._timer.offer()
 
-    def send(self, kind: str, index: int, state: State) -> None:
-        pickle.dump((kind, index, state.to_arrays()), self._output)
+    def send(self, kind: str, index: int, state: State | None) -> None:
+        pickle.dump((kind, index, None if state is None else state.to_arrays()), self._output)
         self._output.flush()
 
     def _send_latest(self) -> None:

@@ -1,0 +1,136 @@
+"""Several starts in quotas: all go a little way, those that find what another has found are left, the best go on.
+
+Which go on depends on the states alone, and is written into them (`State.left`): a resumed run, and one on any number
+of processes, decides alike.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.case.stages import stage_count
+from mdstopo.optimizer.starts import Family, best_run, family_of
+from mdstopo.optimizer.state import State
+from mdstopo.session.starts import Leg
+from mdstopo.status import RunStatus
+
+#: iterations after which it is decided who goes on; the share of the starts that do
+QUOTAS, SHARE = (20, 40), 1.0 / 3.0
+#: a start that has fallen by this share of U within so many iterations goes on, too
+FALLING, LATELY = 0.1, 5
+#: a start whose U is higher than the best by more than this share of it does not
+BEHIND = 1.0
+#: two designs are one optimum where U differs by less than this, relative, and alpha by less than that on average
+SAME_VALUE, SAME_DESIGN = 1e-3, 2e-2
+
+States = list[State | None]
+
+
+def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> Iterator[list[Leg]]:
+    """What every start does next, round by round; `states` are to be up to date when the next round is asked for."""
+    count = len(states)
+    families = [family_of(index, count) for index in range(count)]
+    if count == 1 or stage_count(case) > 1:
+        yield [Leg(index, families[index]) for index in range(count)]
+        return
+    late = [index for index in range(count) if families[index] is Family.NEIGHBOUR]
+    early = [index for index in range(count) if index not in late]
+    yield [Leg(index, families[index], QUOTAS[0]) for index in early]
+    best = states[best_run(states, case.optimizer.tolerance)]
+    for index in late:
+        yield [Leg(index, families[index], QUOTAS[0], None if best is None else best.best_alpha)]
+    for quota, following in zip(QUOTAS, (*QUOTAS[1:], None), strict=True):
+        leave(case, states, quota, keep)
+        yield [Leg(i, families[i], following) for i, state in enumerate(states) if state is not None and not state.left]
+
+
+def leave(case: Case, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
+    """Mark the starts that do not go on after so many iterations.
+
+    The best third of the distinct ones goes on, and those that are still falling fast. To decide again changes nothing:
+    who has gone on from here is not asked.
+    """
+    tolerance = case.optimizer.tolerance
+    begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.left]
+    if any(state.iteration > quota for _, state in begun if state.running):
+        return
+    order = sorted(begun, key=lambda each: (*_rank(each[1], tolerance), each[0]))
+    most = max(1, math.ceil(SHARE * len(states)))
+    kept: list[State] = []
+    for index, state in order:
+        twin = any(same(state, other) for other in kept)
+        if not twin and (not kept or (near(state, kept[0], tolerance) and (len(kept) < most or falls(state)))):
+            kept.append(state)
+        elif state.running:
+            why = "another start came to the same" if twin else "other starts were better"
+            reason = f"left after {state.iteration} iterations: {why}"
+            states[index] = marked = replace(state, left=True, status=RunStatus.MAX_ITERATIONS, reason=reason)
+            keep(index, marked)
+
+
+def near(state: State, best: State, tolerance: float) -> bool:
+    """Whether a start may still come to be the best: it violates limits, as yet, or its U is not far above."""
+    if best.best_violation > tolerance or state.best_violation > tolerance:
+        return True
+    return state.best_objective - best.best_objective <= BEHIND * abs(best.best_objective)
+
+
+def falls(state: State) -> bool:
+    """Whether U has lately been falling fast."""
+    objective = np.array(state.history.objective)
+    if not state.running or len(objective) <= LATELY:
+        return False
+    before, now = np.nanmin(objective[:-LATELY]), np.nanmin(objective)
+    return bool(before - now >= FALLING * abs(before))
+
+
+def _rank(state: State, tolerance: float) -> tuple[bool, float, float]:
+    if not np.isfinite(state.best_objective):
+        return True, math.inf, math.inf
+    infeasible = state.best_violation > tolerance
+    return infeasible, state.best_plain if infeasible else 0.0, state.best_objective
+
+
+def same(one: State, other: State) -> bool:
+    """Whether two starts have come to one optimum."""
+    if not abs(one.best_objective - other.best_objective) <= SAME_VALUE * abs(other.best_objective):
+        return False
+    return float(np.abs(one.best_alpha - other.best_alpha).mean()) <= SAME_DESIGN
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """One distinct optimum: U, its violation, by which starts, their evaluations all told, and how it ended."""
+
+    objective: float
+    violation: float
+    starts: tuple[int, ...]
+    evaluations: int
+    status: RunStatus
+
+
+def distinct(states: Sequence[State | None], tolerance: float) -> list[Found]:
+    """The distinct optima that the starts have come to, best first."""
+    begun = [(index, state) for index, state in enumerate(states) if state is not None]
+    order = sorted(begun, key=lambda each: (*_rank(each[1], tolerance), each[0]))
+    groups: list[list[tuple[int, State]]] = []
+    for item in order:
+        for group in groups:
+            if same(item[1], group[0][1]):
+                group.append(item)
+                break
+        else:
+            groups.append([item])
+    return [
+        Found(
+            group[0][1].best_objective,
+            group[0][1].best_plain,
+            tuple(index for index, _ in group),
+            sum(state.evaluations for _, state in group),
+            group[0][1].status,
+        )
+        for group in groups
+    ]
