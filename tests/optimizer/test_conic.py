@@ -1,0 +1,141 @@
+"""The subproblem of lines and norms: its optimality conditions, checked by themselves, and closed forms."""
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import settings as examples
+from hypothesis import strategies as st
+
+from mdstopo.optimizer.conic import Lines, Norms, Program, solve
+from mdstopo.optimizer.curvature import Curvature, learnt
+from mdstopo.optimizer.problem import LinearRows
+
+
+def no_lines(n):
+    return Lines(np.zeros(0), np.zeros((0, n)), np.zeros(0, dtype=np.int64))
+
+
+def no_norms(n):
+    none = np.zeros((0, n))
+    return Norms(np.zeros((0, 2)), none, none, np.zeros(0), np.zeros(0, dtype=np.int64))
+
+
+def program(n, lines, norms, groups, dense, equal, seed):
+    rng = np.random.default_rng(seed)
+    directions = np.linalg.qr(rng.normal(size=(n, min(n, 3))))[0]
+    weight = rng.uniform(0.1, 2.0, directions.shape[1])
+    curvature = Curvature(np.full(n, 0.3), directions, weight)
+    if dense:
+        curvature = Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), curvature.dense())
+    return Program(
+        -rng.uniform(0.0, 0.2, n),
+        rng.uniform(0.01, 0.2, n),
+        Lines(rng.normal(size=lines), rng.normal(size=(lines, n)), rng.integers(0, groups, lines)),
+        Norms(
+            rng.normal(size=(norms, 2)), rng.normal(size=(norms, n)), rng.normal(size=(norms, n)),
+            rng.uniform(0.0, 1.0, norms), rng.integers(0, groups, norms),
+        ),
+        rng.uniform(0.1, 3.0, groups - 1),
+        LinearRows(np.ones((1, n)), np.array([0.0 if equal else 0.05]), np.array([equal])),
+        curvature,
+    )  # fmt: skip
+
+
+def values(p, d):
+    """The rows' values (K,), their gradients (K, N) and groups at d."""
+    vector = p.norms.vector + np.stack([p.norms.slope @ d, p.norms.across @ d], axis=1)
+    size = np.hypot(vector[:, 0], vector[:, 1])
+    unit = vector / size[:, None]
+    norms = unit[:, :1] * p.norms.slope + unit[:, 1:] * p.norms.across
+    return (
+        np.concatenate([p.lines.value + p.lines.slope @ d, size - p.norms.excess]),
+        np.concatenate([p.lines.slope, norms]),
+        np.concatenate([p.lines.group, p.norms.group]),
+    )
+
+
+@examples(max_examples=40, deadline=None)
+@given(
+    n=st.integers(1, 60),
+    lines=st.integers(1, 20),
+    norms=st.integers(0, 20),
+    groups=st.integers(1, 4),
+    dense=st.booleans(),
+    equal=st.booleans(),
+    seed=st.integers(0, 10**6),
+)
+def test_the_solution_meets_its_optimality_conditions(n, lines, norms, groups, dense, equal, seed):
+    p = program(n, lines, norms, groups, dense, equal, seed)
+    p.lines.group[0] = 0  # an objective has a row at least
+    found = solve(p)
+    assert found.solved
+    d, (level, slope, group) = found.d, values(p, found.d)
+    multiplier = np.concatenate([found.lines, found.norms])
+    size = max(1.0, float(np.abs(slope).max()))
+    assert np.all(d >= p.lower)
+    assert np.all(d <= p.upper)
+    assert abs(multiplier[group == 0].sum() - 1.0) < 1e-6
+    excess = float(p.linear.A[0] @ d - p.linear.b[0])
+    assert abs(excess) < 1e-7 if equal else excess < 1e-7
+    assert equal or found.linear[0] >= 0.0
+    gradient = p.curvature.times(d) + multiplier @ slope + found.linear @ p.linear.A
+    vector = p.norms.vector + np.stack([p.norms.slope @ d, p.norms.across @ d], axis=1)
+    assume(not np.any((np.hypot(vector[:, 0], vector[:, 1]) < 1e-3) & (found.norms > 1e-9)))  # no gradient there
+    inside = (d > p.lower + 1e-6) & (d < p.upper - 1e-6)
+    assert np.abs(gradient[inside]).max(initial=0.0) < 1e-5 * size
+    assert gradient[d <= p.lower].min(initial=0.0) > -1e-5 * size
+    assert gradient[d >= p.upper].max(initial=0.0) < 1e-5 * size
+    for j in range(groups):
+        mine = group == j
+        top = max(level[mine].max(initial=-np.inf), 0.0 if j else -np.inf)
+        assert np.abs(multiplier[mine] * (level[mine] - top)).sum() < 1e-6 * size
+        if j:
+            assert multiplier[mine].sum() <= p.price[j - 1] * (1.0 + 1e-6)
+            if top > 1e-6:
+                assert multiplier[mine].sum() == pytest.approx(p.price[j - 1], rel=1e-4)
+
+
+@pytest.mark.parametrize("dense", [False, True])
+def test_both_ways_to_the_linear_system_give_one_solution(dense):
+    one, other = (solve(program(30, 12, 12, 3, way, False, 5)) for way in (False, True))
+    assert np.allclose(one.d, other.d, atol=1e-7)
+
+
+def test_the_least_norm_is_found_where_it_vanishes():
+    """|(1 + d_0, 2 d_1)| is least at d = (-1, 0), where it has a kink."""
+    norms = Norms(np.array([[1.0, 0.0]]), np.array([[1.0, 0.0]]), np.array([[0.0, 2.0]]), np.zeros(1), np.array([0]))
+    flat = Curvature.diagonal_of(np.full(2, 1e-12))
+    found = solve(Program(np.full(2, -2.0), np.full(2, 2.0), no_lines(2), norms, np.zeros(0), LinearRows.none(2), flat))
+    assert np.allclose(found.d, [-1.0, 0.0], atol=1e-6)
+    assert found.level[0] == pytest.approx(0.0, abs=1e-7)
+
+
+def test_a_limit_that_cannot_be_kept_costs_its_price():
+    """Minimise 0 under 1 + d <= e at d >= -0.4: the violation left is 0.6, its multiplier the price."""
+    lines = Lines(np.array([0.0, 1.0]), np.array([[0.0], [1.0]]), np.array([0, 1]))
+    flat = Curvature.diagonal_of(np.full(1, 1e-9))
+    found = solve(
+        Program(np.array([-0.4]), np.array([0.4]), lines, no_norms(1), np.array([7.0]), LinearRows.none(1), flat)
+    )
+    assert found.d[0] == pytest.approx(-0.4, abs=1e-8)
+    assert found.level[1] == pytest.approx(0.6, abs=1e-7)
+    assert found.lines[1] == pytest.approx(7.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("n", [5, 300])
+def test_curvature_is_learnt_from_steps(n):
+    """After steps over a quadratic function B s = y of the last one, B is positive definite, also in compact form."""
+    rng = np.random.default_rng(2)
+    scale = rng.uniform(0.5, 4.0, n)
+    steps = rng.normal(size=(6, n))
+    B = learnt(steps, steps * scale, 1e-3)
+    assert np.allclose(B.times(steps[-1]), steps[-1] * scale, rtol=1e-8, atol=1e-8)
+    assert np.linalg.eigvalsh(B.dense()).min() > 0.0
+
+
+@pytest.mark.parametrize("n", [4, 300])
+def test_curvature_stays_positive_where_the_function_bends_down(n):
+    rng = np.random.default_rng(3)
+    steps = rng.normal(size=(5, n))
+    B = learnt(steps, -2.0 * steps, 1e-3)
+    assert np.linalg.eigvalsh(B.dense()).min() > -1e-12
