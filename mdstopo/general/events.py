@@ -40,10 +40,11 @@ SLACK = 0.03
 
 
 @kernel
-def has_switches(model):  # type: ignore[no-untyped-def]
-    """Whether any member can switch at all."""
+def has_switches(model, knots):  # type: ignore[no-untyped-def]
+    """Whether any member can switch at all; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
-        if model.block[k, 3] != INERTER and law_switches(model.block[k, 3], model.law[k]):
+        code = model.block[k, 3]
+        if code != INERTER and law_switches(code, model.law[k]) and (knots or code != CURVE):
             return True
     return model.contact_pair.shape[0] > 0
 

@@ -18,7 +18,7 @@ from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.mechanics.laws.table import CRUSH, SPRING, law, law_first_set, law_start
+from mdstopo.mechanics.laws.table import CRUSH, CURVE, SPRING, law, law_first_set, law_start
 from mdstopo.native.padding import whole_vectors
 
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
@@ -160,8 +160,11 @@ def general_sums(model, segment, t, strength, rel, tangent, sums):  # type: igno
 
 
 @kernel
-def set_modes(model, strength, rel, rel_rate):  # type: ignore[no-untyped-def]
-    """The modes at the start from elongation, rate and second derivative (rel_rate: the pose of the accelerations)."""
+def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped-def]
+    """The modes at the start from elongation, rate and second derivative (rel_rate: the pose of the accelerations).
+
+    knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise curves have none.
+    """
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
         if code == INERTER:
@@ -174,7 +177,8 @@ def set_modes(model, strength, rel, rel_rate):  # type: ignore[no-untyped-def]
             rate = bx * r[4] + by * r[5] + bt * r[6]
             second = second_rate(model.member, i, r, acc)
             x = length - model.member[4, i]
-            strength[1, i] = law_start(code, model.law[k], x, rate, second, model.curves)
+            whole = code == CURVE and not knots
+            strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
             if code == CRUSH and model.active[0, k] == 0:  # whatever it is like now, it has not been crushed
                 strength[1, i] = 0.0

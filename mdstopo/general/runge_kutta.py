@@ -118,14 +118,17 @@ def scene_size(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def start_modes(model, strength, desk, q, v, a, lam):  # type: ignore[no-untyped-def]
-    """The modes at the start: by elongation, then its rate, then its second derivative with what is surely closed."""
+def start_modes(model, strength, desk, q, v, a, lam, knots):  # type: ignore[no-untyped-def]
+    """The modes at the start: by elongation, then its rate, then its second derivative with what is surely closed.
+
+    knots: as of `members.set_modes`.
+    """
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, POSE))
     second = np.zeros((n_pair, 3))
     relative_pose(model.pair, q, v, rel)
     for attempt in range(2):
-        set_modes(model, strength, rel, second)
+        set_modes(model, strength, rel, second, knots)
         if attempt == 0:
             singular = balance(model, strength, np.int64(0), model.times[0], q, v, np.bool_(False), desk, a, lam)
             if singular >= 0:
@@ -238,9 +241,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     graze = settings[0] * size
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
-    switching = has_switches(model)
+    switching = has_switches(model, np.bool_(True))
     if switching:
-        singular = start_modes(model, strength, desk, q0, v0, a0, lam)
+        singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t

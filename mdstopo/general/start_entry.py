@@ -71,7 +71,7 @@ def linearise(ints, floats, alpha, strength, stiffness, mass, rows):  # type: ig
     a = np.zeros(n)
     lam = np.zeros(model.size[0])
     scale_general(model.block, model.power, alpha, strength)
-    start_modes(model, strength, desk, q, v, a, lam)
+    start_modes(model, strength, desk, q, v, a, lam, np.bool_(True))
     balance(model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk, a, lam)
     for d in range(n):
         mass[d, d] = model.mass[d]

@@ -124,12 +124,12 @@ class Ensemble(Evaluator):
             float(weights @ np.array([each.gradient for each in errors])),
         )
 
-    def otherwise(self, **solver: Any) -> "Ensemble":
-        """As of `Evaluator`; every point has the settings."""
-        key = tuple(sorted(solver.items()))
+    def otherwise(self, sample: int = 0, **solver: Any) -> "Ensemble":
+        """As of `Evaluator`; every point has the settings, and is rounded otherwise as that sample."""
+        key = (sample, *sorted(solver.items()))
         if key not in self._others:
             case = replace(self.case, solver=replace(self.case.solver, **solver))
-            points = {i: point.otherwise(**solver) for i, point in self.points.items()}
+            points = {i: point.otherwise(sample, **solver) for i, point in self.points.items()}
             self._others[key] = Ensemble(case, self._compiles_beside, points)
         found = self._others[key]
         assert isinstance(found, Ensemble)

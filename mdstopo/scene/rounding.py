@@ -28,8 +28,12 @@ def rounded_otherwise(case: Case, origin: Pair, size: float, sample: int) -> Cas
 
 
 def _nudged(group: MemberGroup, random: np.random.Generator) -> MemberGroup:
-    arrays = {name: _neighbours(getattr(group, name), random) for name in ("from_local", "to_local", "length")}
-    return replace(group, **arrays)
+    return replace(
+        group,
+        from_local=_neighbours(group.from_local, random),
+        to_local=_neighbours(group.to_local, random),
+        length=_neighbours(group.length, random),
+    )
 
 
 def _neighbours(numbers: FloatArray, random: np.random.Generator) -> FloatArray:

@@ -4,10 +4,10 @@ Parameters: where its data begin in the scene's curves, number of knots n, V of 
 much a piece goes on beyond its ends (`OVERLAP`). The data: n knots, then for each of the n - 1 pieces four coefficients
 of powers of x - knot, then V at each knot from the first.
 
-The second derivative jumps at the knots, where a step has to end if its error is to be of the method's order. So every
-piece is a mode: 1 is the line below the first knot, i + 1 the cubic behind knot i, n + 1 the line above the last knot;
-mode 0, of members whose mode nobody has set, is whichever piece x is in. Force and stiffness are continuous at a knot:
-accelerations do not jump there, and derivatives do not feel when it is passed.
+The second derivative jumps at the knots, where a step has to end if its error is to be of an order above the second. So
+every piece is a mode: 1 is the line below the first knot, i + 1 the cubic behind knot i, n + 1 the line above the last
+knot; mode 0, where steps need not end at knots, is whichever piece x is in. Force and stiffness are continuous at a
+knot: accelerations do not jump there, and derivatives do not feel when it is passed.
 """
 
 from typing import Any
