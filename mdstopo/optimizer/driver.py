@@ -191,8 +191,8 @@ class Gsao:
             if accepted:
                 self._take(state, sample)
             return accepted
-        before = merit(state.objective, state.constraint_rows, state.charge)
-        after = merit(sample.objective, sample.constraint_rows, state.charge)
+        before = merit(state.objective, state.sample.constraint_levels, state.charge)
+        after = merit(sample.objective, sample.constraint_levels, state.charge)
         actual = before - after
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         # A decrease that rounding decides is none: both sums carry it.
@@ -300,32 +300,37 @@ class Gsao:
             if found is not None:
                 if len(state.charge):
                     state.charge = next_charge(state.charge, np.zeros_like(state.charge), state.price)
-                before = merit(state.objective, state.constraint_rows, state.charge)
+                before = merit(state.objective, state.sample.constraint_levels, state.charge)
                 state.trial, state.kkt = found.trial, found.kkt
                 state.predicted = before - found.promised
                 return
         model = self._approximate(state, chosen)
         lower, upper = self._box(state, model)
-        optimum = solve(model, lower, upper, self.problem.linear, state.price)
+        sample = state.sample
+        price = state.price[sample.groups] if len(state.price) else state.price
+        optimum = solve(model, lower, upper, self.problem.linear, price)
         for weight in RESCUE_WEIGHTS:
             if optimum.converged:
                 break
             steepest = float(np.abs(model.slopes[: model.n_objective]).max())
             model = replace(model, kappa=model.kappa + weight * steepest / self.range)
-            optimum = solve(model, lower, upper, self.problem.linear, state.price)
+            optimum = solve(model, lower, upper, self.problem.linear, price)
         promised, constraints = model.model(optimum.x)
         if optimum.converged:
-            state.charge = next_charge(state.charge, optimum.multipliers[model.n_objective :], state.price)
-        before = merit(state.objective, state.constraint_rows, state.charge)
+            carried: Floats = np.bincount(
+                sample.groups, weights=optimum.multipliers[model.n_objective :], minlength=len(state.price)
+            )
+            state.charge = next_charge(state.charge, carried, state.price)
+        before = merit(state.objective, sample.constraint_levels, state.charge)
         state.trial = optimum.x
-        state.predicted = before - merit(promised, constraints, state.charge)
+        state.predicted = before - merit(promised, sample.levels_of(constraints), state.charge)
         state.kkt = self._kkt(state, model, optimum) if optimum.converged else float("nan")
         if not optimum.converged and not state.predicted > 0.0:
             state.status = RunStatus.FAILED
             state.reason = "the approximate subproblem could not be solved; the best design so far is kept"
         if len(state.price) and state.violation > self.settings.tolerance:
-            bought = optimum.multipliers[model.n_objective :] >= 0.99 * state.price
-            dearest = PRICE_CEILING * first_price(state.sample, self.settings)
+            bought = sample.levels_of(optimum.multipliers[model.n_objective :]) >= 0.99 * state.price
+            dearest = PRICE_CEILING * first_price(sample, self.settings)
             dearer = np.minimum(PRICE_GROWTH * state.price, np.maximum(dearest, state.price))
             state.price = np.where(bought, dearer, state.price)
 

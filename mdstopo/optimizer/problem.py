@@ -93,12 +93,21 @@ class Sample:
     info: Mapping[str, Floats | float] = field(default_factory=dict)
 
     @property
+    def groups(self) -> Ints:
+        """The constraint that each constraint row belongs to (C,)."""
+        return self.constraint_groups if len(self.constraint_groups) else np.arange(len(self.constraint_rows))
+
+    @property
     def constraint_levels(self) -> Floats:
         """The largest row of each constraint (J,)."""
+        return self.levels_of(self.constraint_rows)
+
+    def levels_of(self, rows: Floats) -> Floats:
+        """The largest of numbers (C,) of the constraint rows for each constraint (J,)."""
         if not len(self.constraint_groups):
-            return self.constraint_rows
+            return rows
         levels = np.full(int(self.constraint_groups[-1]) + 1, -np.inf)
-        np.maximum.at(levels, self.constraint_groups, self.constraint_rows)
+        np.maximum.at(levels, self.constraint_groups, rows)
         return levels
 
 

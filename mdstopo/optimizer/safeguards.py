@@ -101,24 +101,24 @@ def outdated(state: State) -> bool:
     return len(state.cuts) > 0 and state.objective < state.forgotten - FRESH * abs(state.objective)
 
 
-def merit(objective: float, constraint_rows: Floats, price: Floats) -> float:
-    """What a step must decrease: the objective and the price of all violations."""
+def merit(objective: float, levels: Floats, price: Floats) -> float:
+    """What a step must decrease: the objective and the price of the largest violation of each constraint (J,)."""
     if not len(price):
         return objective
-    return objective + float(np.einsum("i,i->", price, np.maximum(constraint_rows, 0.0)))
+    return objective + float(np.einsum("i,i->", price, np.maximum(levels, 0.0)))
 
 
 def next_charge(charge: Floats, multipliers: Floats, price: Floats) -> Floats:
-    """What violations cost in the merit, (C,): twice the multipliers, at most the price; it falls gradually."""
+    """What violations cost in the merit, (J,): twice the multipliers, at most the price; it falls gradually."""
     return np.minimum(np.maximum(CHARGE * multipliers, CHARGE_FALL * charge), price)
 
 
 def first_price(sample: Sample, settings: Settings) -> Floats:
-    """The price of each constraint row, (C,): so that `elastic` times its gradient outweighs the
+    """The price of each constraint, (J,): so that `elastic` times its gradient outweighs the
     objective's."""
     if not len(sample.constraint_rows):
         return np.zeros(0)
-    steepest = np.abs(sample.constraint_gradients).max(axis=1)
+    steepest = sample.levels_of(np.abs(sample.constraint_gradients).max(axis=1))
     slope = float(np.abs(sample.gradients).max())
     return settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(steepest > 0.0, steepest, 1.0)
 
