@@ -8,7 +8,8 @@ design (Sevin and Pilkey 1971; Balandin, Bolotnik and Pilkey 1998). docs/theory/
     system       what joints, prescribed motions and floating bodies leave free of the centres' motion
     response     a response or a limit as a row of the program
     forces       what the case's own members cannot do: carry more, push, act before their slack is used up
-    program      the linear program, its refinement and its certificate
+    program      the linear program on finer and finer cells
+    solve        one of them: its rows, its solution, its certificate
     bounds       a bound for each objective of a case
     compare      bounds beside what a result file holds
 """

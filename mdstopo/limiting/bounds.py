@@ -10,8 +10,9 @@ from mdstopo.case.aims import Objective
 from mdstopo.case.model import Case
 from mdstopo.case.units import unit_of_value, words
 from mdstopo.limiting.forces import restrictions
-from mdstopo.limiting.program import ImpossibleError, Program, UnsolvedError
+from mdstopo.limiting.program import ImpossibleError, Program
 from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row
+from mdstopo.limiting.solve import UnsolvedError
 from mdstopo.limiting.system import System
 
 

@@ -224,18 +224,16 @@ def cone_of(middles: Floats, halves: Floats, directions: Floats) -> Floats | Non
         if np.all(off - halves >= 0.5 * math.pi):
             return np.array([[-1.0]])
         return None
-    # the largest gap between the arcs has to be wider than a half turn
+    # a gap between the arcs has to be wider than a half turn; once round, so that arcs over the full turn are seen
     first = (middles - halves) % (2.0 * math.pi)
     order = np.argsort(first, kind="stable")
-    starts, ends = first[order], (first + 2.0 * halves)[order]
-    reach = np.maximum.accumulate(ends)
-    gaps = np.append(starts[1:], starts[0] + 2.0 * math.pi) - reach
+    starts = np.concatenate([first[order], first[order] + 2.0 * math.pi])
+    reach = np.maximum.accumulate(starts + 2.0 * np.tile(halves[order], 2))
+    gaps = starts[len(first) :] - reach[len(first) - 1 : -1]
     widest = int(np.argmax(gaps))
-    # where the last arcs reach over the first ones, what lies between those is not certain: then there is no cone
-    if gaps[widest] <= math.pi or reach[-1] - 2.0 * math.pi > starts[0]:
+    if gaps[widest] <= math.pi:
         return None
-    low = starts[(widest + 1) % len(starts)]
-    high = reach[widest]
+    low, high = starts[len(first) + widest], reach[len(first) - 1 + widest]
     normals = np.array([[-math.sin(low), math.cos(low)], [math.sin(high), -math.cos(high)]])
     return np.asarray(normals @ directions.T)
 

@@ -86,11 +86,11 @@ def limits_of(system: System, constraints: tuple[object, ...]) -> Limits:
     """The limits of the system's load case, as far as they can be counted."""
     found = Limits()
     own = [row for row in constraints if isinstance(row, ResponseRow) and row.load_case == system.load_case.name]
-    for row in own:
-        _note_angle(system, row, found)
-    for row in own:
+    turns = [_note_angle(system, row, found) for row in own]
+    for row, turn in zip(own, turns, strict=True):
         text = f"{row.over_time} of {words(row.response)} {_SENSES[row.sense]} {row.bound:g}"
-        if row.response.kind == "angle" and row.response.body in found.turns:
+        if turn:
+            found.counted.append(f"{text} (as far as it turns)")
             continue
         try:
             rows, remark = _limit_rows(system, row, found.turns)
@@ -205,13 +205,13 @@ def arm_travel(arm: float, turn: float) -> float:
     return 2.0 * arm * math.sin(0.5 * min(turn, math.pi))
 
 
-def _note_angle(system: System, row: ResponseRow, found: Limits) -> None:
-    """A limit on how far a body turns against one that does not."""
+def _note_angle(system: System, row: ResponseRow, found: Limits) -> bool:
+    """Whether a row limits how far a body turns against one that does not; then it is noted."""
     response = row.response
     if response.kind != "angle" or row.over_time != "max_abs" or row.sense == "at_least":
-        return
+        return False
     if response.relative_to not in system.angles or response.body is None:
-        return
+        return False
     start = {body.name: body.angle for body in system.load_case.bodies}
     # the response is the difference of angles, not its change; the start keeps the limit, too
     apart = (
@@ -221,6 +221,7 @@ def _note_angle(system: System, row: ResponseRow, found: Limits) -> None:
     )
     reach = row.bound + min(row.bound, apart)
     found.turns[response.body] = min(found.turns.get(response.body, math.inf), reach)
+    return True
 
 
 def _scaled(cubics: Cubics, factor: float) -> Cubics:

@@ -94,7 +94,7 @@ class System:
             return Cubics(self.times, np.zeros((segments, self.n, 4))), np.eye(self.n)
         matrix = np.array([row.vector for row in rows])
         known = np.stack([row.known for row in rows], axis=1)
-        u, s, vt = np.linalg.svd(matrix)
+        u, s, vt = np.linalg.svd(matrix, full_matrices=len(matrix) < self.n)
         rank = int((s > _RANK * s[0]).sum())
         inverse = vt[:rank].T @ (u[:, :rank] / s[:rank]).T
         return Cubics(self.times, known).mapped(inverse), vt[rank:].T
@@ -210,7 +210,7 @@ def _null_space(matrix: Floats) -> Floats:
     """(n, f): an orthonormal basis."""
     if not len(matrix):
         return np.eye(matrix.shape[1])
-    _, s, vt = np.linalg.svd(matrix)
+    _, s, vt = np.linalg.svd(matrix, full_matrices=len(matrix) < matrix.shape[1])
     return np.asarray(vt[int((s > _RANK * s[0]).sum()) :].T)
 
 

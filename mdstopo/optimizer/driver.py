@@ -317,9 +317,8 @@ class Gsao:
             optimum = solve(model, lower, upper, self.problem.linear, price)
         promised, constraints = model.model(optimum.x)
         if optimum.converged:
-            carried: Floats = np.bincount(
-                sample.groups, weights=optimum.multipliers[model.n_objective :], minlength=len(state.price)
-            )
+            multipliers = optimum.multipliers[model.n_objective :]
+            carried = np.bincount(sample.groups, weights=multipliers, minlength=len(state.price)).astype(np.float64)
             state.charge = next_charge(state.charge, carried, state.price)
         before = merit(state.objective, sample.constraint_levels, state.charge)
         state.trial = optimum.x

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import GROUND, Case, GapLaw, MemberGroup, SpringLaw
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
+from mdstopo.limiting.compare import compared
 from mdstopo.plots.scenery import outline, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.watch import points_at, response_history
@@ -25,6 +26,7 @@ def content(source: Source) -> dict[str, Any]:
     """The page's data; numbers are rounded to what a screen can show."""
     case, view = source.case, source.view
     names = list(source.names)
+    known = _bounds(source)
     objectives = {each.name: each for each in case.objectives}
     page: dict[str, Any] = {
         "title": source.title,
@@ -37,7 +39,8 @@ def content(source: Source) -> dict[str, Any]:
         "settings": {key: value for key, value in view.settings.items() if not key.startswith("set ")},
         "objectives": [
             {"name": name, "unit": unit_of_value(objectives[name]), "what": _what(case, name),
-             "load_case": objectives[name].load_case, "over_time": objectives[name].over_time}
+             "load_case": objectives[name].load_case, "over_time": objectives[name].over_time,
+             "bound": known.get(name)}
             for name in names
         ],
         "load_cases": list(source.load_cases),
@@ -59,6 +62,19 @@ def content(source: Source) -> dict[str, Any]:
             "status": list(view.lines("pareto/status")),
         }
     return page
+
+
+def _bounds(source: Source) -> dict[str, dict[str, Any]]:
+    """What no members do better, beside the best of a run or a front; of the objectives for which theory gives it."""
+    if source.view.kind not in ("run", "pareto"):
+        return {}
+    found = compared(source.case, source.view)
+    largest = {each.name for each in source.case.objectives if each.sense == "maximize"}
+    return {
+        name: {"value": each.bound, "why": each.why, "best": each.best, "gap": each.gap, "above": name in largest}
+        for name, each in found.items()
+        if each.bound is not None
+    }
 
 
 def _what(case: Case, name: str) -> str:

@@ -142,7 +142,10 @@
     data.objectives.forEach((objective, i) => {
       const ys = data.iterations.objectives[i], xs = ys.map((_, k) => k);
       const known = ys.filter((y) => y !== null), log = Math.min(...known) > 0 && Math.max(...known) > 20 * Math.min(...known);
-      line(chart(at("convergence"), `convergence of ${objective.name}`, "iteration", `${objective.name}, ${objective.unit}`, xs, ys, log), xs, ys, COLOURS[i % COLOURS.length]);
+      const bound = objective.bound ? [objective.bound.value] : [], drawn = log && bound.some((y) => y <= 0) ? [] : bound;
+      const c = chart(at("convergence"), `convergence of ${objective.name}${drawn.length ? "; dashed: its bound" : ""}`, "iteration", `${objective.name}, ${objective.unit}`, xs, ys.concat(drawn), log);
+      line(c, xs, ys, COLOURS[i % COLOURS.length]);
+      for (const y of drawn) line(c, [xs[0], xs[xs.length - 1]], [y, y], "#000").setAttribute("stroke-dasharray", "4 3");
     });
   };
 
@@ -173,6 +176,14 @@
       for (const cell of row) tr.insertCell().textContent = cell;
     }
     at("numbers").replaceChildren(table);
+    for (const o of data.objectives) {
+      if (!o.bound) continue;
+      const p = document.createElement("p"), gap = o.bound.gap;
+      const reached = o.bound.best === null ? "" : `; best ${number(o.bound.best, 7)}${gap === null ? "" : `, a gap of ${number(100 * gap, 3)} %`}`;
+      p.textContent = `${o.name}: ${o.bound.above ? "at most" : "at least"} ${number(o.bound.value, 7)} ${o.unit} with any members${reached}. ${o.bound.why}.`;
+      p.className = "bound";
+      at("numbers").appendChild(p);
+    }
   };
 
   const refresh = () => {
