@@ -2,6 +2,7 @@
 #
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
+#   make test-lowest              the same with the lowest versions of dependencies that pyproject.toml allows
 #   make lint, make types         ruff; mypy
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
@@ -13,6 +14,8 @@
 
 PYTHON ?= $(or $(shell command -v python3.11),python3)
 VENV ?= .venv
+# the environment of `make test-lowest`
+LOWEST ?= .venv-lowest
 BIN := $(VENV)/bin
 CASE ?= cases/fig6.yaml
 RESULT := results/$(basename $(notdir $(CASE))).h5
@@ -28,10 +31,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test lint types docs reproduce bench peers readme clean
+.PHONY: help run test test-lowest lint types docs reproduce bench peers readme clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,12p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,13p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -63,6 +66,20 @@ reproduce: $(VENV)/.ready-plot
 
 test: $(VENV)/.ready-dev
 	$(BIN)/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
+
+# What a plain installation, pictures and a cluster need, each at its lower bound; the tools of development as they are.
+$(LOWEST)/.ready: pyproject.toml
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(PYTHON) -c 'import tomllib; \
+	  project = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+	  extras = project["optional-dependencies"]; \
+	  print(*(each.replace(">=", "==") for each in project["dependencies"] + extras["plot"] + extras["cluster"]), sep="\n")' \
+	  > $(LOWEST)/lowest.txt
+	$(LOWEST)/bin/python -m pip install --quiet --constraint $(LOWEST)/lowest.txt --editable '.[dev]'
+	@touch $@
+
+test-lowest: $(LOWEST)/.ready
+	$(LOWEST)/bin/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
@@ -98,5 +115,5 @@ readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme
 
 clean:
-	rm -rf $(VENV) build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(LOWEST) build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

