@@ -204,13 +204,20 @@ def dynamic() -> tuple[Problem, ...]:
 
 
 def named(names: "list[str] | None") -> list[Problem]:
-    """The problems whose names begin with one of `names`; all of them without. Raises ValueError for a name that none
-    has."""
+    """The problems of these names, or whose names begin so where none has the name; all without. Raises ValueError for
+    a name that none begins with."""
     everything = all()
-    for name in names or []:
-        if not any(each.name.startswith(name) for each in everything):
+    if not names:
+        return everything
+    chosen = []
+    for name in names:
+        own = [each for each in everything if each.name == name] or [
+            each for each in everything if each.name.startswith(name)
+        ]
+        if not own:
             raise ValueError(f"no problem {name!r}; there are: {', '.join(each.name for each in everything)}")
-    return [each for each in everything if not names or each.name.startswith(tuple(names))]
+        chosen += [each for each in own if each not in chosen]
+    return chosen
 
 
 def _known(problem: Problem) -> Problem:

@@ -99,12 +99,14 @@ def race(problem: Problem, starts: int, budget: int) -> dict[str, Any]:
 
 
 def write_rivals(chosen: Sequence[Problem], starts: int, budget: int) -> None:
-    """Race the others and keep what they reach."""
+    """Race the others and keep what they reach, and the best of mdstopo with as many starts."""
     for problem in chosen:
         if problem.kind != "dynamic":
             continue
         kept = json.loads(KEPT_RESULTS.read_text()) if KEPT_RESULTS.exists() else {}
         kept[problem.name] = entry = race(problem, starts, budget)
+        own, _, _ = ours(problem, starts, budget)
+        entry["ours"] = own[-1][1] if own else None
         KEPT_RESULTS.write_text(json.dumps(kept, separators=(",", ":")).replace('},"', '},\n"') + "\n")
         for method, each in entry["methods"].items():
             last = each["improvements"][-1] if each["improvements"] else None
@@ -118,12 +120,15 @@ def rivals_of(problem: Problem) -> dict[str, Any] | None:
 
 
 def best_known(problem: Problem) -> float | None:
-    """The exact value, or the best that one of the others found; None where nobody found any design."""
+    """The exact value, or the best that is kept of anybody; None where nobody found any design."""
     if problem.exact is not None:
         return problem.exact
     entry = rivals_of(problem)
-    methods = {} if entry is None else entry["methods"]
-    return min((each["improvements"][-1][1] for each in methods.values() if each["improvements"]), default=None)
+    if entry is None:
+        return None
+    lasts = [each["improvements"][-1][1] for each in entry["methods"].values() if each["improvements"]]
+    own = entry.get("ours")
+    return min([*lasts, *([] if own is None else [own])], default=None)
 
 
 def within(found: Sequence[Sequence[float]], best: float) -> int | None:

@@ -28,7 +28,9 @@ Floats = NDArray[np.float64]
 #: rows of each objective and of each side of a constraint
 PEAKS, HELD = 12, 6
 #: processor seconds of one attempt, most of which some solvers spend on their own subproblems
-SECONDS = 30.0
+SECONDS = 8.0
+#: evaluations of MMA's and CCSAQ's dual function for one step: their default, 100 000, takes seconds
+DUAL = 1000
 #: an evaluation that fails is so far from everything
 FAR = 1e3
 
@@ -329,6 +331,8 @@ def _nlopt(name: str) -> Callable[[Smooth, Floats], None]:
         optimizer.set_ftol_rel(1e-9)
         optimizer.set_xtol_rel(1e-9)
         optimizer.set_maxeval(20 * problem.budget)
+        if not slsqp:
+            optimizer.set_param("dual_maxeval", DUAL)
         try:
             optimizer.optimize(np.clip(first, low, high))
         except (nlopt.RoundoffLimited, nlopt.ForcedStop, RuntimeError):

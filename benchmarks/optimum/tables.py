@@ -115,8 +115,8 @@ def dynamic(chosen: Sequence[Problem], iterations: Sequence[int] = ITERATIONS) -
         ),
         rows,
         (
-            f"{words} of {len(rows) * len(iterations)} last words are true. *Best known* is what another optimiser "
-            "found with several starts, or the closed form; a single start may end at another optimum.",
+            f"{words} of {len(rows) * len(iterations)} last words are true. *Best known* is the closed form, or the "
+            "best that anybody found with several starts; a single start may end at another optimum.",
         ),
     )  # fmt: skip
     yield from untrue_table("Dynamic problems", untrue)

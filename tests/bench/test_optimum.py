@@ -184,3 +184,41 @@ def test_other_optimisers_find_the_isolator(method, module):
     case = problem.case()
     visited = attempt(case, method, case.space.reduce(case.start), 60)
     assert min(value for _, value, over in visited if over < 1e-5) == pytest.approx(problem.exact, rel=1e-4)
+
+
+def test_the_best_that_is_known_is_that_of_everybody(monkeypatch):
+    from benchmarks.optimum import race
+
+    problem = Problem("p", "dynamic", "{}")
+    methods = {"A": {"improvements": [[3, 9.0], [7, 8.0]]}, "B": {"improvements": []}}
+    monkeypatch.setattr(race, "rivals_of", lambda _: {"methods": methods, "ours": 7.5})
+    assert race.best_known(problem) == 7.5
+    monkeypatch.setattr(race, "rivals_of", lambda _: {"methods": methods, "ours": None})
+    assert race.best_known(problem) == 8.0
+    monkeypatch.setattr(race, "rivals_of", lambda _: None)
+    assert race.best_known(problem) is None
+
+
+def test_an_application_is_judged_by_its_limits_and_the_best_of_its_starts(monkeypatch):
+    from types import SimpleNamespace
+
+    from benchmarks.optimum import held
+
+    values = iter([(1.0, 0.0), (1.01, 0.0), (0.5, 0.1)])
+
+    def optimized(case, initial=None, starts=1):
+        value, over = next(values)
+        if initial is not None:
+            assert initial.shape == (case.n_design,)
+        return SimpleNamespace(
+            objectives={each.name: value for each in case.objectives},
+            constraints=np.array([over * abs(row.bound) for row in case.constraints]),
+            evaluations=10, status="converged",
+        )  # fmt: skip
+
+    monkeypatch.setattr(held, "optimize", optimized)
+    (table,) = held.applications(("tiedown",))
+    assert [row[-1] for row in table.rows] == ["yes", "yes", "NO"]
+    values = iter([(18.0, 0.0), (5.9, 0.0), (36.0, 0.0)])
+    (table,) = held.eight_starts()
+    assert [row[-1] for row in table.rows] == ["yes", "yes", "NO"]
