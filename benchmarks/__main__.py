@@ -25,13 +25,17 @@ SECTIONS = {
     "ring": "a closed loop of bodies beside other programs, forward runs too",
     "forward": "forward runs of the paper's bodies beside other programs",
     "million": "a million members beside JAX",
+    "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
 PEERS = ("peers", "ring", "forward", "million")
 
+#: what measures nothing, but looks for mistakes: no part of a run without names either
+CAMPAIGNS = ("damage",)
+
 #: what has no place in the README
-ELSEWHERE = (*PEERS, "applications")
+ELSEWHERE = (*PEERS, *CAMPAIGNS, "applications")
 
 
 def main() -> int:
@@ -42,7 +46,9 @@ def main() -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
-    parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but those with other programs")
+    parser.add_argument(
+        "sections", nargs="*", metavar="SECTION", help="default: all but those with other programs and damage"
+    )
     parser.add_argument("--peers", metavar="DIR", help="a folder of other programs to compare with, with its bench.py")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
@@ -55,7 +61,9 @@ def main() -> int:
     unknown = [name for name in chosen.sections if name not in SECTIONS]
     if unknown:
         parser.error(f"no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}")
-    sections = chosen.sections or ([] if chosen.peers else [name for name in SECTIONS if name not in PEERS])
+    sections = chosen.sections or (
+        [] if chosen.peers else [name for name in SECTIONS if name not in (*PEERS, *CAMPAIGNS)]
+    )
     machine = f"Measured on: {description()}."
     print(machine + "\n", flush=True)
     for table in outside(chosen.peers, chosen.peers_python) if chosen.peers else ():
