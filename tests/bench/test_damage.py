@@ -31,7 +31,10 @@ def test_every_way_to_end_is_told_from_the_others(tmp_path: Path, monkeypatch: p
     def fails() -> None:
         raise ValueError("a mistake")
 
-    ends = {"harmless": lambda: 0, "refused": lambda: 2, "wrong": lambda: 3, "traceback": fails, "crash": lambda: os.kill(os.getpid(), signal.SIGKILL)}
+    def crashes() -> None:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    ends = {"harmless": lambda: 0, "refused": lambda: 2, "wrong": lambda: 3, "traceback": fails, "crash": crashes}
     for name, work in ends.items():
         assert damage._outcome(*damage.apart(work, log), log) == name
     monkeypatch.setattr(damage, "LIMIT", 0.1)
