@@ -27,13 +27,17 @@ SECTIONS = {
     "ring": "a closed loop of bodies beside other programs, forward runs too",
     "forward": "forward runs of the paper's bodies beside other programs",
     "million": "a million members beside JAX",
+    "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
 PEERS = ("peers", "ring", "forward", "million")
 
-#: sections that take an hour are run where they are named
-NAMED = (*PEERS, "optimum")
+#: what looks for mistakes instead of measuring
+CAMPAIGNS = ("damage", "hunt")
+
+#: sections that take an hour, or measure nothing, are run where they are named
+NAMED = (*PEERS, *CAMPAIGNS, "optimum")
 
 #: what has no place in the README
 ELSEWHERE = (*NAMED, "applications", "bound")
@@ -48,7 +52,7 @@ def main() -> int:
         epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
     parser.add_argument(
-        "sections", nargs="*", metavar="SECTION", help="default: all but those with other programs and optimum"
+        "sections", nargs="*", metavar="SECTION", help="default: all but other programs, campaigns and optimum"
     )
     parser.add_argument("--peers", metavar="DIR", help="a folder of other programs to compare with, with its bench.py")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")

@@ -50,7 +50,7 @@ STATED = 1e-8
 @set_option
 @click.option("--starts", type=click.IntRange(1), default=None, metavar="N", help="How many starts for every solve.")
 @click.option("--workers", type=click.IntRange(1), metavar="N", help="At most so many processes (default: all cores).")
-@click.option("--cluster", metavar="ADDRESS", help="Workers of a Dask cluster instead, e.g. tcp://host:8786.")
+@click.option("--cluster", metavar="ADDRESS", help="Workers of a Dask cluster instead: tcp://host:8786, or tls://...")
 @output_options
 def command(
     case_path: Path,

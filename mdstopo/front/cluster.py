@@ -1,5 +1,9 @@
 """Pieces of work on a Dask cluster: `--cluster tcp://host:8786`, with the extra `cluster`.
 
+Whoever can reach its scheduler or a worker can have it run anything, and so can the scheduler here: Dask trusts them
+and the network between them. Where that is not to be trusted, use tls://host:8786: certificates are those of Dask's own
+settings (DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..._TLS__CLIENT__CERT, ..._TLS__CLIENT__KEY).
+
 The scheduler is Dask's, and so is what happens to pieces whose worker dies: they are given to another one.
 """
 
@@ -11,7 +15,7 @@ from typing import Any
 
 from mdstopo._version import __version__
 from mdstopo.front.jobs import Job, Setting, perform
-from mdstopo.front.pool import PATIENCE, Lost
+from mdstopo.front.pool import PATIENCE, Keep, Lost, ignore_both
 from mdstopo.session.errors import WorkerError
 from mdstopo.store.errors import StoreError
 
@@ -62,8 +66,8 @@ class Cluster:
         # goes with every piece: what is scattered dies with the workers that hold it
         self._setting = setting
 
-    def results(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]:
-        """As they are done. Raises WorkerError where the scheduler is gone."""
+    def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
+        """As they are done, nothing of what is not. Raises WorkerError where the scheduler is gone."""
         done: queue.Queue[Any] = queue.Queue()
         futures = {
             self._client.submit(perform_alone, self._setting, job, pure=False, retries=2): place

@@ -14,6 +14,7 @@ from mdstopo.case.model import Case
 from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, repeated, scaled, spacing
 from mdstopo.front.plan import TOLERATED, Front
 from mdstopo.front.tasks import Found
+from mdstopo.optimizer.state import State
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.status import RunStatus
 from mdstopo.store.contents import Datasets
@@ -77,6 +78,27 @@ def read_tasks(view: ResultView, place: str = "pareto/tasks") -> dict[str, Found
     except (KeyError, IndexError, ValueError) as error:
         raise DamagedError(f"{view.path}: damaged: its finished points are not whole ({error})") from error
     return found
+
+
+def begun_part(begun: Mapping[str, State], place: str = "pareto/tasks") -> Datasets:
+    """The optimisers' states of tasks that are being worked on, by their keys."""
+    part: Datasets = {}
+    for k, (key, state) in enumerate(begun.items()):
+        part[f"{place}/begun/{k}/key"] = key
+        part |= {f"{place}/begun/{k}/{name}": array for name, array in state.to_arrays().items()}
+    return part
+
+
+def read_begun(view: ResultView, place: str = "pareto/tasks") -> dict[str, State]:
+    """The states of tasks that were being worked on, by their keys. Raises DamagedError where they are not whole."""
+    found: dict[str, dict[str, NDArray[np.generic]]] = {}
+    for path, array in view.under(f"{place}/begun").items():
+        index, _, name = path.partition("/")
+        found.setdefault(index, {})[name] = array
+    try:
+        return {view.text(f"{place}/begun/{k}/key"): State.from_arrays(arrays) for k, arrays in found.items()}
+    except (KeyError, ValueError, TypeError) as error:
+        raise DamagedError(f"{view.path}: damaged: its unfinished points are not whole ({error})") from error
 
 
 def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Found]) -> Datasets:

@@ -11,6 +11,7 @@ import numpy as np
 
 from mdstopo.case.model import Case, FloatArray
 from mdstopo.front.tasks import Found, StoppedError, Task, failed, solve
+from mdstopo.optimizer.state import State
 from mdstopo.session.combining import even, problem_of
 from mdstopo.session.engine import Engine, make_engine
 from mdstopo.session.ready import compile_apart, get_ready
@@ -39,15 +40,17 @@ _KEPT = 2
 _engines: OrderedDict[str, Engine] = OrderedDict()
 
 
-def perform(setting: Setting, job: Job, stop: Callable[[], bool] | None = None) -> Any:
+def perform(
+    setting: Setting, job: Job, stop: Callable[[], bool] | None = None, keep: Callable[[State], None] | None = None
+) -> Any:
     """The result of one piece; whatever goes wrong in it is its status, so that it fails nothing else.
 
-    Raises StoppedError where `stop` says so before the end.
+    keep: is given the states of a task's optimiser. Raises StoppedError where `stop` says so before the end.
     """
     try:
         if isinstance(job, Trial):
             return run_trial(job, stop)
-        return solve(ready_engine(setting), setting.case, job, job.key(setting.case_key), stop)
+        return solve(ready_engine(setting), setting.case, job, job.key(setting.case_key), stop, keep)
     except StoppedError:
         raise
     except Exception as error:

@@ -6,13 +6,32 @@ dies is replaced once for each piece it had; then the piece comes back as an err
 """
 
 import queue
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from mdstopo.front.jobs import Job, Setting, perform
 from mdstopo.front.tasks import StoppedError
+from mdstopo.optimizer.state import State
 from mdstopo.session.crew import WorkerProcess
+
+Keep = Callable[[int, State], None]
+
+
+def ignore_both(place: int, state: State) -> None:
+    """Keep nothing."""
+
+
+@dataclass(frozen=True)
+class Reached:
+    """What a worker says in the middle of a task: its optimiser's state as arrays."""
+
+    arrays: Mapping[str, NDArray[np.generic]]
+
 
 #: seconds between two looks at whether to stop
 PATIENCE = 0.1
@@ -28,12 +47,13 @@ class Lost:
 class Pool(Protocol):
     """Does pieces of work. `results` yields (place, result) as they are done, and ends early where it is to stop.
 
-    at_once: how many pieces are worked on together; 0 where that is not known.
+    keep: is given (place, state) of tasks that are being worked on, as time goes by. at_once: how many pieces are
+    worked on together; 0 where that is not known.
     """
 
     at_once: int
 
-    def results(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]: ...
+    def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]: ...
     def close(self) -> None: ...
 
 
@@ -46,13 +66,13 @@ class Here:
         self._setting = setting
         self._stop = stop
 
-    def results(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]:
+    def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
         """In order."""
         for place, job in enumerate(jobs):
             if self._stop():
                 return
             try:
-                result = perform(self._setting, job, self._stop)
+                result = perform(self._setting, job, self._stop, partial(keep, place))
             except StoppedError:
                 return
             yield place, result
@@ -71,7 +91,7 @@ class Processes:
         self._crew: list[WorkerProcess] = []
         self._inbox: queue.Queue[tuple[WorkerProcess, Any]] = queue.Queue()
 
-    def results(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Any]]:
+    def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
         """As they are done."""
         todo = list(range(len(jobs)))
         doing: dict[WorkerProcess, int] = {}
@@ -97,6 +117,9 @@ class Processes:
                     todo.insert(0, place)
                 elif place >= 0:
                     yield place, Lost()
+                continue
+            if isinstance(message, Reached):
+                keep(doing[worker], State.from_arrays(message.arrays))
                 continue
             yield doing.pop(worker), message
 

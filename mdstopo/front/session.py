@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.front.content import Quality, front_part, quality, read_tasks, tasks_part
+from mdstopo.front.content import Quality, begun_part, front_part, quality, read_begun, read_tasks, tasks_part
 from mdstopo.front.jobs import Setting, perform
 from mdstopo.front.plan import Front, NoEndError, Planner, Request
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.tasks import Found, StoppedError, Task, case_key, failed
 from mdstopo.native.threads import cores
 from mdstopo.optimizer.starts import random_feasible
+from mdstopo.optimizer.state import State
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even
@@ -122,7 +123,8 @@ def run_front(
         remove_leftovers(place)
         if resume:
             view = admit_resume(place, case, run.notify, "pareto")
-            run.solved = {} if view is None else read_tasks(view)
+            if view is not None:
+                run.solved, run.begun = read_tasks(view), read_begun(view)
         else:
             admit(place, case, "pareto", overwrite, run.notify)
         return run.go(place, workers, cluster, worth)
@@ -162,6 +164,8 @@ class _FrontRun:
         #: finished tasks by key: those of an earlier process, and those of this one in the plan's order
         self.solved: dict[str, Found] = {}
         self.taken: dict[str, Found] = {}
+        #: the optimisers' states of tasks that are being worked on
+        self.begun: dict[str, State] = {}
         self.warnings = tuple(mistake.message for mistake in case.warnings)
         self.pool: Pool | None = None
 
@@ -239,7 +243,8 @@ class _FrontRun:
                 self.pool = self.choose_pool(tasks[due[0]])
             running = {i: tasks[i].point for i in due}
             self.tell(running)  # the first of them, as many as there are workers
-            for place, result in self.pool.results([tasks[i] for i in due]):
+            jobs = [replace(tasks[i], begun=self.begun.get(keys[i])) for i in due]
+            for place, result in self.pool.results(jobs, lambda place, state: self.hold(keys[due[place]], state)):
                 i = due[place]
                 running.pop(i)
                 self.keep(keys[i], self.lost(tasks[i], result) if isinstance(result, Lost) else result, running)
@@ -257,7 +262,7 @@ class _FrontRun:
             return Cluster(self.setting, self.stop, self.cluster)
         wanted = cores() if self.workers is None else self.workers
         if wanted > 1:
-            look = perform(self.setting, replace(task, iterations=LOOK), self.stop)
+            look = perform(self.setting, replace(task, iterations=LOOK, begun=None), self.stop)
             left = look.seconds / max(look.evaluations, 1) * EVALUATIONS * TASKS * len(self.ask.directions)
             left *= 1.0 - min(len(self.solved) / (TASKS * len(self.ask.directions)), 1.0)
             if left > self.worth:
@@ -268,9 +273,16 @@ class _FrontRun:
         """What stands for a task that no worker finished; its key is empty, so that a resumed front tries again."""
         return failed(task.point, "", task.start, len(self.case.objectives), result.reason)
 
+    def hold(self, key: str, state: State) -> None:
+        """Take in how far a task has come, and write it where that is due."""
+        self.begun[key] = state
+        if self.saver is not None:
+            self.saver.offer()
+
     def keep(self, key: str, found: Found, running: dict[int, int]) -> None:
         """Take a result in, and write it."""
         self.solved[key] = found
+        self.begun.pop(key, None)
         self.tell(running)
         if self.saver is not None:
             self.saver.offer(urgent=found.seconds > INTERVAL)
@@ -330,7 +342,7 @@ class _FrontRun:
         datasets = self.fixed | tasks_part(tasks, self.case)
         settings = dict(self.settings)
         if front is None:
-            datasets |= front_part(self.case, self.ask.directions, self.so_far(), tasks)
+            datasets |= front_part(self.case, self.ask.directions, self.so_far(), tasks) | begun_part(self.begun)
         else:
             datasets |= front_part(self.case, self.ask.directions, front, tasks)
             assert self.quality is not None

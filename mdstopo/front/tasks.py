@@ -15,6 +15,7 @@ from mdstopo.case.model import Case
 from mdstopo.optimizer.driver import Gsao, run
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.optimizer.state import State
 from mdstopo.session.engine import Engine
 from mdstopo.status import RunStatus
 from mdstopo.store.compare import describe
@@ -26,13 +27,15 @@ Floats = NDArray[np.float64]
 class Task:
     """point: which point of the front it is for, or -1 - i for the optimum of objective i alone.
 
-    start (n,): the optimiser's x to begin with; iterations: at most so many.
+    start (n,): the optimiser's x to begin with; iterations: at most so many. begun: the optimiser's state where an
+    earlier process left the task; what is found does not depend on it.
     """
 
     point: int
     scalarisation: Scalarisation
     start: Floats
     iterations: int
+    begun: State | None = None
 
     def key(self, case_key: str) -> str:
         """The hash of all that the result depends on."""
@@ -94,10 +97,18 @@ class StoppedError(Exception):
     """A task was left in the middle."""
 
 
-def solve(engine: Engine, case: Case, task: Task, key: str, stop: Callable[[], bool] | None = None) -> Found:
+def solve(
+    engine: Engine,
+    case: Case,
+    task: Task,
+    key: str,
+    stop: Callable[[], bool] | None = None,
+    keep: Callable[[State], None] | None = None,
+) -> Found:
     """Run the task to its end. Never raises because of a design: a failure is a status.
 
-    Raises StoppedError where `stop` says so before the end.
+    keep: is given every state, from which the task could go on. Raises StoppedError where `stop` says so before the
+    end.
     """
     began = time.perf_counter()
     chosen = case.optimizer
@@ -106,7 +117,8 @@ def solve(engine: Engine, case: Case, task: Task, key: str, stop: Callable[[], b
         problem,
         settings(chosen.preset, dict(chosen.options), max_iterations=task.iterations, tolerance=chosen.tolerance),
     )
-    state = run(optimizer, optimizer.start(task.start), stop_requested=stop)
+    first = optimizer.start(task.start) if task.begun is None else task.begun
+    state = run(optimizer, first, on_iteration=keep, stop_requested=stop)
     if state.running:
         raise StoppedError
     visited = np.array(state.history.info["objectives"]).reshape(-1, len(case.objectives))

@@ -1,6 +1,7 @@
 """How a run makes one U of several objectives: utopia and maxima first, by optimising each alone (Eq. 24)."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from mdstopo.front.plan import NoEndError, Planner, Request
 from mdstopo.front.tasks import Found, StoppedError, Task, case_key, solve
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.optimizer.state import State
 from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.callbacks import ignore
 from mdstopo.session.engine import Engine
@@ -37,6 +39,8 @@ class Combining:
         self.case = case
         #: finished solves by key
         self.solved: dict[str, Found] = {}
+        #: the optimisers' states of solves that were left in the middle, by key
+        self.begun: dict[str, State] = {}
         self.used: set[str] = set()
         #: those of an earlier process whose iterates go on: they stay, whatever options have changed
         self.fixed: tuple[Floats, Floats] | None = None
@@ -92,7 +96,7 @@ class Combining:
                     if key not in self.solved:
                         if stop():
                             raise StoppedError
-                        self.solved[key] = solve(engine, case, task, key, stop)
+                        self.solved[key] = self._solved(engine, task, key, keep, stop)
                         notify(_sentence(case, task, self.solved[key]))
                         keep()
                     self.used.add(key)
@@ -103,15 +107,30 @@ class Combining:
         except NoEndError as error:
             name = case.objectives[error.place].name
             raise NoUtopiaError(f"objective {name} alone cannot be optimised: {error}") from error
+        self.begun.clear()
         self.utopia, self.maxima = signs * planner.lowest, signs * planner.highest
         return Scalarisation(combine.method, weights, planner.lowest, planner.highest, combine.exponent)
 
+    def _solved(
+        self, engine: Engine, task: Task, key: str, keep: Callable[[], None], stop: Callable[[], bool]
+    ) -> Found:
+        """What a solve finds, from where an earlier process left it; `keep` is called after each iteration."""
+
+        def hold(state: State) -> None:
+            self.begun[key] = state
+            keep()
+
+        found = solve(engine, self.case, replace(task, begun=self.begun.get(key)), key, stop, hold)
+        self.begun.pop(key, None)
+        return found
+
     def part(self, visited: Floats) -> Datasets:
         """What the result file holds of it. visited (K, m): raw values so far, for better utopia than was known."""
-        from mdstopo.front.content import tasks_part
+        from mdstopo.front.content import begun_part, tasks_part
 
         kept = [found for key, found in self.solved.items() if key in self.used] or list(self.solved.values())
         part: Datasets = tasks_part(kept, self.case, "combine/tasks") if kept else {}
+        part |= begun_part(self.begun, "combine/tasks")
         if self.utopia is not None and self.maxima is not None:
             signs = np.array([sign_of(objective) for objective in self.case.objectives])
             found = np.concatenate([visited * signs, (self.utopia * signs)[None]])

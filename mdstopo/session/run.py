@@ -220,9 +220,10 @@ class _Run:
     def restore(self, view: ResultView) -> None:
         """Take up the states of an earlier process."""
         if len(self.case.objectives) > 1:
-            from mdstopo.front.content import read_tasks
+            from mdstopo.front.content import read_begun, read_tasks
 
             self.combining.solved = read_tasks(view, "combine/tasks")
+            self.combining.begun = read_begun(view, "combine/tasks")
         before = view.arrays.get("design/initial")
         if self.initial is not None and (before is None or not np.array_equal(before, self.initial)):
             raise DifferentCaseError(

@@ -1,0 +1,162 @@
+"""What a front, or the individual optima of a run, has reached within a solve is kept, and gone on from."""
+
+import io
+import pickle
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from mdstopo.case.reader import read_case
+from mdstopo.front import tasks
+from mdstopo.front.pool import Processes, Reached
+from mdstopo.front.session import Ask, run_front
+from mdstopo.front.worker import _Sender
+from mdstopo.optimizer.state import State
+from mdstopo.session.run import run_session
+from mdstopo.store.checkpoint import Checkpointer
+from mdstopo.store.reader import read_result
+from tests.front.support import CASE
+
+WALL_TIMES = {"seconds", "created"}
+
+
+@pytest.fixture(autouse=True)
+def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.fixture
+def starts(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many designs had been evaluated where each solve of this process began."""
+    found: list[int] = []
+    run = tasks.run
+
+    def noted(optimizer: Any, state: State, **more: Any) -> State:
+        found.append(int(state.evaluations))
+        return run(optimizer, state, **more)
+
+    monkeypatch.setattr(tasks, "run", noted)
+    return found
+
+
+def spread(count: int) -> np.ndarray:
+    share = np.linspace(0.0, 1.0, count)
+    return np.stack([share, 1.0 - share], axis=1)
+
+
+def after(count: int) -> Callable[[], bool]:
+    """Stops when it has been asked so often: once before a solve, and once in each of its iterations."""
+    asked = iter(range(1_000_000))
+    return lambda: next(asked) > count
+
+
+def assert_same(one: str, other: str) -> None:
+    first, second = read_result(one), read_result(other)
+    assert first.texts == second.texts
+    assert first.arrays.keys() == second.arrays.keys()
+    for name, array in first.arrays.items():
+        if name.rpartition("/")[2] not in WALL_TIMES:
+            assert np.asarray(array).tobytes() == np.asarray(second.arrays[name]).tobytes(), name
+
+
+def test_a_front_that_is_stopped_within_a_solve_goes_on_within_it(starts: list[int]) -> None:
+    case, ask = read_case(CASE), Ask(spread(3))
+    run_front(case, ask, path=Path("whole.h5"), workers=1)
+    first = run_front(case, ask, path=Path("parts.h5"), workers=1, stop_requested=after(9))
+    assert first.status == "interrupted"
+    with h5py.File("parts.h5") as file:
+        assert list(file["pareto/tasks/begun"]) == ["0"]
+    starts.clear()
+    run_front(case, ask, path=Path("parts.h5"), resume=True, workers=1)
+    assert starts[0] > 2
+    assert set(starts[1:]) == {1}
+    assert_same("whole.h5", "parts.h5")
+
+
+def test_individual_optima_of_a_run_go_on_within_a_solve(starts: list[int]) -> None:
+    case = read_case(CASE)
+    run_session(case, path="whole.h5")
+    with pytest.raises(KeyboardInterrupt):
+        run_session(case, path="parts.h5", stop_requested=after(9))
+    starts.clear()
+    run_session(case, path="parts.h5", resume=True)
+    assert starts[0] > 2
+    assert_same("whole.h5", "parts.h5")
+
+
+def test_a_front_that_is_killed_in_its_first_solve_has_saved_what_it_had() -> None:
+    """A solve of many seconds: something is there after the first of them, and goes on."""
+    slow = CASE.replace("max_iterations: 40", "max_iterations: 4000, tolerance: 0").replace("end: 0.2", "end: 3")
+    Path("slow.yaml").write_text(slow)
+    command = [sys.executable, "-m", "mdstopo", "pareto", "slow.yaml", "--points", "2", "--quiet", "--workers", "1"]
+    process = subprocess.Popen([*command, "--out", "slow.h5"])
+    end = time.monotonic() + 120
+    while not Path("slow.h5").exists() and process.poll() is None and time.monotonic() < end:
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    view = read_result("slow.h5")
+    assert view.lines("pareto/tasks/key") == ()
+    assert view.array("pareto/tasks/begun/0/evaluations") >= 1
+
+
+def reached() -> State:
+    """A state of an optimiser."""
+    found: list[State] = []
+    case = read_case(CASE)
+    run_front(case, Ask(spread(2)), path=Path("x.h5"), workers=1, stop_requested=after(4))
+    from mdstopo.front.content import read_begun
+
+    found += read_begun(read_result("x.h5")).values()
+    return found[0]
+
+
+def test_workers_send_what_they_have_reached_now_and_then() -> None:
+    output, now = io.BytesIO(), [0.0]
+    sender = _Sender(output)
+    sender._timer = Checkpointer(sender._send, clock=lambda: now[0])
+    state = reached()
+    for _ in range(10):
+        now[0] += 0.1
+        sender.keep(state)
+    output.seek(0)
+    messages = []
+    while output.tell() < len(output.getvalue()):
+        messages.append(pickle.load(output))
+    assert 1 <= len(messages) <= 3
+    assert State.from_arrays(messages[0].arrays).evaluations == state.evaluations
+
+
+def test_what_workers_have_reached_is_kept_until_they_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    state, kept = reached(), []
+
+    class Fake:
+        def send(self, job: Any) -> None:
+            pool._inbox.put((self, Reached(state.to_arrays())))
+            pool._inbox.put((self, f"found {job}"))
+
+        def kill(self) -> None:
+            pass
+
+    pool = Processes(None, lambda: False, 1)  # type: ignore[arg-type]
+    worker = Fake()
+    monkeypatch.setattr(pool, "_idle", lambda doing: worker)
+    results = list(pool.results(["a", "b"], lambda place, each: kept.append((place, each.evaluations))))  # type: ignore[list-item]
+    assert results == [(0, "found a"), (1, "found b")]
+    assert kept == [(0, state.evaluations), (1, state.evaluations)]
+
+
+def test_where_a_task_was_left_does_not_change_its_key() -> None:
+    state = reached()
+    from mdstopo.optimizer.scalarisation import Scalarisation
+
+    task = tasks.Task(0, Scalarisation("weighted_sum", np.ones(2)), np.ones(3), 5)
+    assert replace(task, begun=state).key("k") == task.key("k")
