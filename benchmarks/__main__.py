@@ -19,6 +19,7 @@ SECTIONS = {
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
+    "rows": "cost of many competing peaks and members, whose gradients are pulled back in one sweep",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",
@@ -31,7 +32,7 @@ SECTIONS = {
 PEERS = ("peers", "ring", "forward", "million")
 
 #: what has no place in the README
-ELSEWHERE = (*PEERS, "applications")
+ELSEWHERE = (*PEERS, "applications", "rows")
 
 
 def main() -> int:

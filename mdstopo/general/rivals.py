@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 #: members that are followed at most, unless more rows than these are asked for
 RIVALS = 12
+#: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
+#: pass, with those alone that come near the largest
+AT_ONCE = 2**21
 
 
 def compete(kind: int, reduction: str) -> bool:
@@ -39,19 +42,24 @@ def members_peaks(
         places = np.empty((count * len(FRACTIONS), 2))
         places[:, 0] = np.repeat(np.arange(count), len(FRACTIONS))
         places[:, 1] = np.tile(FRACTIONS, count)
-    top, _ = _compare(driver, j, places, np.zeros(0, dtype=np.int64), count)
+    members = np.arange(_members(driver, j))
+    at_once = not final and len(members) * len(places) <= AT_ONCE
+    nobody = np.zeros(0, dtype=np.int64)
+    top, seen_all = _compare(driver, j, places, members if at_once else nobody, count)
     near = np.flatnonzero(top >= (1.0 - window) * top.max())
     who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(RIVALS, most)]])
     if final:
-        seen = [driver.visit(j, places, True, count, who=int(i))[2][0] for i in who]
+        seen = [driver.see_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [np.array([t[-1], s[0], count - 1.0, 1.0, s[1], 1.0, i]) for s, i in zip(seen, who, strict=True)]
-    _, seen_all = _compare(driver, j, places, who, count)
+    seen_all = seen_all[who] if at_once else _compare(driver, j, places, who, count)[1]
     rows = []
     for i, seen_one in zip(who.tolist(), seen_all, strict=True):
         shaped = seen_one.reshape(count, len(FRACTIONS), 2)
         samples = Samples(t, shaped[:, :, 0], shaped[:, :, 1], np.full(shaped.shape[:2], float(i)))
 
         def see(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
+            if exact and len(places) == 1:
+                return driver.see_one(j, count, places[0], who)[None].copy()
             return driver.visit(j, places, exact, count, who=who)[2]
 
         rows += peaks(samples, see, 1.0, window)
@@ -62,13 +70,16 @@ def _compare(
     driver: "GeneralDriver", j: int, places: FloatArray, who: IndexArray, count: int
 ) -> tuple[FloatArray, FloatArray]:
     """The largest |f*| of every member (count of members,), and |f*| with rate of some (C, K, 2), at places (K, 2)."""
-    model = driver.scene.model
-    group = int(model.response[j, 5])
-    own = model.block[model.block[:, GROUP] == group]
-    members = int((own[:, OFFSET] + own[:, COUNT]).max())
-    top, seen = np.zeros(members), np.zeros((len(who), len(places), 2))
+    top, seen = np.zeros(_members(driver, j)), np.zeros((len(who), len(places), 2))
     driver.entry.compare(
         driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,
         driver.room_ints, driver.strength, j, places, who, top, seen, driver.work,
     )  # fmt: skip
     return top, seen
+
+
+def _members(driver: "GeneralDriver", j: int) -> int:
+    """How many members the group has whose force response j looks at."""
+    model = driver.scene.model
+    own = model.block[model.block[:, GROUP] == int(model.response[j, 5])]
+    return int((own[:, OFFSET] + own[:, COUNT]).max())
