@@ -21,6 +21,8 @@ RIVALS = 12
 #: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
 #: pass, with those alone that come near the largest
 AT_ONCE = 2**21
+#: by how much, relative, the samples of a force may lie beside it
+BESIDE = 0.02
 
 
 def compete(kind: int, reduction: str) -> bool:
@@ -52,8 +54,10 @@ def members_peaks(
         seen = [driver.see_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [np.array([t[-1], s[0], count - 1.0, 1.0, s[1], 1.0, i]) for s, i in zip(seen, who, strict=True)]
     seen_all = seen_all[who] if at_once else _compare(driver, j, places, who, count)[1]
+    limit = _least(top, window, most)
     rows = []
     for i, seen_one in zip(who.tolist(), seen_all, strict=True):
+        own = min(window, 1.0 - limit / top[i]) if top[i] > 0.0 else window
         shaped = seen_one.reshape(count, len(FRACTIONS), 2)
         samples = Samples(t, shaped[:, :, 0], shaped[:, :, 1], np.full(shaped.shape[:2], float(i)))
 
@@ -62,8 +66,20 @@ def members_peaks(
                 return driver.see_one(j, count, places[0], who)[None].copy()
             return driver.visit(j, places, exact, count, who=who)[2]
 
-        rows += peaks(samples, see, 1.0, window)
+        rows += peaks(samples, see, 1.0, own)
     return rows
+
+
+def _least(top: FloatArray, window: float, most: int) -> float:
+    """The value below which no peak is among the `most` highest within the window, by the highest of each member (M,).
+
+    So many members have a peak at least as high as the last of them. Samples lie beside the motion by what the steps'
+    quintic is off.
+    """
+    least = (1.0 - window) * float(top.max())
+    if len(top) >= most:
+        least = max(least, float(np.partition(top, -most)[-most]))
+    return (1.0 - BESIDE) * least
 
 
 def _compare(

@@ -20,7 +20,7 @@ IMPLICIT = {"integrator": "generalized_alpha", "step": 0.004}
 def every_row(evaluator, design, **asked):
     found = evaluator.evaluate(design, rows=ALL, **asked)
     assert found.status.ok, found.message
-    return {name: peaks for name, peaks in [*found.peaks.items(), *found.constraint_peaks.items()]}
+    return dict([*found.peaks.items(), *found.constraint_peaks.items()])
 
 
 def differ(one, two):
@@ -120,3 +120,13 @@ def test_a_hundred_rows_take_one_sweep_of_design_passes():
     assert many["reverse_steps"] > 20 * few["reverse_steps"]
     of_rows = many["force_sums"] - values[1]["force_sums"]
     assert of_rows <= 60 * (few["force_sums"] - values[0]["force_sums"])
+
+
+@pytest.mark.parametrize("asked", [Rows(), Rows(1.0, 12), Rows(1.0, 30), Rows(0.3, 100)])
+def test_leaving_out_peaks_that_are_too_low_to_be_told_changes_none_that_is(asked, monkeypatch):
+    evaluator = Evaluator(grid(30))
+    design = evaluator.case.start * np.random.default_rng(2).uniform(0.3, 1.3, len(evaluator.case.start))
+    found = evaluator.evaluate(design, False, rows=asked).peaks["F"]
+    monkeypatch.setattr(rivals, "_least", lambda *_: -1e300)
+    every = evaluator.evaluate(design, False, rows=asked).peaks["F"]
+    assert [peak[:2] for peak in found] == [peak[:2] for peak in every]
