@@ -19,6 +19,7 @@ SECTIONS = {
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
+    "rows": "cost of many competing peaks and members, whose gradients are pulled back in one sweep",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
@@ -40,7 +41,7 @@ CAMPAIGNS = ("damage", "hunt")
 NAMED = (*PEERS, *CAMPAIGNS, "optimum")
 
 #: what has no place in the README
-ELSEWHERE = (*NAMED, "applications", "bound")
+ELSEWHERE = (*NAMED, "applications", "bound", "rows")
 
 
 def main() -> int:

@@ -94,8 +94,8 @@ class GeneralDriver:
         self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
         self.where = np.full(3, -1, dtype=np.int64)
         n = len(model.mass)
-        #: what `visit` is given for the end alone, and `pull`
-        self._end = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
+        #: what `visit` is given for one place, and `pull`
+        self._one = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
         self._pulled = np.zeros(n_design + varied)
         self._blocks: dict[int, _Block] = {}
         self._make_rows(ROWS)
@@ -210,6 +210,8 @@ class GeneralDriver:
 
     def see(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
         """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
+        if exact and rates and len(places) == 1:
+            return self.see_one(j, count, places[0])[None].copy()
         return self.visit(j, places, exact, count, rates=rates)[2]
 
     def _grazing(self) -> int:
@@ -243,7 +245,7 @@ class GeneralDriver:
             found = members_peaks(self, j, t.copy(), reduction == "final", window, most)
             found = ranked(found, window, most, t[-1] - t[0])
         elif reduction == "final":
-            value, rate, who = self._see_end(j, count).tolist()
+            value, rate, who = self.see_one(j, count, np.array([count - 1.0, 1.0])).tolist()
             found = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
         elif reduction == "min":
             found = ranked(minima(self, j, t.copy()), window, most, t[-1] - t[0])
@@ -292,13 +294,14 @@ class GeneralDriver:
         """How many `visit` gives: of the solved rows and of the driven coordinates."""
         return int(self.scene.model.size[0]) + len(self.scene.model.driven)
 
-    def _see_end(self, j: int, count: int) -> FloatArray:
-        """(3,) value, rate, member of response j at the end."""
-        places, out, lam, seen = self._end
-        places[0] = count - 1.0, 1.0
+    def see_one(self, j: int, count: int, place: FloatArray, who: int = -1) -> FloatArray:
+        """(3,) value, rate, member of response j at one place (2,), exactly; who: as of `visit`. The array is the
+        driver's own: the next call overwrites it."""
+        places, out, lam, seen = self._one
+        places[0] = place
         self._ready(
             "visit", self.entry.visit, self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count,
-            self.room, self.room_ints, self.strength, True, True, j, -1, places, out, lam, seen, self.work,
+            self.room, self.room_ints, self.strength, True, True, j, who, places, out, lam, seen, self.work,
         )  # fmt: skip
         found: FloatArray = seen[0]
         return found

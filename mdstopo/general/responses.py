@@ -4,6 +4,8 @@ A response is evaluated at a state whose balance has just been made (`balance`),
 multipliers are at hand. A new response is one more kind here, with its slopes.
 """
 
+import math
+
 import numpy as np
 
 from mdstopo.general.balance import balance, gather, gather_multipliers
@@ -81,6 +83,46 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  
             slopes[0, r] += scale * (by_x * own[0, r] + by_rate * own[1, r])
             slopes[1, r] += scale * by_rate * own[0, r]
     return total, pair
+
+
+@kernel
+def group_forces(model, strength, segment, t, group, q, v, a, out):  # type: ignore[no-untyped-def]
+    """out (M,) = f* of all members of a group: that of `member_force`, to the bit, without slopes."""
+    row = np.empty(6)
+    member = model.member
+    out[:] = 0.0
+    for k in range(model.block.shape[0]):
+        if model.block[k, 6] != group or model.active[segment, k] == 0:
+            continue
+        one = 3 * model.pair[model.block[k, 0], 0]
+        two = 3 * model.pair[model.block[k, 0], 1]
+        ca = math.cos(q[one + 2])
+        sa = math.sin(q[one + 2])
+        cb = math.cos(q[two + 2])
+        sb = math.sin(q[two + 2])
+        wa = v[one + 2]
+        wb = v[two + 2]
+        value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
+        first = model.block[k, 7] - model.block[k, 1]
+        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            scale = strength[0, i]
+            if model.block[k, 3] == INERTER:
+                out[first + i] += scale * inerter_force(model, k, i, q, v, a, row)
+                continue
+            px = ca * member[0, i] - sa * member[1, i]
+            py = sa * member[0, i] + ca * member[1, i]
+            qx = cb * member[2, i] - sb * member[3, i]
+            qy = sb * member[2, i] + cb * member[3, i]
+            ux = q[two] + qx - q[one] - px
+            uy = q[two + 1] + qy - q[one + 1] - py
+            length = math.sqrt(ux * ux + uy * uy)
+            y = 1.0 / length if length > 1e-15 else 0.0
+            dx = v[two] - wb * qy - v[one] + wa * py
+            dy = v[two + 1] + wb * qx - v[one + 1] - wa * px
+            rate = ux * y * dx + uy * y * dy
+            x = length - member[4, i] - strength[2, i]
+            f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
+            out[first + i] += scale * f
 
 
 @kernel

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 
 #: members that are followed at most, unless more rows than these are asked for
 RIVALS = 12
+#: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
+#: pass, with those alone that come near the largest
+AT_ONCE = 2**21
+#: by how much, relative, the samples of a force may lie beside it
+BESIDE = 0.02
 
 
 def compete(kind: int, reduction: str) -> bool:
@@ -39,24 +44,43 @@ def members_peaks(
         places = np.empty((count * len(FRACTIONS), 2))
         places[:, 0] = np.repeat(np.arange(count), len(FRACTIONS))
         places[:, 1] = np.tile(FRACTIONS, count)
-    top, _ = compare(driver, j, places, np.zeros(0, dtype=np.int64), count)
+    members = np.arange(members_of(driver, j))
+    at_once = not final and len(members) * len(places) <= AT_ONCE
+    nobody = np.zeros(0, dtype=np.int64)
+    top, seen_all = compare(driver, j, places, members if at_once else nobody, count)
     near = np.flatnonzero(top >= (1.0 - window) * top.max())
     who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(RIVALS, most)]])
     if final:
-        seen = [driver.visit(j, places, True, count, who=int(i))[2][0] for i in who]
+        seen = [driver.see_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]
-    _, seen_all = compare(driver, j, places, who, count)
+    seen_all = seen_all[who] if at_once else compare(driver, j, places, who, count)[1]
+    limit = _least(top, window, most)
     rows = []
     for i, seen_one in zip(who.tolist(), seen_all, strict=True):
+        own = min(window, 1.0 - limit / top[i]) if top[i] > 0.0 else window
         force, rate = np.moveaxis(seen_one.reshape(count, len(FRACTIONS), 2), 2, 0)
         sign = np.where(force >= 0.0, 1.0, -1.0)
         samples = Samples(t, sign * force, sign * rate, np.full(force.shape, float(i)))
 
         def see(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
+            if exact and len(places) == 1:
+                return driver.see_one(j, count, places[0], who)[None].copy()
             return driver.visit(j, places, exact, count, who=who)[2]
 
-        rows += peaks(samples, see, 1.0, window)
+        rows += peaks(samples, see, 1.0, own)
     return rows
+
+
+def _least(top: FloatArray, window: float, most: int) -> float:
+    """The value below which no peak is among the `most` highest within the window, by the highest of each member (M,).
+
+    So many members have a peak at least as high as the last of them. Samples lie beside the motion by what the steps'
+    quintic is off.
+    """
+    least = (1.0 - window) * float(top.max())
+    if len(top) >= most:
+        least = max(least, float(np.partition(top, -most)[-most]))
+    return (1.0 - BESIDE) * least
 
 
 def compare(

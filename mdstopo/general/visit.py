@@ -6,7 +6,7 @@ from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.duties import beside, point_of
 from mdstopo.general.forces import drive_state
 from mdstopo.general.model import unpack_general
-from mdstopo.general.responses import APART, MEMBER_FORCE, largest_force, member_force, rated
+from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
 from mdstopo.general.track import carve_track, copy_vector, restore_modes
 from mdstopo.jit import entry, kernel
 
@@ -81,7 +81,7 @@ def compare(  # type: ignore[no-untyped-def]
     """Members beside each other, of the group that response j looks at, at places (K, 2) and `exact` as of `visit`.
 
     Out: top (count of members,), the largest |f*| of each at all places; seen (C, K, 2), f* and its rate of the
-    members who (C,), by differences along the motion.
+    members who (C,), by differences along the motion; nobody: no rates are computed.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -96,8 +96,7 @@ def compare(  # type: ignore[no-untyped-def]
     lam = np.empty(n_row)
     near = np.empty((3, n))
     ends = np.empty((6, n))
-    slopes = np.empty((3, 6))
-    own = np.empty((2, 6))
+    force = np.empty(top.shape[0])
     last = -1
     for i in range(top.shape[0]):
         top[i] = 0.0
@@ -108,12 +107,11 @@ def compare(  # type: ignore[no-untyped-def]
         last = go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work)
         t = time_at(track, k, c)
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
+        group_forces(model, strength, segment, t, group, q, v, a, force)
         for m in range(top.shape[0]):
-            f, _ = member_force(model, strength, segment, t, group, m, q, v, a, slopes, own)
-            top[m] = max(top[m], abs(f))
+            top[m] = max(top[m], abs(force[m]))
         for m in range(who.shape[0]):
-            f, _ = member_force(model, strength, segment, t, group, who[m], q, v, a, slopes, own)
-            seen[m, i, 0] = f
+            seen[m, i, 0] = force[who[m]]
             seen[m, i, 1] = 0.0
         if who.shape[0] == 0:
             continue
@@ -122,11 +120,9 @@ def compare(  # type: ignore[no-untyped-def]
             e = side * apart
             beside(tag, track, k, c, e, q, v, a, near[0], near[1])
             balance(model, strength, segment, t + e, near[0], near[1], no, desk, near[2], lam)
+            group_forces(model, strength, segment, t + e, group, near[0], near[1], near[2], force)
             for m in range(who.shape[0]):
-                f, _ = member_force(
-                    model, strength, segment, t + e, group, who[m], near[0], near[1], near[2], slopes, own
-                )
-                seen[m, i, 1] += side * f / (2.0 * apart)
+                seen[m, i, 1] += side * force[who[m]] / (2.0 * apart)
 
 
 @kernel

@@ -82,7 +82,7 @@ design:
   initial: 0.6
   variables:
     k: {group: aid, parameter: stiffness, lower: 5, upper: 40}
-    begin: {group: prop, parameter: active_from, lower: 0.01, upper: 0.2}
+    begin: {group: prop, parameter: active_from, initial: 0.1, lower: 0.01, upper: 0.2}
 """
 
 

@@ -1,0 +1,132 @@
+"""Many rows pulled back in one sweep are each what they are alone; and as many members compete as are asked for."""
+
+import numpy as np
+import pytest
+
+import mdstopo
+import mdstopo.general.driver as general_driver
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.evaluation import Rows
+from mdstopo.general import rivals
+from tests.general.support import design_of, load
+from tests.general.test_across import SCENE, STRUCK, VARIABLES, case_of
+from tests.general.test_rivals import GRID
+
+ALL = Rows(window=1.0, most=8, cones=True)
+IMPLICIT = {"integrator": "generalized_alpha", "step": 0.004}
+
+
+def every_row(evaluator, design, **asked):
+    found = evaluator.evaluate(design, rows=ALL, **asked)
+    assert found.status.ok, found.message
+    return dict([*found.peaks.items(), *found.constraint_peaks.items()])
+
+
+def differ(one, two):
+    """By how much gradients differ at most, relative to the largest part of each."""
+    assert one.keys() == two.keys()
+    worst = 0.0
+    for name, peaks in one.items():
+        for a, b in zip(peaks, two[name], strict=True):
+            assert a.value == b.value, name
+            for x, y in ((a.gradient, b.gradient), (a.across, b.across)):
+                assert (x is None) == (y is None), name
+                if x is not None and np.abs(x).max() > 0.0:
+                    worst = max(worst, np.abs(x - y).max() / np.abs(x).max())
+    return worst
+
+
+CASES = {
+    "scene": (lambda **solver: case_of(SCENE, **solver)),
+    "struck": (lambda **solver: case_of(STRUCK.replace("design: {initial: 0.6}", VARIABLES), **solver)),
+    "everything": (lambda **solver: load("everything", **solver)),
+    "bouncing": (lambda **solver: load("bouncing", **solver)),
+    "crash": (lambda **solver: load("crash", **solver)),
+    "cradle": (lambda **solver: load("cradle", **solver)),
+}
+
+
+@pytest.mark.parametrize("solver", [{}, IMPLICIT], ids=["rk", "alpha"])
+@pytest.mark.parametrize("name", CASES)
+def test_rows_that_are_pulled_back_together_are_what_they_are_alone(name, solver, monkeypatch):
+    """Joints, motions, switching and crushed members, inerters, a start at rest, variables of laws."""
+    case = CASES[name](**solver)
+    evaluator = Evaluator(case)
+    design = np.concatenate([design_of(case), case.start[case.n_design :]])
+    together = every_row(evaluator, design)
+    assert sum(len(peaks) for peaks in together.values()) > 5
+    monkeypatch.setattr(general_driver, "TOGETHER", 1)
+    alone = every_row(evaluator, design)
+    assert differ(together, alone) <= 1e-12
+    assert differ(together, every_row(evaluator, design, sensitivity="direct")) <= 1e-8
+
+
+def grid(members, reduction="max"):
+    text = GRID.format(reduction=reduction, integrator="runge_kutta", count=members, step=0.02)
+    return read_case(text.replace("stiffness: 60, damping: 1", f"stiffness: {300 / members}, damping: {5 / members}"))
+
+
+@pytest.mark.parametrize("reduction", ["max", "final"])
+def test_as_many_members_compete_as_come_within_the_window(reduction):
+    """Against the force of each member along the motion, in a second formulation."""
+    case = grid(40, reduction)
+    evaluator = Evaluator(case)
+    found = evaluator.evaluate(case.start, rows=Rows(window=0.6, most=100))
+    trajectory = mdstopo.simulate(case)
+    group = case.members[0]
+    times = np.linspace(0.0, 2.0, 4001) if reduction == "max" else np.array([2.0])
+    s = trajectory.at(times)
+    turned = s.q[:, 2]
+    arm = group.q_world - np.array(case.bodies[0].position)
+    end = s.q[:, None, :2] + np.stack(
+        [
+            np.cos(turned)[:, None] * arm[:, 0] - np.sin(turned)[:, None] * arm[:, 1],
+            np.sin(turned)[:, None] * arm[:, 0] + np.cos(turned)[:, None] * arm[:, 1],
+        ],
+        axis=2,
+    )
+    way = end - group.p_world
+    length = np.linalg.norm(way, axis=2)
+    lever = end - s.q[:, None, :2]
+    speed = s.v[:, None, :2] + s.v[:, 2, None, None] * np.stack([-lever[..., 1], lever[..., 0]], axis=2)
+    rest = np.linalg.norm(group.q_world - group.p_world, axis=1)
+    force = 0.7 * np.abs(300 / 40 * (length - rest) + 5 / 40 * (way * speed).sum(axis=2) / length)
+    top = force.max(axis=0)
+    near = np.sort(top[top >= 0.4 * top.max()])[::-1]
+    rows = evaluator.driver("default").rows[0, : len(found.peaks["F"])]
+    assert len(set(rows[:, 6])) == len(near) > 12
+    highest = [rows[rows[:, 6] == who, 1].max() for who in dict.fromkeys(rows[:, 6])]
+    assert highest == pytest.approx(near, rel=1e-5)
+
+
+def test_one_pass_over_the_motion_or_two_find_the_same_rows(monkeypatch):
+    """Two, where all members at all places would take much memory."""
+    evaluator = Evaluator(grid(15))
+    asked = Rows(window=0.6, most=50)
+    one = evaluator.evaluate(evaluator.case.start, rows=asked)
+    monkeypatch.setattr(rivals, "AT_ONCE", 0)
+    two = evaluator.evaluate(evaluator.case.start, rows=asked)
+    assert len(one.peaks["F"]) > 12
+    assert [peak[:2] for peak in one.peaks["F"]] == [peak[:2] for peak in two.peaks["F"]]
+
+
+def test_a_hundred_rows_take_one_sweep_of_design_passes():
+    """Counted, not timed: the force sums of a sweep are those of the rows' own points alone."""
+    evaluator = Evaluator(grid(60))
+    few, many = (evaluator.evaluate(evaluator.case.start, rows=Rows(0.6, most)).work for most in (1, 60))
+    values = [evaluator.evaluate(evaluator.case.start, False, rows=Rows(0.6, most)).work for most in (1, 60)]
+    assert few["steps"] == many["steps"]
+    assert many["reverse_steps"] > 20 * few["reverse_steps"]
+    of_rows = many["force_sums"] - values[1]["force_sums"]
+    assert of_rows <= 60 * (few["force_sums"] - values[0]["force_sums"])
+
+
+@pytest.mark.parametrize("asked", [Rows(), Rows(1.0, 12), Rows(1.0, 30), Rows(0.3, 100)])
+def test_leaving_out_peaks_that_are_too_low_to_be_told_changes_none_that_is(asked, monkeypatch):
+    evaluator = Evaluator(grid(30))
+    design = evaluator.case.start * np.random.default_rng(2).uniform(0.3, 1.3, len(evaluator.case.start))
+    found = evaluator.evaluate(design, False, rows=asked).peaks["F"]
+    monkeypatch.setattr(rivals, "_least", lambda *_: -1e300)
+    every = evaluator.evaluate(design, False, rows=asked).peaks["F"]
+    assert [peak[:2] for peak in found] == [peak[:2] for peak in every]
