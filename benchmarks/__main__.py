@@ -25,13 +25,17 @@ SECTIONS = {
     "ring": "a closed loop of bodies beside other programs, forward runs too",
     "forward": "forward runs of the paper's bodies beside other programs",
     "million": "a million members beside JAX",
+    "hunt": "random scenes against a second model, differences, invariances and the error estimates (--minutes)",
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
 PEERS = ("peers", "ring", "forward", "million")
 
 #: what has no place in the README
-ELSEWHERE = (*PEERS, "applications")
+ELSEWHERE = (*PEERS, "applications", "hunt")
+
+#: what is no part of a run without names: it takes as long as it is given
+ASKED_FOR = (*PEERS, "hunt")
 
 
 def main() -> int:
@@ -45,6 +49,8 @@ def main() -> int:
     parser.add_argument("sections", nargs="*", metavar="SECTION", help="default: all but those with other programs")
     parser.add_argument("--peers", metavar="DIR", help="a folder of other programs to compare with, with its bench.py")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
+    parser.add_argument("--minutes", type=float, default=10.0, metavar="M", help="how long to hunt (default: 10)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="the first scene of a hunt (default: 0)")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
     parser.add_argument(
         "--pages",
@@ -55,7 +61,7 @@ def main() -> int:
     unknown = [name for name in chosen.sections if name not in SECTIONS]
     if unknown:
         parser.error(f"no section {', '.join(unknown)}; there are: {', '.join(SECTIONS)}")
-    sections = chosen.sections or ([] if chosen.peers else [name for name in SECTIONS if name not in PEERS])
+    sections = chosen.sections or ([] if chosen.peers else [name for name in SECTIONS if name not in ASKED_FOR])
     machine = f"Measured on: {description()}."
     print(machine + "\n", flush=True)
     for table in outside(chosen.peers, chosen.peers_python) if chosen.peers else ():
@@ -63,7 +69,7 @@ def main() -> int:
     for name in sections:
         began = time.perf_counter()
         printed, summary = [], []
-        for table in _tables(name, chosen.pages):
+        for table in _tables(name, chosen):
             text = table.markdown()
             printed.append(text)
             if not table.detail:
@@ -79,10 +85,12 @@ def main() -> int:
     return 0
 
 
-def _tables(name: str, pages: bool) -> Iterator[Table]:
+def _tables(name: str, chosen: argparse.Namespace) -> Iterator[Table]:
     module = "benchmarks.peers.sections" if name in PEERS else f"benchmarks.{name}"
     section: Callable[..., Iterator[Table]] = getattr(import_module(module), name)
-    return section(folder=Path("cases/designs")) if name == "applications" and pages else section()
+    if name == "hunt":
+        return section(chosen.minutes, chosen.seed)
+    return section(folder=Path("cases/designs")) if name == "applications" and chosen.pages else section()
 
 
 if __name__ == "__main__":
