@@ -29,6 +29,7 @@ SECTIONS = {
     "forward": "forward runs of the paper's bodies beside other programs",
     "million": "a million members beside JAX",
     "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
+    "hunt": "random scenes against a second model, differences, invariances and the error estimates (--minutes)",
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
@@ -57,6 +58,8 @@ def main() -> int:
     )
     parser.add_argument("--peers", metavar="DIR", help="a folder of other programs to compare with, with its bench.py")
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
+    parser.add_argument("--minutes", type=float, default=10.0, metavar="M", help="how long to hunt (default: 10)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="the first scene of a hunt (default: 0)")
     parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
     parser.add_argument(
         "--pages",
@@ -75,7 +78,7 @@ def main() -> int:
     for name in sections:
         began = time.perf_counter()
         printed, summary = [], []
-        for table in _tables(name, chosen.pages):
+        for table in _tables(name, chosen):
             text = table.markdown()
             printed.append(text)
             if not table.detail:
@@ -93,10 +96,12 @@ def main() -> int:
     return 0
 
 
-def _tables(name: str, pages: bool) -> Iterator[Table]:
+def _tables(name: str, chosen: argparse.Namespace) -> Iterator[Table]:
     module = "benchmarks.peers.sections" if name in PEERS else f"benchmarks.{name}"
     section: Callable[..., Iterator[Table]] = getattr(import_module(module), name)
-    return section(folder=Path("cases/designs")) if name == "applications" and pages else section()
+    if name == "hunt":
+        return section(chosen.minutes, chosen.seed)
+    return section(folder=Path("cases/designs")) if name == "applications" and chosen.pages else section()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,184 @@
+"""A hunt for wrong results: random mixed scenes against a second model, differences, invariances and the estimates.
+
+Every scene is evaluated at the default tolerance, and then
+
+- its values against those of `hunt_model`, which shares nothing with the package,
+- its gradients along a random direction against differences of the program's own values at a tolerance of 1e-12,
+- its values against those of the same scene moved, turned, mirrored, renamed, with swapped ends, in other units,
+- its error estimates against what the second model says the errors are.
+
+Values are compared relative to the largest size that the response has in the motion, gradients relative to the largest
+part of the slope along the direction (and to a thousandth of that size where they are smaller). A difference that two
+step sizes do not agree on decides nothing.
+"""
+
+import json
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+import mdstopo
+from benchmarks.hunt_model import Model
+from benchmarks.hunt_scenes import CHANGES, scene
+from mdstopo.bench.tables import Table, significant, verdict
+from mdstopo.case.reader import read_case
+
+#: the default tolerance, and that of the values that differences are taken of
+TOLERANCE, FINE = 1e-8, 1e-12
+#: steps of differences, relative to the design
+STEPS = (4e-3, 1e-3, 2.5e-4)
+#: what the second model is good to: smaller errors cannot be told
+RESOLVED = 1e-10
+
+
+@dataclass
+class Found:
+    """What the hunt has found: errors in tolerances by kind, with scene and objective; and how much was seen."""
+
+    values: list[tuple[float, int, str]] = field(default_factory=list)
+    gradients: list[tuple[float, int, str]] = field(default_factory=list)
+    changes: list[tuple[float, int, str]] = field(default_factory=list)
+    estimates: list[tuple[float, int, str]] = field(default_factory=list)
+    statuses: Counter[str] = field(default_factory=Counter)
+    undecided: int = 0
+
+
+def hunt(minutes: float = 10.0, first: int = 0) -> Iterator[Table]:
+    """Go through scenes, from seed `first` on, for so many minutes; then the bars and the worst of what was found."""
+    found, began, seed = Found(), time.monotonic(), first
+    while time.monotonic() < began + 60.0 * minutes:
+        look(seed, found)
+        seed += 1
+    yield bars(found, seed - first)
+    yield worst(found)
+
+
+def values_of(document: dict[str, Any], alpha: Any, tolerance: float) -> dict[str, float]:
+    """Objectives at a tolerance; a ValueError where the scene cannot be computed."""
+    case = read_case(json.dumps(document), overrides={"solver.tolerance": tolerance})
+    result = mdstopo.evaluate(case, alpha, gradient=False)
+    if not result.status.ok:
+        raise ValueError(result.status.name)
+    return dict(result.objectives)
+
+
+def look(seed: int, found: Found) -> None:
+    """Everything about one scene."""
+    document = scene(seed)
+    try:
+        case = read_case(json.dumps(document))
+        rng = np.random.default_rng(seed)
+        alpha = rng.uniform(0.4, 1.0, case.n_design)
+        result = mdstopo.evaluate(case, alpha, error_estimate=True)
+    except mdstopo.CaseError as refused:
+        found.statuses[f"refused: {refused.mistakes[0].message}"] += 1
+        return
+    found.statuses[result.status.name] += 1
+    if not result.status.ok:
+        return
+    model = Model(document, alpha)
+    model.solve()
+    sizes = {}
+    for name, keys in document["objectives"].items():
+        value, size = model.objective(keys["response"], keys["over_time"])
+        sizes[name] = size = max(size, abs(value), 1e-9)
+        label = f"{keys['over_time']} of {keys['response']}"
+        error = abs(result.objectives[name] - value) / size
+        found.values.append((error / TOLERANCE, seed, label))
+        if error > RESOLVED and name in result.errors:
+            found.estimates.append((result.errors[name].value / (error * size), seed, label))
+    _gradients(seed, document, alpha, result, sizes, found, rng)
+    _changes(seed, document, alpha, result, sizes, found)
+
+
+def _gradients(
+    seed: int, document: dict[str, Any], alpha: Any, result: Any, sizes: dict[str, float], found: Found, rng: Any
+) -> None:
+    direction = rng.normal(size=len(alpha)) * alpha
+    slopes: list[dict[str, float]] = []
+    try:
+        for h in STEPS:
+            total: dict[str, float] = {}
+            for m, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+                for sign in (1.0, -1.0):
+                    for name, value in values_of(document, alpha + sign * m * h * direction, FINE).items():
+                        total[name] = total.get(name, 0.0) + sign * weight * value / h
+            slopes.append(total)
+    except ValueError:  # a design nearby cannot be computed, or touches something only just
+        found.undecided += len(result.objectives)
+        return
+    for name, gradient in result.gradients.items():
+        candidates = [(abs(a[name] - b[name]), b[name]) for a, b in pairwise(slopes)]
+        doubt, slope = min(candidates)
+        scale = max(float(np.abs(gradient * direction).max()), 1e-3 * sizes[name])
+        error = abs(float(gradient @ direction) - slope)
+        if doubt > TOLERANCE * scale and doubt > 0.1 * error:
+            found.undecided += 1
+            continue
+        keys = document["objectives"][name]
+        found.gradients.append((error / scale / TOLERANCE, seed, f"{keys['over_time']} of {keys['response']}"))
+
+
+def _changes(
+    seed: int, document: dict[str, Any], alpha: Any, result: Any, sizes: dict[str, float], found: Found
+) -> None:
+    """The same scene written in another way, a different one for each seed."""
+    label, change = list(CHANGES.items())[seed % len(CHANGES)]
+    other = scene(seed, change)
+    again = mdstopo.evaluate(read_case(json.dumps(other)), alpha, gradient=False)
+    if not again.status.ok:
+        found.changes.append((np.inf, seed, f"{label}: {again.status.name}"))
+        return
+    for name, keys in document["objectives"].items():
+        response = keys["response"]
+        forceful = response == "energy" or bool({"member_force", "joint_force"} & set(response))
+        factor = change.force if forceful else 1.0
+        error = abs(again.objectives[name] / factor - result.objectives[name]) / sizes[name]
+        found.changes.append((error / TOLERANCE, seed, f"{label}: {keys['over_time']} of {response}"))
+
+
+def bars(found: Found, scenes: int) -> Table:
+    """What is promised, and what was found."""
+    rows = []
+
+    def bar(what: str, entries: list[tuple[float, int, str]], limit: float, share: float) -> None:
+        beyond = sum(error > limit for error, _, _ in entries)
+        allowed = share * len(entries)
+        promised = "none" if share == 0.0 else f"at most {100 * share:g} %"
+        rows.append([what, f"{len(entries)}", promised, f"{beyond}", verdict(beyond <= allowed)])
+
+    bar("values beyond ten tolerances", found.values, 10.0, 0.0)
+    bar("gradients beyond ten tolerances", found.gradients, 10.0, 0.02)
+    bar("gradients beyond a thousand", found.gradients, 1000.0, 0.0)
+    bar("values of a scene written in another way, beyond ten", found.changes, 10.0, 0.0)
+    off = [(max(ratio, 1.0 / max(ratio, 1e-300)), seed, label) for ratio, seed, label in found.estimates]
+    low = [(1.0 / max(ratio, 1e-300), seed, label) for ratio, seed, label in found.estimates]
+    bar("estimates of values off by more than a factor of ten", off, 10.0, 0.02)
+    bar("estimates below a hundredth of the error", low, 100.0, 0.0)
+    statuses = ", ".join(f"{name} {count}" for name, count in sorted(found.statuses.items()))
+    return Table(
+        f"Hunt: {scenes} random scenes",
+        ["what", "of", "allowed", "found", "met"],
+        rows,
+        [
+            f"Statuses: {statuses}. Gradients that differences could not decide on: {found.undecided}.",
+            f"Estimates are compared where the second model can tell the error, from {RESOLVED:g} of the size on.",
+        ],
+    )
+
+
+def worst(found: Found) -> Table:
+    """The three worst of each kind, to be looked into by `benchmarks.hunt_scenes.scene(seed)`."""
+    rows = []
+    kinds = (("value", found.values), ("gradient", found.gradients), ("written in another way", found.changes))
+    for kind, entries in kinds:
+        for error, seed, label in sorted(entries, reverse=True)[:5]:
+            rows.append([kind, f"{seed}", significant(error), label])
+    for ratio, seed, label in sorted(found.estimates)[:3]:
+        rows.append(["estimate / error", f"{seed}", significant(ratio), label])
+    return Table("Hunt: the worst, in tolerances", ["kind", "seed", "off by", "of what"], rows, detail=True)
