@@ -47,7 +47,7 @@ def rows() -> Iterator[Table]:
                 lines.append([f"{name}, {load_case_name}", *_sweeps(evaluator, load_case_name)])
     yield Table(
         "Rows pulled back in one sweep: CPU time in times of one row",
-        ["scene", "members", "steps", "one row, ms", *(f"{count} rows" for count in ROWS[1:])],
+        ["scene", "members", "steps", "one row, ms", *(f"{n} rows" for n in ROWS[1:]), f"{ROWS[-1]} one by one"],
         lines,
         ["Rows are those that the scene has, again from the first where it has fewer; each begins at its own peak."],
     )
@@ -77,6 +77,8 @@ def _sweeps(evaluator: Evaluator, load_case: str) -> list[str]:
         for r in range(int(driver.found[j]))
     ]
     times = [_seconds(_sweep(driver, count, known, rows)) for rows in ROWS]
+    alone = [_sweep(driver, count, known[i % len(known) :], 1) for i in range(ROWS[-1])]
+    times.append(_seconds(lambda: [each() for each in alone]))
     ratios = [f"{each / times[0]:.1f}" for each in times[1:]]
     return [str(evaluator.case.n_design), str(count), significant(1e3 * times[0]), *ratios]
 

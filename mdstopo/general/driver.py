@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import partial
 from importlib import import_module
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from mdstopo.general.extremes import (
     SIGN,
     STEP,
     VALUE,
-    parts,
     peaks,
     ranked,
     row_of,
@@ -31,6 +30,7 @@ from mdstopo.general.minima import minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.ready import Ready
 from mdstopo.general.rivals import compete, members_peaks
+from mdstopo.general.rows_back import RowsBack
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
@@ -38,15 +38,11 @@ from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
-#: rows times members that are pulled back together at most, for the memory they take
-TOGETHER = 2**23
-#: rows of which the arrays of a call are kept for the next one
-KEPT = 32
 #: of what a reduction takes the peaks: of g, or of -g too; minima are looked for apart (`minima`)
 SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
 
@@ -54,16 +50,6 @@ SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
 def load_method(name: str) -> ModuleType:
     """The compiled entries of a method for general scenes."""
     return import_module(f"mdstopo.general.{name}_entry")
-
-
-class _Block(NamedTuple):
-    """Rows that are pulled back together: what `row_sweep.pull_rows` takes, by its names."""
-
-    which: IndexArray
-    rows: FloatArray
-    padded: FloatArray
-    out: FloatArray
-    starts: FloatArray
 
 
 class GeneralDriver:
@@ -97,9 +83,9 @@ class GeneralDriver:
         #: what `visit` is given for one place, and `pull`
         self._one = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
         self._pulled = np.zeros(n_design + varied)
-        self._blocks: dict[int, _Block] = {}
+        self._rows_back = RowsBack(self)
         self._make_rows(ROWS)
-        self._pulled_start = np.zeros(n if case.solver.settle else 0)
+        self.pulled_start = np.zeros(n if case.solver.settle else 0)
         self.events = 0
         #: where the steps of the last evaluation had to end (`landings`)
         self.landings: list[float] = []
@@ -135,7 +121,7 @@ class GeneralDriver:
         floats, ints = track_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
-        self._ready = Ready()  # what was prepared with the room as it was would keep it
+        self.ready = Ready()  # what was prepared with the room as it was would keep it
 
     def _make_rows(self, most: int) -> None:
         """Arrays for so many peaks of each response; those of cones when they are first asked for."""
@@ -197,7 +183,7 @@ class GeneralDriver:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient, window)
             if gradient:
-                self._pull_rows(count, across)
+                self._rows_back(count, across)
         grazing, meeting = self._grazing(), int(self.where[1])
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
 
@@ -299,7 +285,7 @@ class GeneralDriver:
         driver's own: the next call overwrites it."""
         places, out, lam, seen = self._one
         places[0] = place
-        self._ready(
+        self.ready(
             "visit", self.entry.visit, self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count,
             self.room, self.room_ints, self.strength, True, True, j, who, places, out, lam, seen, self.work,
         )  # fmt: skip
@@ -312,63 +298,15 @@ class GeneralDriver:
 
     def _pull(self, j: int, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
         """The integral of response j (2: of its square), and on demand its gradient into out (N + P,)."""
-        total: float = self._ready(
+        total: float = self.ready(
             "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self.room, self.room_ints,
-            self.strength, self.padded, self._pulled, self._pulled_start, self.work,
+            self.strength, self.padded, self._pulled, self.pulled_start, self.work,
         )  # fmt: skip
         if gradient:
             out[:] = self._pulled
             if self.start is not None:
-                self.start.pull(self._pulled_start, out)
+                self.start.pull(self.pulled_start, out)
         return total
-
-    def _pull_rows(self, count: int, across: FloatArray | None) -> None:
-        """The gradients of all rows that were found, and where it is wanted what is across, in one sweep."""
-        wanted = [
-            (j, r, aside, share, part)
-            for j, reduction in enumerate(self.scene.reductions)
-            if reduction not in INTEGRALS
-            for r in range(int(self.found[j]))
-            for share, part in parts(self.rows[j, r])
-            for aside in range(1 if across is None or self.shapes[j] != "norm" else 2)
-        ]
-        wanted.sort(key=lambda row: (-row[4][[STEP, FRACTION]]).tolist())  # the latest first
-        for j, reduction in enumerate(self.scene.reductions):
-            if reduction not in INTEGRALS:
-                self.gradients[j, : self.found[j]] = 0.0
-        most = max(1, TOGETHER // len(self.padded))
-        for first in range(0, len(wanted), most):
-            part = wanted[first : first + most]
-            block = self._block(len(part))
-            block.which[:] = [(j, aside) for j, _, aside, _, _ in part]
-            block.rows[:] = [row for *_, row in part]
-            self._ready(
-                f"pull_rows {len(part)}", self.entry.pull_rows, *self.steps_arguments(count), block.which, block.rows,
-                self.room, self.room_ints, self.strength, block.padded, block.out, block.starts, self.work,
-            )  # fmt: skip
-            for (j, r, aside, share, _), own, start in zip(part, block.out, block.starts, strict=True):
-                if self.start is not None:
-                    self.start.pull(start, own)
-                if aside and across is not None:
-                    across[j, r] += share * own
-                else:
-                    flip = self.rows[j, r, SIGN] if self.scene.reductions[j] == "max_abs" else 1.0
-                    self.gradients[j, r] += flip * share * own
-
-    def _block(self, count: int) -> "_Block":
-        """Arrays for so many rows at once; those of few rows are kept."""
-        if count not in self._blocks:
-            block = _Block(
-                np.zeros((count, 2), dtype=np.int64),
-                np.zeros((count, COLUMNS)),
-                np.zeros((count, len(self.padded))),
-                np.zeros((count, len(self._pulled))),
-                np.zeros((count, len(self._pulled_start))),
-            )
-            if count > KEPT:
-                return block
-            self._blocks[count] = block
-        return self._blocks[count]
 
     def start_from(self, q: FloatArray) -> None:
         """Take other positions q (n,) at the start."""
@@ -395,7 +333,7 @@ class GeneralDriver:
         self.ints, self.floats = pack_general(landed(self._with_start(), landings)) if landings else self._packed
         while True:
             self.work[:] = 0
-            code, count, self.events, time = self._ready(
+            code, count, self.events, time = self.ready(
                 "simulate", self.entry.simulate, self.ints, self.floats, self.method.tables, self._alpha, tangent,
                 self.settings, self.limits, self.room, self.room_ints, self.strength, self.work, self.where,
             )  # fmt: skip

@@ -24,6 +24,10 @@ from mdstopo.native.padding import whole_vectors
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
 SCALE, MODE, SET = range(3)
 
+#: members of a group up to which steps end at the knots of their curves: of a hundred there would be so many knots on the
+#: way that a step would hold nothing else
+KNOTTED = 12
+
 
 @kernel
 def scale_general(block, power, alpha, strength):  # type: ignore[no-untyped-def]
@@ -163,7 +167,8 @@ def general_sums(model, segment, t, strength, rel, tangent, sums):  # type: igno
 def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped-def]
     """The modes at the start from elongation, rate and second derivative (rel_rate: the pose of the accelerations).
 
-    knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise curves have none.
+    knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of many
+    members, curves have none.
     """
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
@@ -177,7 +182,7 @@ def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped
             rate = bx * r[4] + by * r[5] + bt * r[6]
             second = second_rate(model.member, i, r, acc)
             x = length - model.member[4, i]
-            whole = code == CURVE and not knots
+            whole = code == CURVE and (not knots or model.block[k, 5] > KNOTTED)
             strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
             if code == CRUSH and model.active[0, k] == 0:  # whatever it is like now, it has not been crushed

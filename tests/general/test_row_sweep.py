@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 import mdstopo
-import mdstopo.general.driver as general_driver
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general import rivals
+from mdstopo.general import rivals, rows_back
 from tests.general.support import design_of, load
 from tests.general.test_across import SCENE, STRUCK, VARIABLES, case_of
 from tests.general.test_rivals import GRID
@@ -56,7 +55,7 @@ def test_rows_that_are_pulled_back_together_are_what_they_are_alone(name, solver
     design = np.concatenate([design_of(case), case.start[case.n_design :]])
     together = every_row(evaluator, design)
     assert sum(len(peaks) for peaks in together.values()) > 5
-    monkeypatch.setattr(general_driver, "TOGETHER", 1)
+    monkeypatch.setattr(rows_back, "TOGETHER", 1)
     alone = every_row(evaluator, design)
     assert differ(together, alone) <= 1e-12
     assert differ(together, every_row(evaluator, design, sensitivity="direct")) <= 1e-8

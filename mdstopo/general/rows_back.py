@@ -1,0 +1,86 @@
+"""From Python to `row_sweep`: the gradients of all rows that a driver has found, in one call."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, parts
+from mdstopo.general.landings import INTEGRALS
+from mdstopo.scene.model import FloatArray, IndexArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.driver import GeneralDriver
+
+#: rows times members that are pulled back together at most, for the memory they take
+TOGETHER = 2**23
+#: rows of which the arrays of a call are kept for the next one
+KEPT = 32
+
+
+class _Block(NamedTuple):
+    """Rows that are pulled back together: what `row_sweep.pull_rows` takes, by its names."""
+
+    which: IndexArray
+    rows: FloatArray
+    padded: FloatArray
+    out: FloatArray
+    starts: FloatArray
+
+
+class RowsBack:
+    """Pulls the rows of one driver back through its last motion, into its `gradients`."""
+
+    def __init__(self, driver: "GeneralDriver") -> None:
+        self._driver = driver
+        self._blocks: dict[int, _Block] = {}
+
+    def __call__(self, count: int, across: FloatArray | None) -> None:
+        """Of the motion of so many steps; what is across of norms, too, where there is an array for it."""
+        driver = self._driver
+        wanted = [
+            (j, r, aside, share, part)
+            for j, reduction in enumerate(driver.scene.reductions)
+            if reduction not in INTEGRALS
+            for r in range(int(driver.found[j]))
+            for share, part in parts(driver.rows[j, r])
+            for aside in range(1 if across is None or driver.shapes[j] != "norm" else 2)
+        ]
+        wanted.sort(key=lambda row: (-row[4][[STEP, FRACTION]]).tolist())  # the latest first
+        for j, reduction in enumerate(driver.scene.reductions):
+            if reduction not in INTEGRALS:
+                driver.gradients[j, : driver.found[j]] = 0.0
+        most = max(1, TOGETHER // len(driver.padded))
+        for first in range(0, len(wanted), most):
+            part = wanted[first : first + most]
+            block = self._block(len(part))
+            block.which[:] = [(j, aside) for j, _, aside, _, _ in part]
+            block.rows[:] = [row for *_, row in part]
+            driver.ready(
+                f"pull_rows {len(part)}", driver.entry.pull_rows, *driver.steps_arguments(count), block.which,
+                block.rows, driver.room, driver.room_ints, driver.strength, block.padded, block.out, block.starts,
+                driver.work,
+            )  # fmt: skip
+            for (j, r, aside, share, _), own, start in zip(part, block.out, block.starts, strict=True):
+                if driver.start is not None:
+                    driver.start.pull(start, own)
+                if aside and across is not None:
+                    across[j, r] += share * own
+                else:
+                    flip = driver.rows[j, r, SIGN] if driver.scene.reductions[j] == "max_abs" else 1.0
+                    driver.gradients[j, r] += flip * share * own
+
+    def _block(self, count: int) -> _Block:
+        """Arrays for so many rows at once; those of few rows are kept."""
+        if count in self._blocks:
+            return self._blocks[count]
+        driver = self._driver
+        block = _Block(
+            np.zeros((count, 2), dtype=np.int64),
+            np.zeros((count, COLUMNS)),
+            np.zeros((count, len(driver.padded))),
+            np.zeros((count, driver.gradients.shape[2])),
+            np.zeros((count, len(driver.pulled_start))),
+        )
+        if count <= KEPT:
+            self._blocks[count] = block
+        return block
