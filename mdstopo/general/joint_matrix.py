@@ -172,8 +172,9 @@ def _decompose_two(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def weakest(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
-    """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `decompose`; else -1.
+def growth(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+    """What the smallest eigenvalue shows itself by in factors of `decompose`: a sum of squares, and the row that has
+    most of it.
 
     C = R L D^1/2 are Cholesky's factors with rows scaled by R to a diagonal of ones. With signs e that make y = C^-1 e
     grow, y . y / n is at most the inverse of the eigenvalue, and hardly less than a few times that (the idea of
@@ -194,6 +195,13 @@ def weakest(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
         if square > most:
             most = square
             worst = i
+    return size, worst
+
+
+@kernel
+def weakest(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+    """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `decompose`, or -1."""
+    size, worst = growth(envelope, gram, diagonal, x)
     return worst if size * SINGULAR > envelope.shape[0] else -1
 
 

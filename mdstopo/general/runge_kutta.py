@@ -16,6 +16,15 @@ from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
+from mdstopo.general.singular_poses import (
+    CLOSE,
+    NEAR,
+    crosses,
+    error_along,
+    least_singular_value,
+    step_beside,
+    way_to_pose,
+)
 from mdstopo.general.switches import APART, THOROUGH
 from mdstopo.general.track import carve_track, copy_vector, has_factors, keep_stage, keep_state
 from mdstopo.integrators.runge_kutta import MOST, _error
@@ -254,6 +263,10 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
+    sigma = least_singular_value(model, desk)
+    largest = sigma
+    way = np.inf  # until the joints repeat each other
+    must = True
     relative_pose(pair, q0, v0, rel0)
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
@@ -319,6 +332,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             pieces = np.ceil((end - t) / wanted - 1e-9)
             h = (end - t) / max(pieces, 1.0)
             lands = pieces <= 1.0
+            if way < np.inf and not fixed_step > 0.0:
+                beside = step_beside(h, way, must and sigma < CLOSE * largest, table[2, 0], s)
+                if beside < end - t:
+                    h = beside
+                    lands = False
             if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
                 return STEP_TOO_SMALL, count, events, t
             if count + 4 > track.t.shape[0] or stages + 2 * s > track.when.shape[0]:
@@ -333,12 +351,16 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     where[0] = singular
                     return SINGULAR, count, events, t
                 wanted = 0.25 * h
+                must = False
                 work[REJECTED] += 1
                 continue
+            sigma_end = least_singular_value(model, desk)
             relative_pose(pair, ends[0], ends[1], rel)
             motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
             error = _error(table[2], s, h, a, weight)
+            if crosses(h, way):
+                error = error_along(model, desk, table[2], s, h, a, weight, error, sigma_end)
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
@@ -348,6 +370,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             else:
                 if not finite or not error < 1e6:
                     wanted = 0.1 * h
+                    must = False
                     work[REJECTED] += 1
                     continue
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
@@ -356,6 +379,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 turned = largest_turn(pair, q0, ends[0])
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
                 if error > tolerance or turned > 1.1 * TURN:
+                    must = False
+                    work[REJECTED] += 1
+                    continue
+                if sigma_end < NEAR * sigma and not lands and h > 1e-9 * span:
+                    wanted = 0.6 * h
                     work[REJECTED] += 1
                     continue
             happens = False
@@ -427,7 +455,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         model, table, s, strength, segment, t, h, q0, v0, keep, stages, desk, lam, q, v, a,
                         track, ends, push, size, work,
                     )  # fmt: skip
+                    sigma_end = least_singular_value(model, desk)
                 relative_pose(pair, ends[0], ends[1], rel)
+            largest = max(largest, sigma_end)
+            way = way_to_pose(h, sigma, sigma_end, largest)
+            sigma = sigma_end
+            must = True
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
             if where[1] < 0:

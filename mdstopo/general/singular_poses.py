@@ -1,0 +1,114 @@
+"""Steps over poses at which joints repeat each other for an instant, as a linkage does that is stretched out.
+
+Along a motion the smallest singular value sigma of the joints' scaled slopes Phi_q falls in proportion to the distance
+from such a pose, and rises behind it. Beside it everything is determined: accelerations are off by rounding, or by what
+a stage is off, over sigma. In it several motions are possible (a four-bar that lies flat may go on as a parallelogram
+or crossed), and nothing that is computed there tells which one is meant. So no step ends near such a pose, and none has
+a stage there: a step goes from well before it to well behind it, and its state, which is moved onto the joints by no
+more than its error, stays on the branch that it was on.
+
+What a step across the pose is off by is nearly all across the joints: a stage that is off by epsilon has accelerations
+that are off by epsilon over sigma. The joints take that away at the step's end. So there the error of a step is what is
+left along the joints (`error_along`), as long as the rest is far too small to lead to another branch.
+
+sigma of two states tells where it will vanish. A pose that cannot be passed, where a linkage locks, rejects every step
+across it; then steps become shorter until the joints count as singular.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import solve_unknowns
+from mdstopo.general.joint_matrix import growth
+from mdstopo.general.switches import OF_JOINTS
+from mdstopo.jit import kernel
+
+#: a step may not end where sigma is less than this share of what it was at its begin
+NEAR = 0.1
+#: share of the largest sigma so far below which a pose is looked out for, and below which steps have to cross it
+WATCH, CLOSE = 0.25, 0.02
+#: a step that would end nearly there ends at this share of the way
+BEFORE = 0.6
+#: how far a step across a pose goes at least and, where it has to cross it, at most, as multiples of the way to it
+LEAST, FARTHEST = 1.5, 3.0
+#: lengths of a step that are tried
+TRIED = 32
+#: error of a step across a pose, relative to the motion and to sigma at its end, that cannot lead to another branch
+SAFE = 1e-3
+
+
+@kernel
+def least_singular_value(model, desk):  # type: ignore[no-untyped-def]
+    """sigma at the state whose joints have just been factorised on the desk, about; 1 where that is not known."""
+    if desk.switches[OF_JOINTS] == 0 or model.envelope.shape[0] == 0:
+        return 1.0
+    size, _ = growth(model.envelope, desk.gram, desk.diagonal, desk.x)
+    return np.sqrt(model.envelope.shape[0] / size) if size > 0.0 else 1.0
+
+
+@kernel
+def way_to_pose(h, before, now, largest):  # type: ignore[no-untyped-def]
+    """Time until sigma vanishes, that was `before` a step of length h and is `now`; infinite where it need not."""
+    if not now < before or now > WATCH * largest:
+        return np.inf
+    return h * now / (before - now)
+
+
+@kernel
+def step_beside(h, way, must, nodes, s):  # type: ignore[no-untyped-def]
+    """A step of about h that neither ends nor has a stage near the pose that is `way` ahead.
+
+    must: whether it has to cross the pose, however short h is; nodes (s,): where its stages are.
+    """
+    if not must:
+        if way > 2.0 * h:
+            return h
+        if h < LEAST * way:
+            return min(h, BEFORE * way)
+    most = FARTHEST if must else h / way
+    least = LEAST if must else max(LEAST, 0.7 * most)
+    best = -1.0
+    found = most
+    for i in range(TRIED):
+        multiple = most - (most - least) * i / (TRIED - 1)
+        at = 1.0 / multiple
+        gap = 1.0 - at
+        for j in range(s):
+            gap = min(gap, abs(nodes[j] - at))
+        if gap > best:
+            best = gap
+            found = multiple
+    return found * way
+
+
+@kernel
+def crosses(h, way):  # type: ignore[no-untyped-def]
+    """Whether a step of length h goes across the pose that is `way` ahead, as `step_beside` means it to."""
+    return h > 0.99 * LEAST * way
+
+
+@kernel
+def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):  # type: ignore[no-untyped-def]
+    """The estimated error `whole` (`integrators.runge_kutta._error`) of a step without its part across the joints at
+    its end, which are factorised on the desk; all of it where it might lead to another branch.
+    """
+    if not whole < SAFE * sigma:
+        return whole
+    n = weight.shape[0]
+    rows = np.empty(model.size[0])
+    off = np.empty(n)
+    size = np.zeros(4)
+    for m in range(4):
+        for d in range(n):
+            value = 0.0
+            for j in range(s):
+                value += vectors[3 + m, j] * a[j, d]
+            off[d] = model.mass[d] * value
+        rows[:] = 0.0
+        solve_unknowns(model, desk, off, rows)
+        for d in range(n):
+            size[m] = max(size[m], h * h * weight[d] * abs(off[d]))
+    worst = max(size[0], size[1])
+    coarse = max(size[2], size[3])
+    if coarse > 0.0 and worst > 0.0:  # as there
+        worst = worst * worst / np.sqrt(worst * worst + 0.01 * coarse * coarse)
+    return worst
