@@ -25,7 +25,7 @@ def main() -> None:
     import os
     import signal
 
-    # Matrices here are small: threads of a linear algebra library would only wait for each other, and for other processes.
+    # Matrices here are small: threads of a linear algebra library would only wait for each other.
     for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
     # Modules are made of cycles that last: looking for others among them takes 15 ms of an import.
