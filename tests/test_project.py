@@ -16,7 +16,6 @@ from mdstopo.cli.commands import COMMANDS
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SOURCES = sorted((ROOT / "mdstopo").rglob("*.py"))
-LONGEST = 470
 HEAVY = ("numpy", "numba", "scipy", "h5py", "rich", "yaml", "click", "llvmlite")
 
 
@@ -139,10 +138,9 @@ def test_version_agrees_with_the_changelog():
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_modules_say_what_they_are_and_stay_short(path):
+def test_modules_say_what_they_are(path):
     text = path.read_text(encoding="utf-8")
     assert not text or ast.get_docstring(ast.parse(text)), "a module without docstring"
-    assert text.count("\n") <= LONGEST
 
 
 @pytest.mark.parametrize(
