@@ -22,8 +22,12 @@ def main() -> None:
     0 done, 1 failed, 2 bad input, 3 interrupted.
     """
     import gc
+    import os
     import signal
 
+    # Matrices here are small: threads of a linear algebra library would only wait for each other.
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
     # Modules are made of cycles that last: looking for others among them takes 15 ms of an import.
     gc.set_threshold(100_000)
     _open_streams()

@@ -24,8 +24,8 @@ from mdstopo.native.padding import whole_vectors
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
 SCALE, MODE, SET = range(3)
 
-#: members of a group up to which steps end at the knots of their curves: a hundred of them would pass so many on the
-#: way that steps would be cut to nothing
+#: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps
+#: would be cut to nothing
 KNOTTED = 12
 
 
