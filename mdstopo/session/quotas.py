@@ -50,12 +50,12 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
 def leave(case: Case, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
     """Mark the starts that do not go on after so many iterations.
 
-    The best third of the distinct ones goes on, and those that are still falling fast. To decide again changes nothing:
-    who has gone on from here is not asked.
+    The best third of the distinct ones goes on, and those that are still falling fast. Where one has gone on from here
+    it is decided already: a resumed run must not decide again by what that one has found since.
     """
     tolerance = case.optimizer.tolerance
     begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.left]
-    if any(state.iteration > quota for _, state in begun if state.running):
+    if any(state.iteration > quota for _, state in begun):
         return
     order = sorted(begun, key=lambda each: (*_rank(each[1], tolerance), each[0]))
     most = max(1, math.ceil(SHARE * len(states)))

@@ -287,21 +287,21 @@ class _Run:
         if workers > 1 and chosen.starts == 1:
             self.notify("one start needs one process: the other workers are not used")
         for legs in rounds(self.case, self.states, keep):
-            if self.stop_requested():
-                break
             if workers > 1 and len(legs) > 1:
                 from mdstopo.session.workers import run_in_workers  # most runs need no other process
 
                 job = (self.case, self.initial, make, scalarisation)
                 run_in_workers(job, self.states, legs, workers, keep, self.stop_requested)
-                continue
-            for leg in legs:
-                if self.stop_requested():
-                    break
-                state = self.states[leg.index]
-                self.states[leg.index] = run_stages(
-                    self.case, make, problem, leg, state, self.initial, keep, self.stop_requested
-                )
+            else:
+                for leg in legs:
+                    if self.stop_requested():
+                        return
+                    state = self.states[leg.index]
+                    self.states[leg.index] = run_stages(
+                        self.case, make, problem, leg, state, self.initial, keep, self.stop_requested
+                    )
+            if self.stop_requested():
+                return  # before the next round decides from starts that are half done who goes on
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""

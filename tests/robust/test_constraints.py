@@ -9,7 +9,6 @@ import pytest
 import mdstopo
 from mdstopo.cli.gradient_numbers import differences
 from mdstopo.evaluators import evaluator_of
-from mdstopo.optimizer.scalarisation import ROWS
 from tests.robust.scenes import read, uncertain
 
 REACH = {"response": {"displacement": {"body": "torso", "relative_to": "vehicle"}}, "over_time": "max"}
@@ -77,14 +76,19 @@ def test_a_bound_that_varies_is_kept_by_the_distance_to_it():
     assert len({engine.points[i].case.constraints[1].bound for i in range(6)}) == 6
 
 
-def test_a_constraint_has_as_many_rows_at_every_design():
+def test_the_competing_points_of_a_constraint_are_rows_of_one_group_at_every_design():
     case = case_of({**REACH, "limit": 0.2})
-    problem = evaluator_of(case).problem()
+    evaluator = evaluator_of(case)
+    problem = evaluator.problem()
     for seed in range(3):
-        sample = problem.evaluate(np.random.default_rng(seed).uniform(0.1, 0.6, 40))
-        assert sample.constraint_rows.shape == (ROWS,)
-        assert sample.constraint_gradients.shape == (ROWS, 40)
+        alpha = np.random.default_rng(seed).uniform(0.1, 0.6, 40)
+        sample = problem.evaluate(alpha)
+        rows = len(sample.constraint_rows)
+        assert rows >= 1
+        assert sample.constraint_gradients.shape == (rows, 40)
+        assert sample.constraint_groups.tolist() == [0] * rows
         assert sample.constraint_rows[0] == sample.constraint_rows.max()
+        assert sample.constraint_rows[0] == pytest.approx(evaluator.evaluate(alpha).constraints[1] / 0.2, rel=1e-12)
 
 
 def test_a_run_keeps_its_bound_at_the_share_of_points_that_it_asks_for():

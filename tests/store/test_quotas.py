@@ -1,0 +1,48 @@
+"""Who goes on of several starts: decided once for each quota, whatever is stopped and resumed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fakes import FakeEngineWithEvaluations, hand_made_case, limited
+
+from mdstopo.optimizer.state import State
+from mdstopo.session.quotas import QUOTAS, leave
+from mdstopo.session.starts import make_optimizer
+from mdstopo.status import RunStatus
+
+
+@pytest.fixture
+def first() -> State:
+    case = limited(hand_made_case(), 60)
+    return make_optimizer(case, FakeEngineWithEvaluations(case).problem()).start()
+
+
+def at(state: State, iteration: int, objective: float, status: RunStatus = RunStatus.RUNNING) -> State:
+    """The state after so many iterations, with a best design of its own for each objective."""
+    alpha = np.full_like(state.alpha, objective)
+    return replace(state, iteration=iteration, best_objective=objective, best_alpha=alpha, status=status)
+
+
+def decided(states: list[State | None]) -> list[bool]:
+    case = limited(hand_made_case(), 60)
+
+    def keep(index: int, state: State) -> None:
+        assert states[index] is state
+
+    leave(case, states, QUOTAS[0], keep)
+    return [state is not None and state.left for state in states]
+
+
+def test_starts_that_lag_behind_are_left_at_their_quota(first: State) -> None:
+    states: list[State | None] = [at(first, QUOTAS[0], value) for value in (0.3, 0.1, 0.11, 0.9)]
+    assert decided(states) == [True, False, False, True]
+    assert states[3] is not None
+    assert states[3].status is RunStatus.MAX_ITERATIONS
+
+
+def test_what_one_start_finds_afterwards_does_not_change_who_goes_on(first: State) -> None:
+    """The second start was to go on; the run was stopped when the first one had ended, and far better by then."""
+    ended = at(first, QUOTAS[0] + 9, 0.01, RunStatus.CONVERGED)
+    states: list[State | None] = [ended, at(first, QUOTAS[0], 0.11), None]
+    assert decided(states) == [False, False, False]
