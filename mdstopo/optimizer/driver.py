@@ -141,6 +141,7 @@ class Gsao:
             if self.bundle is not None and self.competes:
                 self._begin_bundle(state)
             self._propose(state)
+            self._change_piece(state)  # where the first design is one that the piece at work cannot leave
         return self._finish(state, sample, alpha, 0.0, not wrong, began)
 
     def step(self, state: State) -> State:
