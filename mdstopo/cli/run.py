@@ -169,7 +169,7 @@ def _optima(outcome: "Outcome") -> list[list[str]]:
             [
                 f"  {number(found.objective, 7)}{broken}",
                 f"start{'s' if len(found.starts) > 1 else ''} {starts}, {found.evaluations} evaluations, "
-                f"{found.status.replace('_', ' ')}",
+                f"{found.status.replace('_', ' ')}, KKT residual {number(found.kkt, 2)}",
             ]
         )
     return rows
@@ -216,10 +216,13 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "objectives": outcome.objectives,
         "initial_objectives": outcome.initial_objectives,
         "peaks": {name: [{"time": t, "value": value} for t, value in found] for name, found in outcome.peaks.items()},
+        "kkt": outcome.kkt,
         "evaluations": outcome.evaluations,
         "iterations": outcome.iterations,
         "starts": [
-            None if each is None else {"status": str(each.status), "objective": each.best_objective}
+            None
+            if each is None
+            else {"status": str(each.status), "objective": each.best_objective, "kkt": each.kkt, "left": each.left}
             for each in outcome.states
         ],
         "best_start": outcome.best_start,

@@ -31,7 +31,7 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
 
     output = Output(json=as_json, quiet=quiet)
     view = read_result(result_path, leave_out=("optimizer", "pareto/tasks", "sweep/tasks", "combine/tasks"))
-    output.say(f"{view.title or view.name}: {view.status.replace('_', ' ')} - {view.reason}")
+    output.say(f"{view.title or view.name}: {_ended(view)} - {view.reason}")
     output.say(f"made by `{view.provenance.get('command') or view.kind}` on {view.provenance.get('created', '?')}")
     if view.kind == "run" and "iterations/combined" in view.arrays:
         _say_iterations(output, view)
@@ -54,6 +54,23 @@ def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
         output.say(f"to go on: {resume_command(view)}")
     output.document(_document(view) | ({"bounds": known} if known else {}))
     return 0
+
+
+def _ended(view: "ResultView") -> str:
+    """The status, of a run with the residual that tells how far from an optimum it is."""
+    word = view.status.replace("_", " ")
+    kkt = residual_of(view)
+    return word if kkt is None else f"{word}, KKT residual {number(kkt, 2)}"
+
+
+def residual_of(view: "ResultView") -> float | None:
+    """The projected KKT residual at the last iterate of a run; None of other files, and where it is unknown."""
+    import numpy as np
+
+    if view.kind != "run" or "iterations/kkt" not in view.arrays or not len(view.arrays["iterations/kkt"]):
+        return None
+    kkt = float(view.array("iterations/kkt")[-1])
+    return kkt if np.isfinite(kkt) else None
 
 
 def objective_names(view: "ResultView") -> list[str]:
@@ -92,7 +109,7 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     stages = _stages(columns)
     within = f" in {stages} stages" if stages > 1 else ""
     output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
-    rows = [["iterate", *names, "constraint", "change", "evaluations", "time"]]
+    rows = [["iterate", *names, "constraint", "change", "KKT", "evaluations", "time"]]
     for k in condensed(total):
         worst = columns["constraints"][k].max(initial=float("-inf")) if columns["constraints"].size else float("nan")
         rows.append(
@@ -101,6 +118,7 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
                 *(number(value) for value in columns["objectives"][k]),
                 number(worst, 3),
                 number(columns["change"][k], 3),
+                number(columns["kkt"][k], 2) if "kkt" in columns else "",
                 str(int(columns["evaluations"][k])),
                 duration(float(columns["seconds"][k])),
             ]
@@ -118,9 +136,11 @@ def _say_starts(output: Output, view: "ResultView") -> None:
     if not starts:
         return
     output.say("starts")
-    rows = [["start", *objective_names(view), "status"]]
+    rows = [["start", *objective_names(view), "status", "KKT"]]
     for index, word in enumerate(view.lines("starts/status")):
-        rows.append([str(index + 1), *(number(value) for value in starts["objectives"][index]), word])
+        values = (number(value) for value in starts["objectives"][index])
+        kkt = number(starts["kkt"][index], 2) if "kkt" in starts else ""
+        rows.append([str(index + 1), *values, word.replace("_", " "), kkt])
     output.table(rows)
 
 
@@ -141,10 +161,11 @@ def _say_sweep(output: Output, view: "ResultView") -> None:
     keys = list(view.lines("sweep/keys"))
     columns = [view.lines(f"sweep/values/{key}") for key in keys]
     objectives, status = view.array("sweep/objectives"), view.lines("sweep/status")
-    rows = [[*keys, *objective_names(view), "status"]]
+    residuals = view.arrays.get("sweep/kkt")
+    rows = [[*keys, *objective_names(view), "status", "KKT"]]
     for i, word in enumerate(status):
         cells = [*(column[i] for column in columns), *(number(value, 7) for value in objectives[i])]
-        rows.append([*cells, word.replace("_", " ")])
+        rows.append([*cells, word.replace("_", " "), "" if residuals is None else number(residuals[i], 2)])
     output.table(rows)
     reasons = view.lines("sweep/reason")
     for i, word in enumerate(status):
@@ -214,7 +235,7 @@ def _document(view: "ResultView") -> dict[str, Any]:
         "resume": None if view.finished else resume_command(view),
     }
     if view.kind == "pareto":
-        for name in ("weights", "objectives", "dominated", "evaluations"):
+        for name in ("weights", "objectives", "dominated", "evaluations", "kkt"):
             content[name] = view.array(f"pareto/{name}")
         content["point_status"] = list(view.lines("pareto/status"))
         content |= {
@@ -224,6 +245,7 @@ def _document(view: "ResultView") -> dict[str, Any]:
         columns = view.under("iterations")
         content["iterations"] = len(columns["combined"]) - _stages(columns)
         content["evaluations"] = int(columns["evaluations"][-1])
+        content["kkt"] = residual_of(view)
         content["objectives"] = {name: columns["objectives"][:, i] for i, name in enumerate(objective_names(view))}
     if variables := view.under("design/variables"):
         content["variables"] = variables

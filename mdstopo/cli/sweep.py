@@ -94,6 +94,8 @@ def set_values(
         )
     _say(output, outcome)
     output.document(_document(outcome, again))
+    for warning in outcome.warnings:
+        output.notice(f"warning: {warning}")
     if outcome.status == "interrupted":
         output.notice(f"interrupted; to go on: {again}")
     return EXIT[outcome.status]
@@ -101,15 +103,16 @@ def set_values(
 
 def _say(output: Output, outcome: "SweepOutcome") -> None:
     output.say(f"{outcome.case.title or outcome.case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
-    rows = [[*outcome.keys, *(o.name for o in outcome.case.objectives), "status", "evaluations"]]
+    rows = [[*outcome.keys, *(o.name for o in outcome.case.objectives), "status", "evaluations", "KKT"]]
     for values, found in zip(outcome.values, outcome.found, strict=True):
         if found is None:
-            rows.append([*values, *("" for _ in outcome.case.objectives), "not run", ""])
+            rows.append([*values, *("" for _ in outcome.case.objectives), "not run", "", ""])
             continue
         word = found.status.value.replace("_", " ")
         if found.status == "failed":
             word += f": {found.reason}"
-        rows.append([*values, *(number(value, 7) for value in found.objectives), word, str(found.evaluations)])
+        cells = [*values, *(number(value, 7) for value in found.objectives), word]
+        rows.append([*cells, str(found.evaluations), number(found.kkt, 2)])
     output.table(rows)
     output.table([["time", duration(outcome.seconds)], ["result", str(outcome.path)]])
 
@@ -121,6 +124,7 @@ def _document(outcome: "SweepOutcome", again: str) -> dict[str, Any]:
             "status": "running" if found is None else found.status.value,
             "reason": "" if found is None else found.reason,
             "objectives": None if found is None else found.objectives,
+            "kkt": None if found is None else found.kkt,
             "evaluations": 0 if found is None else found.evaluations,
         }
         for values, found in zip(outcome.values, outcome.found, strict=True)
@@ -133,6 +137,7 @@ def _document(outcome: "SweepOutcome", again: str) -> dict[str, Any]:
         "objectives": [objective.name for objective in outcome.case.objectives],
         "runs": runs,
         "seconds": outcome.seconds,
+        "warnings": outcome.warnings,
         "path": str(outcome.path),
         "resume": again if outcome.status == "interrupted" else None,
     }

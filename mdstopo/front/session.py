@@ -24,6 +24,7 @@ from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even
 from mdstopo.session.engine import make_engine
 from mdstopo.session.ready import compile_apart
+from mdstopo.session.shortfall import of_many
 from mdstopo.session.starts import NOTHING_VARIES, first_design, replaced, unshared
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
@@ -195,6 +196,9 @@ class _FrontRun:
             if self.pool is not None:
                 self.pool.close()
         self.quality = quality(self.case, front) if front is not None else None
+        if front is not None:
+            ends = [(each.status, each.kkt) for each in front.points if each is not None]
+            self.warnings += of_many(ends, "points", self.case.optimizer.tolerance)
         if path is not None:
             self.save(path, status, reason, front)
         tasks = tuple(self.taken.values())

@@ -20,6 +20,7 @@ from mdstopo.front.tasks import Found, case_key, failed
 from mdstopo.native.threads import cores
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.ready import compile_apart
+from mdstopo.session.shortfall import of_many
 from mdstopo.status import RunStatus, together
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers
@@ -43,6 +44,7 @@ class SweepOutcome:
     reason: str
     seconds: float
     path: Path | None
+    warnings: tuple[str, ...] = ()
 
 
 def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
@@ -139,9 +141,12 @@ def run_sweep(
                 pool.close()
         whole = all(key in sweep.solved for key in sweep.runs)
         status, reason = sweep.verdict() if whole else (RunStatus.INTERRUPTED, "stopped; what is finished is saved")
+        sweep.warnings = sweep.stalled() if whole else ()
         sweep.save(place, status, reason)
     found = tuple(sweep.solved.get(key) for key in sweep.runs)
-    return SweepOutcome(base, tuple(sets), values, found, status, reason, time.perf_counter() - began, place)
+    return SweepOutcome(
+        base, tuple(sets), values, found, status, reason, time.perf_counter() - began, place, sweep.warnings
+    )
 
 
 def _cases(
@@ -174,6 +179,12 @@ class _Sweep:
         self.solved: dict[str, Found] = {}
         self.fixed: Datasets = case_part(base)
         self.provenance = Provenance.collect(command)
+        self.warnings: tuple[str, ...] = ()
+
+    def stalled(self) -> tuple[str, ...]:
+        """The warning about runs that stalled; their tolerances may differ."""
+        found = [self.solved[key] for key in self.runs]
+        return of_many([(each.status, each.kkt) for each in found], "runs")
 
     def verdict(self) -> tuple[RunStatus, str]:
         """How the runs have ended."""
@@ -204,6 +215,7 @@ class _Sweep:
             "objectives": np.array([np.full(m, np.nan) if each is None else each.objectives for each in done]),
             "status": ["running" if each is None else each.status.value for each in done],
             "reason": ["" if each is None else each.reason for each in done],
+            "kkt": np.array([np.nan if each is None else each.kkt for each in done]),
             "evaluations": np.array([0 if each is None else each.evaluations for each in done], dtype=np.int64),
         }
         for k, key in enumerate(self.keys):
@@ -216,7 +228,7 @@ class _Sweep:
                 part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
         datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
         datasets |= tasks_part(tasks, self.base, "sweep/tasks")
-        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, {})
+        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, {}, self.warnings)
 
 
 def shortest(value: float) -> str:

@@ -415,8 +415,7 @@ class Gsao:
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
     ) -> State:
-        """Look at the stops and write the history's row."""
-        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
+        """Write the history's row and look at the stops."""
         state.seconds += self.clock() - began
         state.history = state.history.extended(
             sample,
@@ -427,6 +426,7 @@ class Gsao:
             state.kkt,
             accepted,
         )
+        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
         return state
 
 

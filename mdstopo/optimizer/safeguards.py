@@ -33,6 +33,8 @@ PRICE_CEILING = 1e4
 # off a line says little of a function that is curved. They are kept while they are so near to the highest row of the
 # iterate and the box is at most so wide; so many in all. Where one tells what stood in the way, the box shrinks less.
 CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.1, 0.15, 0.4, 24, 0.8
+# Iterations of which the last decrease is told.
+LATELY = 10
 # Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
 
@@ -201,6 +203,19 @@ def verdict(state: State, stuck: bool, settings: Settings) -> tuple[RunStatus, s
     if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, (
             f"the limit of {settings.max_iterations} iterations was reached "
-            f"at a projected KKT residual of {state.kkt:.2g}"
+            f"at a projected KKT residual of {state.kkt:.2g}{lately(state)}"
         )
     return RunStatus.RUNNING, ""
+
+
+def lately(state: State) -> str:
+    """How much U has changed over the last iterations, as the end of a sentence; nothing where that is not known."""
+    count = min(LATELY, state.iteration)
+    taken, objective = state.history.accepted, state.history.objective
+    before = next((objective[k] for k in range(len(taken) - 1 - count, -1, -1) if taken[k]), float("nan"))
+    if count == 0 or not isfinite(before) or before == 0.0:
+        return ""
+    change = (state.objective - before) / abs(before)
+    if change == 0.0:
+        return f"; the last {count} changed nothing"
+    return f"; the last {count} {'lowered' if change < 0.0 else 'raised'} the objective by {abs(change):.2g} of itself"

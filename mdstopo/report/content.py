@@ -27,11 +27,13 @@ def content(source: Source) -> dict[str, Any]:
     case, view = source.case, source.view
     names = list(source.names)
     known = _bounds(source)
+    kkts = view.arrays.get("iterations/kkt", np.zeros(0))
     objectives = {each.name: each for each in case.objectives}
     page: dict[str, Any] = {
         "title": source.title,
         "status": view.status.replace("_", " "),
         "reason": view.reason,
+        "kkt": _plain(_rounded(kkts[-1:], 2))[0] if view.kind == "run" and len(kkts) else None,
         "kind": view.kind,
         "warnings": list(view.warnings),
         "case": view.case_text,
@@ -60,6 +62,7 @@ def content(source: Source) -> dict[str, Any]:
             "weights": _rounded(view.arrays["pareto/weights"]),
             "dominated": view.arrays["pareto/dominated"].tolist(),
             "status": list(view.lines("pareto/status")),
+            "kkt": _rounded(view.arrays["pareto/kkt"], 2),
         }
     return page
 

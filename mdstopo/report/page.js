@@ -167,9 +167,10 @@
     });
   };
 
+  const ended = (status, kkt) => status.replace("_", " ") + (kkt === null || kkt === undefined ? "" : `, KKT residual ${kkt.toExponential(1)}`);
   const numbers = () => {
-    const rows = data.front ? data.front.objectives.map((p, j) => [`point ${j}`, ...p.map((x) => number(x, 7)), data.front.status[j]])
-      : data.iterations ? [["final", ...data.iterations.objectives.map((ys) => number(ys[ys.length - 1], 9)), data.status]] : [];
+    const rows = data.front ? data.front.objectives.map((p, j) => [`point ${j}`, ...p.map((x) => number(x, 7)), ended(data.front.status[j], data.front.kkt[j])])
+      : data.iterations ? [["final", ...data.iterations.objectives.map((ys) => number(ys[ys.length - 1], 9)), ended(data.status, data.kkt)]] : [];
     const table = document.createElement("table");
     for (const row of [["", ...data.objectives.map((o) => `${o.name}, ${o.unit}`), ""], ...rows]) {
       const tr = table.insertRow();
@@ -197,7 +198,7 @@
   const show = (frame) => { state.frame = frame; at("time").value = frame; document.body.dataset.frame = frame; draw(); };
 
   text("title", data.title);
-  text("status", `${data.status}: ${data.reason}`);
+  text("status", `${ended(data.status, data.kkt)}: ${data.reason}`);
   for (const warning of data.warnings) at("warnings").appendChild(Object.assign(document.createElement("li"), { textContent: warning }));
   text("case", data.case);
   for (const [key, value] of Object.entries({ ...data.versions, ...data.settings })) { const tr = at("versions").insertRow(); tr.insertCell().textContent = key; tr.insertCell().textContent = value; }

@@ -14,17 +14,20 @@ Floats = NDArray[np.float64]
 _USED = 0.9  # share of a volume limit below which it is far from active
 _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
 _MOTIONS = ("displacement", "angle")  # responses whose limit, or whose minimum, restrains
+#: share of the scene's size, or of a radian, by which prescribed motions of two designs differ at most
+_SAME = 1e-6
 
 
 def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapping[str, Motion]) -> tuple[str, ...]:
     """Warnings about the final design, alpha with the values of variables (N + P,).
 
     before, after: the motion by load case with the starting and the final design. Both warnings are signs of
-    the soft branch: stored energy, accelerations and forces also fall when members that restrain the bodies are taken
-    away. Where a displacement or an angle is bounded or minimised, that cannot be, and nothing is said.
+    the soft branch: stored energy also falls when members that restrain the bodies are taken away. Where a displacement
+    or an angle is bounded or minimised, that cannot be, and nothing is said; nor where the energy is no objective, or
+    where joints and motions prescribe how the bodies move, as in a driven linkage.
     """
     found = []
-    soft = any(not is_held(case, objective.load_case) for objective in _minimised(case))
+    soft = any(may_soften(case, name) and not _prescribed(before[name], after[name]) for name in after)
     for row in case.constraints if soft else ():
         if isinstance(row, VolumeRow) and row.sense == "limit" and row.bound > 0.0:
             share = row.spent(design) / row.bound
@@ -35,7 +38,7 @@ def advise(case: Case, design: Floats, before: Mapping[str, Motion], after: Mapp
                     "spend the volume (`equals`), or bound a displacement"
                 )
     for name, motion in after.items():
-        if is_held(case, name) or not (motion.status.ok and before[name].status.ok):
+        if not may_soften(case, name) or not (motion.status.ok and before[name].status.ok):
             continue
         earlier, later = relative_motion(case, before[name]), relative_motion(case, motion)
         if later > _LARGER * earlier:
@@ -68,6 +71,19 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
             "the optimiser had nothing to go by there"
         )
     return tuple(told)
+
+
+def may_soften(case: Case, load_case: str) -> bool:
+    """Whether energy is minimised in this load case and nothing there restrains the motion."""
+    energy = any(each.response.kind == "energy" and each.load_case == load_case for each in _minimised(case))
+    return energy and not is_held(case, load_case)
+
+
+def _prescribed(before: Motion, after: Motion) -> bool:
+    """Whether the motion does not depend on the design: no degree of freedom is left, and multipliers follow it."""
+    if not (before.status.ok and after.status.ok) or before.lam.shape[1] < before.q.shape[1]:
+        return False
+    return bool(np.abs(after.q[-1] - before.q[-1]).max() <= _SAME * max(1.0, float(np.abs(before.q).max())))
 
 
 def is_held(case: Case, load_case: str) -> bool:

@@ -96,6 +96,12 @@ class Outcome:
     variables: Mapping[str, Floats] = field(default_factory=dict)
 
     @property
+    def kkt(self) -> float:
+        """The projected KKT residual at the best start's last iterate, relative to the largest |dU/dalpha|."""
+        state = self.states[self.best_start]
+        return float("nan") if state is None else float(state.kkt)
+
+    @property
     def keeps_constraints(self) -> bool:
         """Whether the best design does, to the optimiser's tolerance."""
         state = self.states[self.best_start]

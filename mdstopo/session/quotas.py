@@ -103,13 +103,15 @@ def same(one: State, other: State) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """One distinct optimum: U, its violation, by which starts, their evaluations all told, and how it ended."""
+    """One distinct optimum: U, its violation, by which starts, their evaluations all told, and how the best of them
+    ended, at which KKT residual."""
 
     objective: float
     violation: float
     starts: tuple[int, ...]
     evaluations: int
     status: RunStatus
+    kkt: float
 
 
 def distinct(states: Sequence[State | None], tolerance: float) -> list[Found]:
@@ -131,6 +133,7 @@ def distinct(states: Sequence[State | None], tolerance: float) -> list[Found]:
             tuple(index for index, _ in group),
             sum(state.evaluations for _, state in group),
             group[0][1].status,
+            group[0][1].kkt,
         )
         for group in groups
     ]

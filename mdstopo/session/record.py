@@ -87,13 +87,15 @@ def _starts_part(case: Case, states: Sequence[State | None]) -> Datasets:
     objectives = np.full((len(states), len(case.objectives)), np.nan)
     space = case.space
     designs = np.full((len(states), space.length), np.nan)
+    residuals = np.full(len(states), np.nan)
     words = []
     for index, state in enumerate(states):
         words.append("running" if state is None or not is_done(case, state) else str(state.status))
         if state is not None:
             objectives[index] = iteration_columns(case, state)["objectives"][best_row(state)]
             designs[index] = space.expand(state.best_alpha)
-    part: Datasets = {"starts/objectives": objectives, "starts/status": words}
+            residuals[index] = state.kkt
+    part: Datasets = {"starts/objectives": objectives, "starts/status": words, "starts/kkt": residuals}
     return part | design_part(case, designs, "starts")
 
 

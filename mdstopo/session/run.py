@@ -26,6 +26,7 @@ from mdstopo.session.outcome import Outcome, Progress
 from mdstopo.session.quotas import rounds
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
+from mdstopo.session.shortfall import of_run
 from mdstopo.session.stages import first_row, is_done, iterations_of, run_stages, stage_of
 from mdstopo.session.starts import NOTHING_VARIES, is_moved, replaced, unshared
 from mdstopo.status import RunStatus
@@ -188,6 +189,9 @@ class _Run:
             with self.saved_without_worker(path):
                 self.complete(engine, best)
             status, reason = self.judge(best, status, reason)
+            ended_at = self.states[best]
+            assert ended_at is not None
+            self.warnings += of_run(self.case, ended_at)
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - opened, compiled - began)

@@ -1,0 +1,78 @@
+"""What is said of a run that ended before its optimality conditions held: how far off, what holds it, what to do."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mdstopo.case.model import Case, ResponseRow
+from mdstopo.case.units import words
+from mdstopo.optimizer.state import State
+from mdstopo.optimizer.structure import SIGNS
+from mdstopo.status import RunStatus
+
+TRY = (
+    "try more starts (`--starts 8`), a tighter solver.tolerance where gradients have too few digits, "
+    "or a looser optimizer.tolerance where that is good enough"
+)
+#: constraints that are named, and the least share of the Lagrangian's gradient that one has
+NAMED, SHARE = 3, 1e-2
+
+
+def of_run(case: Case, state: State) -> tuple[str, ...]:
+    """The warning about a stalled run whose limits hold; none about others."""
+    if state.status is not RunStatus.STALLED or state.best_violation > case.optimizer.tolerance:
+        return ()
+    held = holders(case, state)
+    by = f"; it is held by {', '.join(held)}" if held else ""
+    return (
+        f"stalled at a KKT residual of {residual(state.kkt)} where optimizer.tolerance asks for "
+        f"{case.optimizer.tolerance:.2g}{by}: {TRY}",
+    )
+
+
+def of_many(ends: Sequence[tuple[RunStatus, float]], noun: str, tolerance: float | None = None) -> tuple[str, ...]:
+    """The warning about those of several runs that stalled, by status and residual. noun: what they are, plural."""
+    stalled = [kkt for status, kkt in ends if status is RunStatus.STALLED]
+    if not stalled:
+        return ()
+    known = [kkt for kkt in stalled if np.isfinite(kkt)]
+    up_to = f" at KKT residuals up to {residual(max(known))}" if known else ""
+    asked = f" where optimizer.tolerance asks for {tolerance:.2g}" if up_to and tolerance is not None else ""
+    return (f"{len(stalled)} of {len(ends)} {noun} stalled{up_to}{asked}: {TRY}",)
+
+
+def residual(kkt: float) -> str:
+    """A residual in words."""
+    return f"{kkt:.2g}" if np.isfinite(kkt) else "unknown size"
+
+
+def holders(case: Case, state: State) -> list[str]:
+    """The objective and the constraints whose rows carry the largest share of the Lagrangian's gradient, that first.
+
+    Known of the bundle method; empty where another one ended the run.
+    """
+    rows = state.bundle
+    if not state.competing or state.restoring or not len(rows) or len(rows) != len(state.multipliers):
+        return []
+    weights = state.multipliers * np.abs(rows.slope).max(axis=1, initial=0.0)
+    whose = [-1]
+    for index, row in enumerate(case.constraints):
+        if isinstance(row, ResponseRow):
+            whose += [index] * len(SIGNS[row.sense])
+    shares: dict[int, float] = {}
+    for group, weight in zip(rows.group.tolist(), weights.tolist(), strict=True):
+        if group < len(whose):
+            shares[whose[group]] = shares.get(whose[group], 0.0) + weight
+    total = sum(shares.values())
+    order = sorted((index for index in shares if index >= 0), key=lambda index: (-shares[index], index))
+    named = [index for index in order if shares[index] > SHARE * total][:NAMED]
+    competing = int(np.count_nonzero((rows.group == 0) & (weights > SHARE * total)))
+    peaks = f" ({competing} rows compete)" if competing > 1 else ""
+    return [f"the objective{peaks}", *(f"constraints[{i}] ({_what(case, i)})" for i in named)]
+
+
+def _what(case: Case, index: int) -> str:
+    row = case.constraints[index]
+    assert isinstance(row, ResponseRow)
+    where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
+    return f"{row.over_time} {words(row.response)}{where}"
