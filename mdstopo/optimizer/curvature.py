@@ -11,7 +11,7 @@ import numpy as np
 
 from mdstopo.optimizer.problem import Bools, Floats
 
-#: variables up to which B is a matrix, and steps that are kept where it is none
+#: variables up to which B is a matrix, and the last steps that it is learnt from where it is none
 FEW, PAIRS = 250, 12
 #: the least y's over s'B s, before y is bent towards B s
 DAMPING = 0.2
@@ -89,6 +89,7 @@ def _first(steps: Floats, changes: Floats, floor: float) -> float:
 
 
 def _bent(s: Floats, y: Floats, Bs: Floats, sBs: float) -> Floats:
+    """y (N,), bent towards B s where the function bends down along s (Powell's damping), so that B stays positive."""
     sy = float(s @ y)
     if sy >= DAMPING * sBs:
         return y
@@ -99,31 +100,36 @@ def _bent(s: Floats, y: Floats, Bs: Floats, sBs: float) -> Floats:
 def _compact(steps: Floats, changes: Floats, sigma: float) -> Curvature:
     """The same of the last steps in compact form, as weights of orthonormal directions."""
     n = steps.shape[1]
-    S: list[Floats] = []
-    Y: list[Floats] = []
-    found = Curvature.diagonal_of(np.full(n, sigma))
+    S, Y = np.zeros((n, 0)), np.zeros((n, 0))
+    inner = np.zeros((0, 0))
     for s, y in zip(steps, changes, strict=True):
-        Bs = found.times(s)
+        Bs = sigma * s - _beside(S, Y, sigma) @ (inner @ (_beside(S, Y, sigma).T @ s))
         sBs = float(s @ Bs)
         if not sBs > 0.0:
             continue
-        S.append(s)
-        Y.append(_bent(s, y, Bs, sBs))
-        found = _of_pairs(np.array(S).T, np.array(Y).T, sigma)
-    return found
-
-
-def _of_pairs(S: Floats, Y: Floats, sigma: float) -> Curvature:
-    """B = sigma I - [sigma S, Y] M^-1 [sigma S, Y]' with M = [[sigma S'S, L], [L', -D]]."""
-    SY = S.T @ Y
-    L, D = np.tril(SY, -1), np.diag(np.diag(SY))
-    M = np.block([[sigma * (S.T @ S), L], [L.T, -D]])
-    directions, R = np.linalg.qr(np.concatenate([sigma * S, Y], axis=1))
-    try:
-        inner = -R @ np.linalg.solve(M, R.T)
-    except np.linalg.LinAlgError:
-        return Curvature.diagonal_of(np.full(len(S), sigma))
-    weight, turn = np.linalg.eigh(0.5 * (inner + inner.T))
+        more_S, more_Y = np.column_stack([S, s]), np.column_stack([Y, _bent(s, y, Bs, sBs)])
+        found = _inner(more_S, more_Y, sigma)
+        if found is not None:
+            S, Y, inner = more_S, more_Y, found
+    if not S.shape[1]:
+        return Curvature.diagonal_of(np.full(n, sigma))
+    directions, R = np.linalg.qr(_beside(S, Y, sigma))
+    turned = -R @ inner @ R.T
+    weight, turn = np.linalg.eigh(0.5 * (turned + turned.T))
     weight = np.maximum(weight, -(1.0 - 1e-8) * sigma)
     used = np.abs(weight) > 1e-12 * max(1.0, float(np.abs(weight).max(initial=0.0)))
-    return Curvature(np.full(len(S), sigma), directions @ turn[:, used], weight[used])
+    return Curvature(np.full(n, sigma), directions @ turn[:, used], weight[used])
+
+
+def _beside(S: Floats, Y: Floats, sigma: float) -> Floats:
+    return np.concatenate([sigma * S, Y], axis=1)
+
+
+def _inner(S: Floats, Y: Floats, sigma: float) -> Floats | None:
+    """M^-1 of B = sigma I - [sigma S, Y] M^-1 [sigma S, Y]' with M = [[sigma S'S, L], [L', -D]]; None: singular."""
+    SY = S.T @ Y
+    L, D = np.tril(SY, -1), np.diag(np.diag(SY))
+    try:
+        return np.asarray(np.linalg.inv(np.block([[sigma * (S.T @ S), L], [L.T, -D]])))
+    except np.linalg.LinAlgError:
+        return None
