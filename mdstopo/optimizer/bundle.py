@@ -106,7 +106,7 @@ class Bundle:
         return highest(self.values(), self.group, groups)
 
     def moved(self, d: Floats, way: float) -> "Bundle":
-        """The same rows seen from another iterate, d (N,) away, in ranges by `way`; none is its own."""
+        """The same rows seen from another iterate: d (N,) away, way in ranges (2-norm); none is its own."""
         return self._with(vector=self.vectors_at(d), own=np.zeros(len(self), dtype=np.bool_), far=self.far + way)
 
     def lowered(self, levels: Floats, bend: Floats) -> "Bundle":
@@ -131,7 +131,7 @@ class Bundle:
         return Bundle(vector, slope, np.concatenate(wide), excess, group, own, idle, far)
 
     def without_repeats(self) -> "Bundle":
-        """Of rows that say the same one each, the last."""
+        """The last one of rows that are the same within SAME."""
         if len(self) < 2:
             return self
         steepest = np.abs(self.slope).max(axis=1)
@@ -183,5 +183,6 @@ def highest(values: Floats, group: Ints, groups: int) -> Floats:
 
 
 def _values(vector: Floats, excess: Floats) -> Floats:
+    """The values (K,) of lines (excess NaN) and norms with vectors (K, 2)."""
     size = np.sqrt(vector[:, 0] ** 2 + vector[:, 1] ** 2)
     return np.where(np.isnan(excess), vector[:, 0], size - excess)

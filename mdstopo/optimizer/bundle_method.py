@@ -51,14 +51,21 @@ NARROW = 0.1
 
 
 class BundleMethod:
-    """Begin, judge and propose for one problem's space and settings."""
+    """Begin, judge and propose for one problem.
+
+    space: bounds, linear rows and ranges; settings: from `presets.settings`. Each method changes the state that it is
+    given; the driver copies it first, and takes an accepted trial as the iterate.
+    """
 
     def __init__(self, space: Space, settings: Settings) -> None:
         self.space = space
         self.settings = settings
 
     def begin(self, state: State, price: Floats | None = None) -> None:
-        """Know the iterate's rows alone."""
+        """Start again at the iterate, with its rows alone and without curvature.
+
+        price (J,): what violations cost from here on; None: as `first_price` says, and nothing while restoring.
+        """
         sample = state.sample
         rows = self._bundle(sample, state.restoring)
         state.bundle, state.multipliers = rows, np.zeros(len(rows))
@@ -77,14 +84,17 @@ class BundleMethod:
     def first_price(self, rows: Bundle) -> Floats:
         """The price of each constraint (J,): its gradient then weighs as much as the objective's."""
         groups = int(rows.group.max(initial=0)) + 1
-        steepest = highest(np.abs(rows.slope / 1.0).max(axis=1, initial=0.0), rows.group, groups)
+        steepest = highest(np.abs(rows.slope).max(axis=1, initial=0.0), rows.group, groups)
         steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
         return np.asarray(MARGIN * steepest[0] / steepest[1:])
 
     # -- the steps
 
     def judge(self, state: State, sample: Sample) -> bool:
-        """Accept or reject the evaluated trial; whether it was accepted."""
+        """Whether the evaluated trial is accepted; its rows join the bundle in any case, seen from the next iterate.
+
+        Adapts the trust box, the curvature's steps, the bend, and the counts of steps without decrease.
+        """
         settings, space = self.settings, self.space
         new = self._bundle(sample, state.restoring)
         groups = len(state.price) + 1
@@ -129,7 +139,7 @@ class BundleMethod:
         steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
         if np.isnan(state.kkt):
             price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * 1e3
-            state.kkt, _ = residual(own, state.alpha, space, price, steepest)
+            state.kkt = residual(own, state.alpha, space, price, steepest)
         B = learnt_from(state.steps, state.changes, max(steepest, 1e-300), space.range)
         box = self._box(state)
 
@@ -144,7 +154,6 @@ class BundleMethod:
             state.bundle = rows = own
             B = Curvature.diagonal_of(np.full(len(state.alpha), FLOOR * steepest) / space.range**2)
             trial = self._steer(state, rows, solved(state.price), here, box, solved)
-        self._solved = trial
         promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.price)
         state.predicted = merit(here[0], here[1:], state.price) - promised
         state.trial = trial.x
@@ -163,6 +172,7 @@ class BundleMethod:
         return rows
 
     def _learn(self, state: State, new: Bundle, d: Floats) -> None:
+        """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
         change = changes_of(state.bundle, new, d, state.multipliers)
         if change is None or not float(np.abs(d).max(initial=0.0)) > 0.0:
             return
@@ -171,6 +181,7 @@ class BundleMethod:
         state.changes = np.concatenate([state.changes, change[None]])[-most:]
 
     def _box(self, state: State) -> tuple[Floats, Floats]:
+        """The lowest and the highest x (N,) of the next step: bounds, move limit and trust box."""
         space = self.space
         reach = np.minimum(self.settings.number("move_limit"), state.trust * space.range)
         return np.maximum(space.lower, state.alpha - reach), np.minimum(space.upper, state.alpha + reach)
@@ -179,7 +190,11 @@ class BundleMethod:
         self, state: State, rows: Bundle, trial: Trial, here: Floats, box: tuple[Floats, Floats],
         solved: Callable[[Floats], Trial],
     ) -> Trial:  # fmt: skip
-        """Prices that make the step take away enough of what violation can go in the box."""
+        """The trial, at prices that make it take away enough of the violation that can go in the box.
+
+        Raises `state.price` until it does, and else lets it follow the multipliers. here (J + 1,): the groups' levels
+        at the iterate; solved: the trial at given prices.
+        """
         if not len(state.price):
             return trial
         limits = rows.group > 0

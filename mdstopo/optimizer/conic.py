@@ -28,6 +28,10 @@ ENOUGH_GAP, ENOUGH_RESIDUAL = 1e-8, 1e-8
 PATIENCE = 3
 #: share of the way to the boundary that a step goes
 SHARE = 0.99
+#: what a determinant is at least: a point on the boundary is taken to be next to it
+TINY = 1e-30
+#: the signs of the cone's reflection (x_0, -x_1, -x_2)
+_FLIP = np.array([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +69,9 @@ class Program:
 
 @dataclass(frozen=True, slots=True)
 class Solution:
-    """d (N,); level (J + 1,) of the groups; multipliers of lines (KL,) and of norms (KC,); pull (KC, N): the slope of
-    each norm at d; linear_multipliers (m,); interior steps taken; whether it is solved, and how well: mean
-    complementarity and largest residual of the scaled problem."""
+    """d (N,); level (J + 1,): e of the groups; multipliers of the lines (KL,), norms (KC,) and linear rows (m,); steps
+    of the interior point; solved: whether it counts as a solution, with gap, the mean complementarity, and residual,
+    the largest of the optimality conditions, both of the scaled problem."""
 
     d: Floats
     level: Floats
@@ -100,7 +104,10 @@ class _Point:
 
 
 def solve(program: Program) -> Solution:
-    """Solve the program; see `Solution` for how well that went."""
+    """Solve the program; `Solution.solved` tells whether that succeeded.
+
+    The objective, group 0, needs a row. Raises AssertionError where numbers of the program are not finite.
+    """
     with np.errstate(all="ignore"):  # what is not finite ends the iteration
         return _Interior(program).solve()
 
@@ -154,11 +161,6 @@ class _Scaling:
         if cross is not None:
             right -= _product(self.inverse_times(cross[0]), self.times(cross[1]))
         return self.times(_divided(right, self.lam))
-
-
-#: what a determinant is at least: a point on the boundary is taken to be next to it
-TINY = 1e-30
-_FLIP = np.array([1.0, -1.0, -1.0])
 
 
 def _determinant(x: Floats) -> Floats:
@@ -253,6 +255,7 @@ class _Interior:
     # -- the iteration
 
     def solve(self) -> Solution:
+        """The best point of the iteration, which ends at rounding, after MAX_STEPS or where no step is possible."""
         point = self._start()
         best: tuple[float, _Point, float, float] | None = None
         step = lately = 0
@@ -333,6 +336,7 @@ class _Interior:
         return gradient, by_level, line, norm - x.s_norm, limit
 
     def _gap(self, x: _Point) -> float:
+        """The sum of all products of a slack and its multiplier."""
         total = x.v @ x.z_lower + x.upper_gap @ x.z_upper + x.s_line @ x.y_line + x.e[1:] @ x.z_elastic
         total += float((x.s_norm * x.y_norm).sum()) + float((x.s_limit * x.y_limit)[~self.equal].sum())
         return float(total)
@@ -443,6 +447,7 @@ class _Interior:
         return share * min(longest, self.scaling.longest(d.s_norm, d.y_norm))
 
     def _solution(self, x: _Point, steps: int, solved: bool, gap: float, worst: float) -> Solution:
+        """The point in the units of the program; d at a bound is that bound to the bit."""
         program = self.program
         # the nearer end tells the place: from the farther it would be rounding
         d = np.where(x.v < x.upper_gap, program.lower + x.v * self.width, program.upper - x.upper_gap * self.width)

@@ -11,7 +11,7 @@ import numpy as np
 
 from mdstopo.optimizer.problem import Bools, Floats
 
-#: variables up to which B is a matrix, and steps that are kept where it is none
+#: variables up to which B is a matrix, and the last steps that it is learnt from where it is none
 FEW, PAIRS = 250, 12
 #: the least y's over s'B s, before y is bent towards B s
 DAMPING = 0.2
@@ -89,6 +89,7 @@ def _first(steps: Floats, changes: Floats, floor: float) -> float:
 
 
 def _bent(s: Floats, y: Floats, Bs: Floats, sBs: float) -> Floats:
+    """y (N,), bent towards B s where the function bends down along s (Powell's damping), so that B stays positive."""
     sy = float(s @ y)
     if sy >= DAMPING * sBs:
         return y

@@ -18,7 +18,6 @@ from mdstopo.status import Status
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Truths = NDArray[np.bool_]
 Bools = NDArray[np.bool_]
 
 
@@ -42,8 +41,7 @@ class LinearRows:
         return len(self.b)
 
     def excess(self, x: Floats) -> Floats:
-        """A x - b, (m,): positive where a limit is exceeded. Summed in a fixed order, whatever the
-        threads."""
+        """A x - b, (m,): positive where a limit is exceeded. Summed in a fixed order, whatever the threads."""
         return np.asarray(np.einsum("ij,j->i", self.A, x) - self.b)
 
 
@@ -74,8 +72,7 @@ class Sample:
     status: anything but `Status.OK` means the evaluation failed; values may then be missing.
     message: what a failure was about (the member, the time), in words; may be empty.
     info: what the driver should record with the iterate, number or array by name (`objectives`, `peak_time`).
-    The
-        names and shapes must not change from sample to sample of one problem.
+        The names and shapes must not change from sample to sample of one problem.
     """
 
     objective: float
@@ -114,10 +111,21 @@ class Sample:
 class Problem(Protocol):
     """The duties of a problem.
 
-    1. `initial`, `lower`, `upper` (N,) and `linear` never change; lower <= upper; `initial` may be
-    infeasible. 2. `evaluate` is a pure function of x: the same bits in, the same bits out, or resumed runs
-    differ. 3. `evaluate` never raises because of x: a design that cannot be computed comes back with a
-    status. 4. `gradient=False` may leave `gradients` and `constraint_gradients` empty.
+    1. `initial`, `lower`, `upper` (N,) and `linear` never change; lower <= upper; `initial` may be infeasible.
+    2. `evaluate` is a pure function of x: the same bits in, the same bits out, or resumed runs differ.
+    3. `evaluate` never raises because of x: a design that cannot be computed comes back with a status.
+    4. `gradient=False` may leave `gradients` and `constraint_gradients` empty.
+
+    A problem may have more, which is asked for by name (`getattr`, `hasattr`) and therefore not declared below:
+
+    competes (bool, else False): whether the bundle method makes the steps from the start; else the separable
+        approximation begins, and the bundle method takes over where that gets no further.
+    competitors (int or None, else None): how many of the highest rows the separable approximation takes; None: as the
+        options `peaks` and `peak_window` say.
+    even (int, else 0): how many of the last variables are drawn uniformly at every random start, because no part of
+        their range is likelier than another.
+    softened(share) -> Problem: the same problem with members that have only this share of their strength, with which a
+        start of the family `starts.Family.SOFTENED` begins; without it such a start begins as the first one does.
     """
 
     @property

@@ -31,7 +31,10 @@ class Rows:
 
 
 class Reduced(ABC):
-    """One problem's system: factored for a point, then solved for several right sides."""
+    """One problem's system: factored for a point, then solved for several right sides.
+
+    P: the curvature (N, N); A (m, N): the linear rows; groups: J + 1.
+    """
 
     def __init__(self, P: Curvature, A: Floats, groups: int) -> None:
         self.P, self.A, self.groups = P, A, groups
@@ -103,7 +106,10 @@ class ByRows(Reduced):
 
 
 class _Inverse:
-    """A dense symmetric matrix, ready to be divided by: scaled to a diagonal of ones, its solutions refined."""
+    """The inverse of a dense symmetric matrix, scaled to a diagonal of ones.
+
+    Raises LinAlgError where the matrix is singular or not finite.
+    """
 
     def __init__(self, M: Floats) -> None:
         size = np.sqrt(np.abs(np.diag(M)))
@@ -115,6 +121,7 @@ class _Inverse:
         self.inverse = np.linalg.inv(self.M)
 
     def times(self, right: Floats) -> Floats:
+        """The solution for a right side, after two steps of iterative refinement."""
         scaled = right * self.scale
         found = self.inverse @ scaled
         for _ in range(2):

@@ -69,7 +69,11 @@ def merit(objective: float, levels: Floats, price: Floats) -> float:
 def subproblem(
     bundle: Bundle, x: Floats, space: Space, box: tuple[Floats, Floats], price: Floats, curvature: Curvature
 ) -> Trial:
-    """Solve the model in the box (lower, upper) around x."""
+    """Solve the model in the box (lower, upper) of designs around x (N,).
+
+    price (J,): of the constraints' violations; curvature: B. Fixed variables and linear rows without a free one are
+    left out; the trial keeps box and linear rows to rounding.
+    """
     lower, upper = box[0] - x, box[1] - x
     free = upper > lower
     d, linear = np.zeros(len(x)), np.zeros(len(space.linear))
@@ -99,7 +103,7 @@ def subproblem(
 def least_violation(
     bundle: Bundle, x: Floats, space: Space, box: tuple[Floats, Floats], weight: Floats
 ) -> Trial:
-    """The step to the least sum of weighted violations in the box."""
+    """The step to the least sum of violations in the box, times weight (J,); of the rows of constraints alone."""
     only = bundle.of_places(bundle.group > 0)
     nothing = Bundle(
         np.zeros((1, 2)), np.zeros((1, len(x))), np.zeros((1, only.across.shape[1])), np.array([np.nan]),
@@ -138,30 +142,33 @@ def changes_of(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> F
 
 
 def learnt_from(steps: Floats, changes: Floats, steepest: float, range_: Floats) -> Curvature:
-    """B in the variables' own units; it is learnt in ranges."""
+    """B in the variables' own units; it is learnt in ranges.
+
+    steps, changes (m, N): as `curvature.learnt`, in the variables' own units; steepest: the largest gradient entry of
+    the objective's rows; range_ (N,).
+    """
     floor = FLOOR * steepest
     found = learnt(steps / range_, changes * range_, floor)
     return found.scaled(1.0 / range_, 1.0)
 
 
-def residual(
-    own: Bundle, x: Floats, space: Space, price: Floats, steepest: float
-) -> tuple[float, Floats]:
-    """The projected KKT residual at x, relative to the largest gradient entry `steepest`, and the rows' multipliers.
+def residual(own: Bundle, x: Floats, space: Space, price: Floats, steepest: float) -> float:
+    """The projected KKT residual at x, relative to the largest gradient entry `steepest`.
 
-    The multipliers are those of the proximal step, whose curvature is that entry: they make the residual all but least.
-    It is the largest of: what a step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
+    own: the iterate's rows; price (J,): bounds of the constraints' multipliers. The multipliers are those of the
+    proximal step, whose curvature is that entry: they make the residual all but least. It is the largest of: what a
+    step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
     the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
     """
     if steepest == 0.0:
-        return 0.0, np.zeros(len(own))
+        return 0.0
     lines = Bundle(
         np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
         np.full(len(own), np.nan), own.group, own.own, own.idle, own.far,
     )  # fmt: skip
     flat = Curvature.diagonal_of(np.full(len(x), steepest))
     trial = subproblem(lines, x, space, (space.lower, space.upper), price, flat)
-    return residual_of(lines, trial.multipliers, trial.linear, x, space, steepest), trial.multipliers
+    return residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
 
 
 def residual_of(

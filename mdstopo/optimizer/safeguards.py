@@ -17,17 +17,19 @@ from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide import finite
 from mdstopo.status import RunStatus, Status
 
+# Least and largest weight of the convex term, relative to the largest gradient entry over the range.
 CONVEX_FLOOR = 1e-6
 CONVEX_CEILING = 1e6
-# A minimiser of a linear function plus the convex term is promised half of the linear decrease: a step that
-# gains
-# much more than promised was held back by that term.
+# A minimiser of a linear function plus the convex term is promised half of the linear decrease: a step that gains much
+# more than promised was held back by that term.
 TOO_CONVEX = 1.5
+# Factor on the price of a constraint whose multiplier has come up to it while limits are violated.
 PRICE_GROWTH = 10.0
 # A merit is exact where violations cost more than the multipliers; every bit more only punishes what a step along a
 # curved limit violates in second order, and makes steps short.
 CHARGE = 2.0
 CHARGE_FALL = 0.5
+# Largest price, in first prices.
 PRICE_CEILING = 1e4
 # Rows of a rejected trial so near to its highest become cuts where the trust box is at most so wide, in ranges; further
 # off a line says little of a function that is curved. They are kept while they are so near to the highest row of the
@@ -116,8 +118,7 @@ def next_charge(charge: Floats, multipliers: Floats, price: Floats) -> Floats:
 
 
 def first_price(sample: Sample, settings: Settings) -> Floats:
-    """The price of each constraint, (J,): so that `elastic` times its gradient outweighs the
-    objective's."""
+    """The price of each constraint, (J,): its gradient then weighs `elastic` times as much as the objective's."""
     if not len(sample.constraint_rows):
         return np.zeros(0)
     steepest = sample.levels_of(np.abs(sample.constraint_gradients).max(axis=1))
@@ -142,8 +143,7 @@ def better(objective: float, violation: float, plain: float, state: State, toler
 
 
 def next_trust(trust: float, ratio: float, settings: Settings) -> float:
-    """The half width of the trust box, in ranges, after a step with this ratio of actual to predicted
-    decrease."""
+    """The half width of the trust box, in ranges, after a step with this ratio of actual to predicted decrease."""
     if ratio > settings.number("good_ratio"):
         return min(1.0, trust * settings.number("trust_grow"))
     if ratio < settings.number("poor_ratio"):

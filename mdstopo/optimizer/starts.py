@@ -13,6 +13,7 @@ from mdstopo.optimizer.problem import Floats, Problem
 from mdstopo.optimizer.projection import project
 from mdstopo.optimizer.state import State
 
+#: the power of the uniform numbers of a random design: the higher, the fewer thick members
 SHARPNESS = 4
 #: share of the members that a sparse design has, and of those that a neighbour exchanges
 SPARSE, EXCHANGED = 0.1, 0.15
@@ -34,7 +35,7 @@ class Family(enum.StrEnum):
 #: the families that take turns after the first two starts
 TURNS = (Family.RANDOM, Family.SPARSE, Family.UNIFORM)
 #: the share of the strengths with which a softened start begins
-SHARE = 0.25
+SOFT_STRENGTH = 0.25
 
 
 def family_of(index: int, starts: int) -> Family:
@@ -96,6 +97,7 @@ def neighbour(problem: Problem, seed: int, index: int, best: Floats) -> Floats:
 
 
 def _feasible(problem: Problem, share: Floats, uniform: Floats) -> Floats:
+    """The design at these shares (N,) of the ranges, the last `even` ones uniform, projected on the linear rows."""
     share = share.copy()
     even = getattr(problem, "even", 0)
     if even:
@@ -107,11 +109,12 @@ def _feasible(problem: Problem, share: Floats, uniform: Floats) -> Floats:
 def best_run(runs: Sequence[State | None], tolerance: float) -> int:
     """The index of the best run: feasible before infeasible, then by violation, then by objective, then the first."""
 
-    def key(item: tuple[int, State | None]) -> tuple[bool, float, float, int]:
-        index, state = item
-        if state is None or not np.isfinite(state.best_objective):
-            return True, float("inf"), float("inf"), index
-        infeasible = state.best_violation > tolerance
-        return infeasible, state.best_plain if infeasible else 0.0, state.best_objective, index
+    return min(range(len(runs)), key=lambda index: (*rank(runs[index], tolerance), index))
 
-    return min(enumerate(runs), key=key)[0]
+
+def rank(run: State | None, tolerance: float) -> tuple[bool, float, float]:
+    """What runs are ordered by, the best first: whether infeasible, by how much, the objective; inf of a failed run."""
+    if run is None or not np.isfinite(run.best_objective):
+        return True, float("inf"), float("inf")
+    infeasible = run.best_violation > tolerance
+    return infeasible, run.best_plain if infeasible else 0.0, run.best_objective

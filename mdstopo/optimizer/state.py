@@ -26,10 +26,9 @@ class History:
 
     objective (K+1,): U, NaN where the evaluation failed. info: what the samples report, each (K+1, ...).
     constraints (K+1, m): A x - b. nonlinear (K+1, J): the largest c of each constraint. change (K+1,): largest
-    |change of alpha| against the
-    iterate that the step started from. evaluations (K+1,): so far. seconds (K+1,): wall time so far. kkt
-    (K+1,): projected KKT residual of the best iterate so far relative to the largest |dU/dalpha|. accepted
-    (K+1,): was the design taken?
+    |change of alpha| against the iterate that the step started from. evaluations (K+1,): so far. seconds (K+1,): wall
+    time so far. kkt (K+1,): projected KKT residual at the iterate, after the design was taken or not, relative to the
+    largest |dU/dalpha|. accepted (K+1,): was the design taken?
     """
 
     objective: list[float] = field(default_factory=list)
@@ -149,7 +148,8 @@ class State:
     """What the optimiser knows after an iteration.
 
     The iterate and what was found there: `alpha` (N,), `objective`, `rows` (R,), `gradients` (R, N),
-    `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (largest c, or 0). What rejected trials have
+    `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (`safeguards.scaled_violation`), and
+    `shape`, which rows are norms and which constraint each belongs to. What rejected trials have
     shown: `cuts` (K,), rows that were the highest there, linearised and seen from the iterate, and `cut_gradients`
     (K, N); `forgotten`, the objective at which they were last dropped.
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
@@ -160,11 +160,11 @@ class State:
     objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards,
     `resisted` how many iterates the largest violation has not fallen well below `mark`,
     `left` whether others of several starts go on instead;
-    or else `convex` the relative weight of the quadratic term, `price` (C,) of violations in the subproblem, `charge`
-    (C,) in the merit. Counters: `iteration`, `evaluations`, `small` steps in a row, `failed` evaluations in a row,
-    `seconds`.
+    or else `convex` the relative weight of the quadratic term. Of each constraint: `price` (J,) of violations in the
+    subproblem, `charge` (J,) in the separable approximation's merit. Counters: `iteration`, `evaluations`, `small`
+    steps in a row, `failed` evaluations in a row, `seconds`.
     The best so far: `best_alpha` (N,), `best_objective`, `best_violation`, and `best_plain`, its violation
-    relative to the bounds alone.
+    relative to the bounds alone. How it stands: `status`, and `reason` for it in words. `history`: a row an evaluation.
     """
 
     alpha: Floats

@@ -43,8 +43,8 @@ class StructureProblem:
         if scalarisation is None and len(case.objectives) != 1:
             raise ValueError("several objectives need a scalarisation")
         self.scalarisation = scalarisation
-        #: rows that may compete, where the optimiser's settings shall not say it
         one = scalarisation is None and case.uncertainty is None
+        #: how many of the highest rows the separable approximation takes; None: as the optimiser's settings say
         self.competitors: int | None = None if one else ROWS
         active = [0] if scalarisation is None else scalarisation.active
         self._count = len(case.objectives)

@@ -12,7 +12,7 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_count
-from mdstopo.optimizer.starts import Family, best_run, family_of
+from mdstopo.optimizer.starts import Family, best_run, family_of, rank
 from mdstopo.optimizer.state import State
 from mdstopo.session.starts import Leg
 from mdstopo.status import RunStatus
@@ -57,7 +57,7 @@ def leave(case: Case, states: States, quota: int, keep: Callable[[int, State], N
     begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.left]
     if any(state.iteration > quota for _, state in begun):
         return
-    order = sorted(begun, key=lambda each: (*_rank(each[1], tolerance), each[0]))
+    order = sorted(begun, key=lambda each: (*rank(each[1], tolerance), each[0]))
     most = max(1, math.ceil(SHARE * len(states)))
     kept: list[State] = []
     for index, state in order:
@@ -87,13 +87,6 @@ def falls(state: State) -> bool:
     return bool(before - now >= FALLING * abs(before))
 
 
-def _rank(state: State, tolerance: float) -> tuple[bool, float, float]:
-    if not np.isfinite(state.best_objective):
-        return True, math.inf, math.inf
-    infeasible = state.best_violation > tolerance
-    return infeasible, state.best_plain if infeasible else 0.0, state.best_objective
-
-
 def same(one: State, other: State) -> bool:
     """Whether two starts have come to one optimum."""
     if not abs(one.best_objective - other.best_objective) <= SAME_VALUE * abs(other.best_objective):
@@ -117,7 +110,7 @@ class Found:
 def distinct(states: Sequence[State | None], tolerance: float) -> list[Found]:
     """The distinct optima that the starts have come to, best first."""
     begun = [(index, state) for index, state in enumerate(states) if state is not None]
-    order = sorted(begun, key=lambda each: (*_rank(each[1], tolerance), each[0]))
+    order = sorted(begun, key=lambda each: (*rank(each[1], tolerance), each[0]))
     groups: list[list[tuple[int, State]]] = []
     for item in order:
         for group in groups:

@@ -94,6 +94,12 @@ def run_session(
     ------
     CaseError
         if there is nothing to vary or nothing to improve, or no design keeps the volume rows.
+    ValueError
+        if `starts` is below 1, or `initial` has another length or a number that is not finite.
+    NoUtopiaError
+        if one of several objectives cannot be optimised alone.
+    WorkerError
+        if a worker process dies; what has been reached is saved.
     StoreError
         if the file must not or cannot be written, is in use, or holds a run that cannot be resumed.
     KeyboardInterrupt

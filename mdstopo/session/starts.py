@@ -12,7 +12,7 @@ from mdstopo.optimizer.driver import Gsao, run
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.projection import InfeasibleRows, project
-from mdstopo.optimizer.starts import SHARE, Family, design_of_family
+from mdstopo.optimizer.starts import SOFT_STRENGTH, Family, design_of_family
 from mdstopo.optimizer.state import State
 
 NOTHING_VARIES = "an optimisation needs members with `design: true`, or `design.variables`"
@@ -130,7 +130,7 @@ def run_start(
 
 def _soften(case: Case, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
     """The end of a short run with a quarter of the strengths; None where it was stopped."""
-    optimizer = make_optimizer(case, problem.softened(SHARE))  # type: ignore[attr-defined]
+    optimizer = make_optimizer(case, problem.softened(SOFT_STRENGTH))  # type: ignore[attr-defined]
     state = optimizer.start(first)
     while state.running and state.iteration < SOFT_ITERATIONS:
         if stop():

@@ -1,13 +1,22 @@
 """Independent starts: seeded and feasible."""
 
 import numpy as np
+import pytest
 
 from mdstopo.optimizer.driver import Gsao, run
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.projection import satisfied
-from mdstopo.optimizer.starts import best_run, random_feasible
-
-from .toys import Toy, volume
+from mdstopo.optimizer.starts import (
+    Family,
+    best_run,
+    design_of_family,
+    family_of,
+    neighbour,
+    random_feasible,
+    sparse,
+    uniform,
+)
+from tests.optimizer.toys import Toy, volume
 
 
 def bumpy(x):
@@ -38,3 +47,45 @@ def test_failed_and_missing_runs_are_never_the_best():
     lower = int(runs[1].best_objective < runs[0].best_objective)
     assert best_run(runs, 1e-6) == lower
     assert best_run([None, *runs], 1e-6) == 1 + lower
+
+
+def test_families_take_turns_between_the_first_starts_and_the_neighbour():
+    families = [family_of(index, 8) for index in range(8)]
+    assert families[:2] == [Family.STATED, Family.SOFTENED]
+    assert families[2:7] == [Family.RANDOM, Family.SPARSE, Family.UNIFORM, Family.RANDOM, Family.SPARSE]
+    assert families[7] is Family.NEIGHBOUR
+    assert Family.NEIGHBOUR not in [family_of(index, 3) for index in range(3)]
+
+
+@pytest.mark.parametrize("family", [Family.RANDOM, Family.SPARSE, Family.UNIFORM, Family.NEIGHBOUR])
+def test_designs_of_every_family_keep_bounds_and_rows_and_can_be_repeated(family):
+    problem, best = make(40), np.linspace(0.1, 0.9, 40)
+    x = design_of_family(problem, 3, 5, family, best)
+    assert satisfied(x, problem.linear)
+    assert np.all((x >= problem.lower) & (x <= problem.upper))
+    assert np.array_equal(x, design_of_family(make(40), 3, 5, family, best))
+    assert not np.array_equal(x, design_of_family(problem, 4, 5, family, best))
+
+
+def test_stated_and_softened_starts_begin_at_the_problem_s_own_design():
+    assert design_of_family(make(), 0, 0, Family.STATED) is None
+    assert design_of_family(make(), 0, 1, Family.SOFTENED) is None
+
+
+def test_the_last_variables_of_a_problem_that_has_even_ones_are_uniform():
+    """Whatever the family, they are the numbers that are drawn; without `even` they follow the family."""
+    free = Toy(bumpy, np.full(8, 0.5), 0.0, 1.0)
+    drawn = uniform(free, 0, 1)
+    assert not np.allclose(random_feasible(free, 0, 1)[-3:], drawn[-3:])
+    free.even = 3
+    for make_design in (random_feasible, sparse):
+        x = make_design(free, 0, 1)
+        assert np.array_equal(x[-3:], drawn[-3:])
+        assert not np.allclose(x[:-3], drawn[:-3])
+
+
+def test_a_neighbour_has_the_best_design_s_values_most_of_them_in_their_place():
+    free, best = Toy(bumpy, np.full(40, 0.5), 0.0, 1.0), np.linspace(0.0, 1.0, 40)
+    x = neighbour(free, 0, 1, best)
+    assert np.allclose(np.sort(x), best)
+    assert 0 < np.count_nonzero(x != best) < 20
