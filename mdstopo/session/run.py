@@ -28,7 +28,7 @@ from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
 from mdstopo.session.stages import first_row, is_done, iterations_of, run_stages, stage_of
-from mdstopo.session.starts import NOTHING_VARIES, is_moved, replaced, unshared
+from mdstopo.session.starts import NOTHING_VARIES, Leg, is_moved, replaced, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers
@@ -305,13 +305,21 @@ class _Run:
             else:
                 for leg in legs:
                     if self.stop_requested():
-                        return
+                        break
                     state = self.states[leg.index]
                     self.states[leg.index] = run_stages(
                         self.case, make, problem, leg, state, self.initial, keep, self.stop_requested
                     )
-            if self.stop_requested():
-                return  # before the next round decides from starts that are half done who goes on
+            # who goes on is decided only where all have come as far as they were to: not in a run that is stopped
+            if not all(self.is_through(leg) for leg in legs):
+                break
+
+    def is_through(self, leg: Leg) -> bool:
+        """Whether a start has gone the part of its way that it was to go."""
+        state = self.states[leg.index]
+        if state is None:
+            return False
+        return is_done(self.case, state) or (leg.quota is not None and state.iteration >= leg.quota)
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""

@@ -125,6 +125,8 @@ def run_start(
     def paused() -> bool:
         return stop() or (leg.quota is not None and latest.iteration >= leg.quota)
 
+    if latest.left:
+        return latest
     return run(optimizer, latest, on_iteration=reached, stop_requested=paused)
 
 
