@@ -14,7 +14,7 @@ def ended(problem, **options):
 
 
 def test_a_first_design_that_cannot_be_left_is_judged_by_its_limits() -> None:
-    """x <= 1 and x >= 2 from x = 1: no step lowers U or the excess, and that no design keeps the limit has to be said."""
+    """x <= 1 and x >= 2 from x = 1: no step lowers U or the excess, and the run has to say so."""
     problem = Toy(lambda x: (-x, -np.ones((1, 1))), [1.0], 0.0, 1.0, constraints=lambda x: (2.0 - x, -np.ones((1, 1))))
     state = ended(problem)
     assert state.status is RunStatus.FAILED
