@@ -29,6 +29,7 @@ from mdstopo.optimizer.safeguards import (
     cuts_of,
     failure,
     first_price,
+    is_least,
     merit,
     next_charge,
     next_convex,
@@ -250,23 +251,32 @@ class Gsao:
                 self._propose(state)
             return
         if state.restoring:
-            if plain_violation(state.sample) <= NOTHING * tolerance:
+            kept = plain_violation(state.sample) <= NOTHING * tolerance
+            # what is left may be rounding of a steep limit: within the tolerance it is kept
+            if kept or ((stuck or done) and state.violation <= tolerance):
                 state.restoring = False
                 self._begin_bundle(state, max(state.trust, 1e-3))
                 state.price = DEARER * state.price
                 self._propose(state)
+            elif stuck and not is_least(state, tolerance):
+                self._forget(state)
             return
         resists = len(state.price) > 0 and state.violation > tolerance
         if resists and (stuck or done or state.resisted >= RESISTS):
-            state.restoring = True
+            state.restoring, state.forgets = True, 0
             self._begin_bundle(state, max(state.trust, FRESH_TRUST))
             self._propose(state)
-        elif stuck and not done and state.forgets < FORGETS:
-            # rows from elsewhere may forbid what is possible; without them the model falls wherever U does
-            trust = FRESH_TRUST * SMALLER**state.forgets
-            self._begin_bundle(state, min(trust, max(state.trust, 1e-2 * trust)), state.price)
-            state.forgets += 1
-            self._propose(state)
+        elif stuck and not done:
+            self._forget(state)
+
+    def _forget(self, state: State) -> None:
+        """Go on without rows from elsewhere, which may forbid what is possible; not too often at one place."""
+        if state.forgets >= FORGETS:
+            return
+        trust = FRESH_TRUST * SMALLER**state.forgets
+        self._begin_bundle(state, min(trust, max(state.trust, 1e-2 * trust)), state.price)
+        state.forgets += 1
+        self._propose(state)
 
     def _is_stuck(self, state: State) -> bool:
         """Whether the next step would change next to nothing, or the last ones have."""

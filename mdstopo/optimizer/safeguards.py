@@ -39,6 +39,8 @@ CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.
 LATELY = 10
 # Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
+# What a residual may be at most, in shares of the violation that it says cannot be made smaller.
+RESOLVED = 0.1
 
 
 def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
@@ -190,11 +192,8 @@ def verdict(state: State, stuck: bool, settings: Settings) -> tuple[RunStatus, s
             f"the projected KKT residual, {state.kkt:.2g} of the largest gradient entry, "
             f"is within the tolerance {settings.tolerance:.2g}"
         )
-    if state.restoring and (state.kkt <= settings.tolerance or stuck):
-        return RunStatus.FAILED, (
-            "no design near this one keeps the limits: the largest violation, "
-            f"{plain_violation(state.sample):.3g} of its bound, cannot be made smaller (KKT residual {state.kkt:.2g})"
-        )
+    if state.restoring and (stuck or is_least(state, settings.tolerance)):
+        return _without_limits(state, settings)
     if stuck:
         return RunStatus.STALLED, (
             f"no step is found that lowers the objective, at a projected KKT residual of {state.kkt:.2g} "
@@ -219,3 +218,30 @@ def lately(state: State) -> str:
     if change == 0.0:
         return f"; the last {count} changed nothing"
     return f"; the last {count} {'lowered' if change < 0.0 else 'raised'} the objective by {abs(change):.2g} of itself"
+
+
+def is_least(state: State, tolerance: float) -> bool:
+    """Whether the largest violation is stationary: its residual is small, also beside the violation itself, which where
+    it is tiny could vanish within the residual."""
+    rows, slopes = state.constraint_rows, state.constraint_gradients
+    left = state.kkt * float(np.abs(slopes).max(initial=0.0))
+    return bool(state.kkt <= tolerance and left <= RESOLVED * float(rows.max(initial=0.0)))
+
+
+def _without_limits(state: State, settings: Settings) -> tuple[RunStatus, str]:
+    """The end of a run at an iterate that breaks limits by an amount that no step makes smaller."""
+    excess = f"{plain_violation(state.sample):.3g} of its bound"
+    if state.best_violation <= settings.tolerance:
+        return RunStatus.STALLED, (
+            f"the best design keeps the limits; from a later one, whose largest violation is {excess}, "
+            f"no step is found that makes it smaller (KKT residual {state.kkt:.2g})"
+        )
+    if is_least(state, settings.tolerance):
+        return RunStatus.FAILED, (
+            f"no design near this one keeps the limits: the largest violation, {excess}, "
+            f"cannot be made smaller (KKT residual {state.kkt:.2g})"
+        )
+    return RunStatus.FAILED, (
+        f"no design is found that keeps the limits: no step makes the largest violation, {excess}, smaller, "
+        f"at a KKT residual of {state.kkt:.2g} where {settings.tolerance:.2g} was asked for"
+    )

@@ -14,10 +14,28 @@ def ended(problem, **options):
 
 
 def test_a_first_design_that_cannot_be_left_is_judged_by_its_limits() -> None:
-    """x <= 1 and x >= 2 from x = 1: no step lowers U or the excess; that no design keeps the limit has to be said."""
-    problem = Toy(
-        lambda x: (-x, -np.ones((1, 1))), [1.0], 0.0, 1.0, constraints=lambda x: (2.0 - x, -np.ones((1, 1)))
-    )
+    """x <= 1 and x >= 2 from x = 1: no step lowers U or the excess, and the run has to say so."""
+    problem = Toy(lambda x: (-x, -np.ones((1, 1))), [1.0], 0.0, 1.0, constraints=lambda x: (2.0 - x, -np.ones((1, 1))))
     state = ended(problem)
     assert state.status is RunStatus.FAILED
     assert "no design near this one keeps the limits" in state.reason
+
+
+def test_short_steps_to_an_equality_do_not_end_in_untrue_words() -> None:
+    """A circle to be reached in steps of 0.001: rows from elsewhere forbade what is left, and designs that keep it
+    lie 0.003 away."""
+    center, slope = np.array([0.83886073, 0.35585191]), np.array([0.71556786, 1.20599045])
+    square = float(((np.array([0.34642495, 0.4153254]) - center) ** 2).sum())
+
+    def objective(x):
+        value = np.exp(3.0 * slope @ x)
+        return np.array([value]), (3.0 * value * slope)[None]
+
+    def on_circle(x):
+        c, g = ((x - center) ** 2).sum() / square - 1.0, 2.0 * (x - center) / square
+        return np.array([c, -c]), np.array([g, -g])
+
+    problem = Toy(objective, [0.51939, 0.80318], 0.0, 1.0, constraints=on_circle)
+    state = ended(problem, overrides={"move_limit": 0.001}, max_iterations=75)
+    assert state.best_violation <= 1e-6
+    assert state.status is not RunStatus.FAILED
