@@ -39,10 +39,10 @@ def workplace(tmp_path, monkeypatch):
 def test_an_error_in_one_task_is_its_status(monkeypatch):
     real = jobs.solve
 
-    def solve(engine, case, task, key, stop=None):
+    def solve(engine, case, task, key, *more):
         if task.point == 1:
             raise np.linalg.LinAlgError("singular")
-        return real(engine, case, task, key, stop)
+        return real(engine, case, task, key, *more)
 
     monkeypatch.setattr(jobs, "solve", solve)
     outcome = run_front(read_case(CASE), Ask(spread(4)), workers=1)
@@ -56,8 +56,8 @@ def test_what_no_worker_finished_is_tried_again(monkeypatch):
     run_front(case, ask, path=Path("whole.h5"), workers=1)
 
     class Loses(session.Here):
-        def results(self, tasks):
-            for place, found in super().results(tasks):
+        def results(self, tasks, *more):
+            for place, found in super().results(tasks, *more):
                 yield place, Lost() if tasks[place].point == 1 else found
 
     with monkeypatch.context() as patch:
