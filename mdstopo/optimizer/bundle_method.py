@@ -30,6 +30,7 @@ from mdstopo.optimizer.rows import (
     residual,
     subproblem,
 )
+from mdstopo.optimizer.safeguards import residual_unit
 from mdstopo.optimizer.state import State
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
@@ -139,7 +140,8 @@ class BundleMethod:
         steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
         if np.isnan(state.kkt):
             price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * 1e3
-            state.kkt = residual(own, state.alpha, space, price, steepest)
+            unit = steepest if state.restoring else residual_unit(state, steepest)
+            state.kkt = residual(own, state.alpha, space, price, unit)
         B = learnt_from(state.steps, state.changes, max(steepest, 1e-300), space.range)
         box = self._box(state)
 

@@ -38,6 +38,7 @@ from mdstopo.optimizer.safeguards import (
     no_cuts,
     outdated,
     plain_violation,
+    residual_unit,
     scaled_violation,
     verdict,
 )
@@ -49,6 +50,9 @@ from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
 
+# Share of U by which a design may be better than the iterate that has converged, by what it breaks limits within their
+# tolerance.
+EQUAL = 1e-5
 # Convex terms tried in turn, in the largest gradient entry over the range, where a subproblem resists.
 RESCUE_WEIGHTS = (0.01, 1.0)
 
@@ -122,6 +126,7 @@ class Gsao:
             resisted=0,
             mark=float("inf"),
             left=False,
+            slope=0.0,
             iteration=0,
             evaluations=1,
             small=0,
@@ -405,7 +410,7 @@ class Gsao:
         of volume rows that carry one. At an optimum the subproblem returns the iterate and its multipliers,
         and all are zero.
         """
-        steepest = float(self._measures.steepest(state.gradients)[0])
+        steepest = residual_unit(state, float(self._measures.steepest(state.gradients)[0]))
         if steepest == 0.0:
             return 0.0
         linear = self.problem.linear
@@ -437,7 +442,16 @@ class Gsao:
             accepted,
         )
         state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
+        if state.status is RunStatus.CONVERGED:
+            self._tell_of(state)
         return state
+
+    @staticmethod
+    def _tell_of(state: State) -> None:
+        """What has converged is what is told, where a design before it is better by no more than limits are kept to."""
+        if abs(state.objective - state.best_objective) <= EQUAL * abs(state.best_objective):
+            state.best_alpha, state.best_objective = state.alpha, state.objective
+            state.best_violation, state.best_plain = state.violation, plain_violation(state.sample)
 
 
 def run(

@@ -39,8 +39,17 @@ CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.
 LATELY = 10
 # Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
+# Share of the largest gradient so far that residuals are relative to at least.
+FADED = 0.01
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESOLVED = 0.1
+
+
+def residual_unit(state: State, steepest: float) -> float:
+    """What the KKT residual is relative to: the largest |dU/dalpha| here, `steepest`, or a share of the largest of any
+    iterate: at a smooth minimum inside the bounds the gradient itself vanishes. The largest is kept in the state."""
+    state.slope = max(state.slope, steepest)
+    return max(steepest, FADED * state.slope)
 
 
 def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:

@@ -159,7 +159,7 @@ class State:
     `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
     objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards,
     `resisted` how many iterates the largest violation has not fallen well below `mark`,
-    `left` whether others of several starts go on instead;
+    `left` whether others of several starts go on instead, `slope` the largest |dU/dalpha| of any iterate;
     or else `convex` the relative weight of the quadratic term. Of each constraint: `price` (J,) of violations in the
     subproblem, `charge` (J,) in the separable approximation's merit. Counters: `iteration`, `evaluations`, `small`
     steps in a row, `failed` evaluations in a row, `seconds`.
@@ -198,6 +198,7 @@ class State:
     resisted: int
     mark: float
     left: bool
+    slope: float
     iteration: int
     evaluations: int
     small: int

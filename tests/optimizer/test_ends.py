@@ -39,3 +39,28 @@ def test_short_steps_to_an_equality_do_not_end_in_untrue_words() -> None:
     state = ended(problem, overrides={"move_limit": 0.001}, max_iterations=75)
     assert state.best_violation <= 1e-6
     assert state.status is not RunStatus.FAILED
+
+
+def test_a_smooth_minimum_inside_the_bounds_converges_although_its_gradient_vanishes() -> None:
+    def bowl(x):
+        away = x - [0.4, 0.6]
+        return np.array([1.0 + away[0] ** 2 + 3.0 * away[1] ** 2]), np.array([[2.0 * away[0], 6.0 * away[1]]])
+
+    for competes in (False, True):
+        problem = Toy(bowl, [0.9, 0.1], 0.0, 1.0)
+        problem.competes = competes
+        state = ended(problem)
+        assert state.status is RunStatus.CONVERGED
+        assert np.allclose(state.best_alpha, [0.4, 0.6], atol=1e-5)
+
+
+def test_what_is_told_of_a_converged_run_is_the_design_that_has_converged() -> None:
+    """A design that breaks its limit within the tolerance is lower, and no optimum."""
+    problem = Toy(
+        lambda x: (-x.sum(keepdims=True), -np.ones((1, 2))), [0.1, 0.2], 0.0, 1.0,
+        constraints=lambda x: (np.array([x @ x - 0.5]), 2.0 * x[None]),
+    )  # fmt: skip
+    state = ended(problem)
+    assert state.status is RunStatus.CONVERGED
+    assert np.array_equal(state.best_alpha, state.alpha)
+    assert state.best_objective == state.objective
