@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from benchmarks.optimum.kkt import residual, rows_of
 from benchmarks.optimum.measure import excess, value_of
 from benchmarks.optimum.problems import Problem
-from mdstopo import Case, Result, evaluate, optimize
+from mdstopo import Case, Result, optimize
+from mdstopo.evaluation import Rows
+from mdstopo.evaluators import evaluator_of
 from mdstopo.status import RunStatus
 
 Floats = NDArray[np.float64]
@@ -109,9 +111,9 @@ def visits(case: Case, result: Result) -> list[tuple[int, float, float]]:
 
 
 def kkt_of(case: Case, design: Floats, driven: bool = False) -> float:
-    """The scaled KKT residual at a design, from an evaluation of its own. driven: as of `rows_of`."""
-    alpha, values = design[: case.n_design], case.space.named(design)
-    found = evaluate(case, alpha, variables=values)
+    """The scaled KKT residual at a design, from an evaluation of its own that tells of all peaks which may carry a
+    multiplier. driven: as of `rows_of`."""
+    found = evaluator_of(case).evaluate(design, rows=Rows(window=0.6, most=100))
     return residual(rows_of(case, design, found, driven)).scaled if found.status.usable else float("nan")
 
 
