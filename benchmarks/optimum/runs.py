@@ -113,7 +113,7 @@ def visits(case: Case, result: Result) -> list[tuple[int, float, float]]:
 def kkt_of(case: Case, design: Floats, driven: bool = False) -> float:
     """The scaled KKT residual at a design, from an evaluation of its own that tells of all peaks which may carry a
     multiplier. driven: as of `rows_of`."""
-    found = evaluator_of(case).evaluate(design, rows=Rows(window=0.6, most=100))
+    found = evaluator_of(case).evaluate(design, rows=Rows(window=0.02, most=100))
     return residual(rows_of(case, design, found, driven)).scaled if found.status.usable else float("nan")
 
 
