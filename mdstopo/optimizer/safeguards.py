@@ -40,7 +40,7 @@ LATELY = 10
 # Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
 # Share of the largest gradient so far that residuals are relative to at least.
-FADED = 1e-3
+FADED = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
 RESOLVED = 0.1
 
