@@ -239,18 +239,18 @@ def is_least(state: State, tolerance: float) -> bool:
 
 def _without_limits(state: State, settings: Settings) -> tuple[RunStatus, str]:
     """The end of a run at an iterate that breaks limits by an amount that no step makes smaller."""
-    excess = f"{plain_violation(state.sample):.3g} of its bound"
+    excess = f"{plain_violation(state.sample):.3g}"
     if state.best_violation <= settings.tolerance:
         return RunStatus.STALLED, (
-            f"the best design keeps the limits; from a later one, whose largest violation is {excess}, "
+            f"the best design keeps the limits; from a later one, whose largest violation is {excess} of its bound, "
             f"no step is found that makes it smaller (KKT residual {state.kkt:.2g})"
         )
     if is_least(state, settings.tolerance):
         return RunStatus.FAILED, (
-            f"no design near this one keeps the limits: the largest violation, {excess}, "
+            f"no design near this one keeps the limits: the largest violation, {excess} of its bound, "
             f"cannot be made smaller (KKT residual {state.kkt:.2g})"
         )
     return RunStatus.FAILED, (
-        f"no design is found that keeps the limits: no step makes the largest violation, {excess}, smaller, "
-        f"at a KKT residual of {state.kkt:.2g} where {settings.tolerance:.2g} was asked for"
+        "no design is found that keeps the limits: no step makes the largest violation, "
+        f"{excess} of its bound, smaller, at a KKT residual of {state.kkt:.2g} where {settings.tolerance:.2g} was asked for"
     )
