@@ -252,5 +252,6 @@ def _without_limits(state: State, settings: Settings) -> tuple[RunStatus, str]:
         )
     return RunStatus.FAILED, (
         "no design is found that keeps the limits: no step makes the largest violation, "
-        f"{excess} of its bound, smaller, at a KKT residual of {state.kkt:.2g} where {settings.tolerance:.2g} was asked for"
+        f"{excess} of its bound, smaller, "
+        f"at a KKT residual of {state.kkt:.2g} where {settings.tolerance:.2g} was asked for"
     )
