@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from mdstopo.optimizer.conic import Lines, Norms
-from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample
+from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample, largest_of_groups
 
 #: numbers that the rows may take, and rows that are kept at least and at most
 ROOM, LEAST, MOST = 2e7, 8, 160
@@ -61,8 +61,7 @@ class Bundle:
             if many and sample.constraint_across.size:
                 across[len(rows) :] = sample.constraint_across
         vector = np.stack([np.where(norm, value + excess, value), np.zeros(len(value))], axis=1)
-        groups = sample.constraint_groups if len(sample.constraint_groups) else np.arange(many)
-        group = np.concatenate([np.zeros(len(rows), dtype=np.int64), 1 + groups.astype(np.int64)])
+        group = np.concatenate([np.zeros(len(rows), dtype=np.int64), 1 + sample.groups])
         own = np.ones(len(value), dtype=np.bool_)
         return cls(vector, slope, across, excess, group, own, np.zeros(len(value), dtype=np.int64),
                    np.zeros(len(value)))  # fmt: skip
@@ -103,7 +102,7 @@ class Bundle:
 
     def levels(self, groups: int) -> Floats:
         """The largest value of each group (groups,) at the iterate, -inf of one without rows."""
-        return highest(self.values(), self.group, groups)
+        return largest_of_groups(self.values(), self.group, groups)
 
     def moved(self, d: Floats, way: float) -> "Bundle":
         """The same rows seen from another iterate: d (N,) away, way in ranges (2-norm); none is its own."""
@@ -173,13 +172,6 @@ class Bundle:
 
     def _with(self, **columns: Floats | Ints | Bools) -> "Bundle":
         return Bundle(*(columns.get(f.name, getattr(self, f.name)) for f in fields(Bundle)))
-
-
-def highest(values: Floats, group: Ints, groups: int) -> Floats:
-    """The largest value of each group (groups,); -inf of one without rows."""
-    out = np.full(groups, -np.inf)
-    np.maximum.at(out, group, values)
-    return out
 
 
 def _values(vector: Floats, excess: Floats) -> Floats:

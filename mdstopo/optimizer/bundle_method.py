@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mdstopo.optimizer.bundle import Bundle, highest
+from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.curvature import FEW, Curvature
 from mdstopo.optimizer.presets import Settings
-from mdstopo.optimizer.problem import Floats, Sample
+from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
 from mdstopo.optimizer.rows import (
     FEW_STEPS,
     FLOOR,
@@ -21,23 +21,21 @@ from mdstopo.optimizer.rows import (
     STEER,
     STEPS,
     TOLD,
-    Space,
+    FeasibleSet,
     Trial,
     changes_of,
     learnt_from,
     least_violation,
-    merit,
     residual,
     subproblem,
 )
-from mdstopo.optimizer.safeguards import residual_unit
+from mdstopo.optimizer.safeguards import merit, residual_unit
 from mdstopo.optimizer.state import State
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
 FRESH_TRUST = 0.05
-#: steps in a row without a decrease that counts, before rows from elsewhere are forgotten, or the run ends; and the
-#: residual below which they may stay, because such steps still make it smaller
-PATIENCE, NEAR = 8, 1e-3
+#: steps in a row without a decrease that counts, before rows from elsewhere are forgotten, or the run ends
+PATIENCE = 8
 #: how often in a row rows from elsewhere are forgotten, each time with a box so much smaller
 FORGETS, SMALLER = 3, 0.2
 #: share of the row's reach in the box that is rounding of the subproblem; the least price, of the first
@@ -58,7 +56,7 @@ class BundleMethod:
     given; the driver copies it first, and takes an accepted trial as the iterate.
     """
 
-    def __init__(self, space: Space, settings: Settings) -> None:
+    def __init__(self, space: FeasibleSet, settings: Settings) -> None:
         self.space = space
         self.settings = settings
 
@@ -85,7 +83,7 @@ class BundleMethod:
     def first_price(self, rows: Bundle) -> Floats:
         """The price of each constraint (J,): its gradient then weighs as much as the objective's."""
         groups = int(rows.group.max(initial=0)) + 1
-        steepest = highest(np.abs(rows.slope).max(axis=1, initial=0.0), rows.group, groups)
+        steepest = largest_of_groups(np.abs(rows.slope).max(axis=1, initial=0.0), rows.group, groups)
         steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
         return np.asarray(MARGIN * steepest[0] / steepest[1:])
 
@@ -104,8 +102,8 @@ class BundleMethod:
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         d = state.trial - state.alpha
         self._learn(state, new, d)
-        size = float(np.abs(d / space.range).max(initial=0.0))
-        way = float(np.sqrt(np.einsum("i,i->", d / space.range, d / space.range)))
+        scaled = d / space.range
+        size, way = float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
         seen, moved = new.moved(-d, way), state.bundle.moved(d, way)
         self._bend(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])

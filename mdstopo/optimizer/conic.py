@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mdstopo.optimizer.curvature import Curvature
-from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows
+from mdstopo.optimizer.problem import Bools, Floats, Ints, LinearRows, largest_of_groups
 from mdstopo.optimizer.reduced import Reduced, Rows, reduced
 
 MAX_STEPS = 100
@@ -221,23 +221,21 @@ class _Interior:
         lines, norms, linear = program.lines, program.norms, program.linear
         self.width = program.upper - program.lower
         self.n, self.groups = len(self.width), len(program.price) + 1
-        scale = np.zeros(self.groups)
+        self.group = np.concatenate([lines.group, norms.group])
         line_slope, norm_slope, across = (x * self.width for x in (lines.slope, norms.slope, norms.across))
-        np.maximum.at(scale, lines.group, np.abs(line_slope).max(axis=1, initial=0.0))
-        np.maximum.at(scale, norms.group, np.abs(norm_slope).max(axis=1, initial=0.0))
-        np.maximum.at(scale, norms.group, np.abs(across).max(axis=1, initial=0.0))
+        of_line, along, beside = (np.abs(x).max(axis=1, initial=0.0) for x in (line_slope, norm_slope, across))
+        steepest = np.concatenate([of_line, np.maximum(along, beside)])
+        scale = largest_of_groups(steepest, self.group, self.groups)
         self.scale = scale = np.where(scale > 0.0, scale, 1.0)
         at = -program.lower / self.width  # where d = 0 is, in v
         self.g_line = line_slope / scale[lines.group, None]
         by = scale[norms.group]
         self.g_norm, self.p_norm = norm_slope / by[:, None], across / by[:, None]
         # levels are counted from the highest row at d = 0
-        self.base = np.zeros(self.groups)
-        highest = np.full(self.groups, -np.inf)
-        np.maximum.at(highest, lines.group, lines.value)
         size = np.sqrt(norms.vector[:, 0] ** 2 + norms.vector[:, 1] ** 2)
-        np.maximum.at(highest, norms.group, size - norms.excess)
-        self.base[0] = highest[0] if np.isfinite(highest[0]) else 0.0
+        highest = largest_of_groups(np.concatenate([lines.value, size - norms.excess]), self.group, self.groups)[0]
+        self.base = np.zeros(self.groups)
+        self.base[0] = highest if np.isfinite(highest) else 0.0
         self.f_line = (lines.value - self.base[lines.group]) / scale[lines.group] - self.g_line @ at
         self.u_norm = norms.vector / by[:, None] - np.stack([self.g_norm @ at, self.p_norm @ at], axis=1)
         self.c_norm = (norms.excess + self.base[norms.group]) / by
@@ -288,17 +286,12 @@ class _Interior:
         vector = self.u_norm + np.stack([self.g_norm @ v, self.p_norm @ v], axis=1)
         size = np.sqrt(vector[:, 0] ** 2 + vector[:, 1] ** 2)
         mu = 0.1
-        e = np.zeros(self.groups)
-        e[0] = -np.inf
-        np.maximum.at(e, self.program.lines.group, line)
-        np.maximum.at(e, self.program.norms.group, size - self.c_norm)
-        e += mu
-        e[~np.isfinite(e)] = mu
+        e = largest_of_groups(np.concatenate([line, size - self.c_norm]), self.group, self.groups)
+        e[1:] = np.maximum(e[1:], 0.0)
+        e = np.where(np.isfinite(e), e, 0.0) + mu
         s_norm = np.concatenate([(e[self.program.norms.group] + self.c_norm)[:, None], vector], axis=1)
         s_norm[:, 0] = np.maximum(s_norm[:, 0], size + mu)
-        counts = np.bincount(
-            np.concatenate([self.program.lines.group, self.program.norms.group]), minlength=self.groups
-        )
+        counts = np.bincount(self.group, minlength=self.groups)
         top = np.concatenate([[1.0], np.minimum(0.5 * self.price, 1.0)]) / np.maximum(counts, 1)
         y_norm = np.zeros_like(s_norm)
         y_norm[:, 0] = top[self.program.norms.group]

@@ -66,9 +66,9 @@ def learnt(steps: Floats, changes: Floats, floor: float) -> Curvature:
     """
     n = steps.shape[1]
     sigma = _first(steps, changes, floor)
-    B = np.full(n, sigma) if n > FEW else sigma * np.eye(n)
     if n > FEW:
         return _compact(steps[-PAIRS:], changes[-PAIRS:], sigma)
+    B = sigma * np.eye(n)
     for s, y in zip(steps, changes, strict=True):
         Bs = B @ s
         sBs = float(s @ Bs)
@@ -103,7 +103,8 @@ def _compact(steps: Floats, changes: Floats, sigma: float) -> Curvature:
     S, Y = np.zeros((n, 0)), np.zeros((n, 0))
     inner = np.zeros((0, 0))
     for s, y in zip(steps, changes, strict=True):
-        Bs = sigma * s - _beside(S, Y, sigma) @ (inner @ (_beside(S, Y, sigma).T @ s))
+        beside = _beside(S, Y, sigma)
+        Bs = sigma * s - beside @ (inner @ (beside.T @ s))
         sBs = float(s @ Bs)
         if not sBs > 0.0:
             continue

@@ -18,8 +18,7 @@ from mdstopo.optimizer.interior import Optimum
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.optimizer.projection import project
-from mdstopo.optimizer.rows import NOTHING
-from mdstopo.optimizer.rows import Space as BundleSpace
+from mdstopo.optimizer.rows import NOTHING, FeasibleSet
 from mdstopo.optimizer.safeguards import (
     CUT_SHRINK,
     PRICE_CEILING,
@@ -78,9 +77,9 @@ class Gsao:
         self.trusted = settings.flag("trust_region")
         #: whether rows compete from the start; else the separable model begins
         self.competes = bool(getattr(problem, "competes", False))
-        space = BundleSpace(self.lower, self.upper, problem.linear, self.range)
-        most = len(self.lower) < WIDE and settings.flag("bundle")
-        self.bundle = BundleMethod(space, settings) if most else None
+        feasible = FeasibleSet(self.lower, self.upper, problem.linear, self.range)
+        few = len(self.lower) < WIDE and settings.flag("bundle")
+        self.bundle = BundleMethod(feasible, settings) if few else None
         self._rule = ShiftRule.of(settings)
         self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
 

@@ -45,6 +45,13 @@ class LinearRows:
         return np.asarray(np.einsum("ij,j->i", self.A, x) - self.b)
 
 
+def largest_of_groups(values: Floats, group: Ints, groups: int) -> Floats:
+    """The largest of the values (K,) of each group (groups,), group (K,) saying whose each is; -inf of one without."""
+    out = np.full(groups, -np.inf)
+    np.maximum.at(out, group, values)
+    return out
+
+
 def _no_rows() -> Floats:
     return np.zeros(0)
 
@@ -103,9 +110,7 @@ class Sample:
         """The largest of numbers (C,) of the constraint rows for each constraint (J,)."""
         if not len(self.constraint_groups):
             return rows
-        levels = np.full(int(self.constraint_groups[-1]) + 1, -np.inf)
-        np.maximum.at(levels, self.constraint_groups, rows)
-        return levels
+        return largest_of_groups(rows, self.constraint_groups, int(self.constraint_groups[-1]) + 1)
 
 
 class Problem(Protocol):

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mdstopo.optimizer.bundle import Bundle, highest
+from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
 from mdstopo.optimizer.curvature import Curvature, learnt
-from mdstopo.optimizer.problem import Floats, LinearRows
+from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
 from mdstopo.optimizer.projection import repair
 
 #: what violations cost, in multipliers; the least share of the violation that could go which has to go; the factor on
@@ -52,8 +52,8 @@ class Trial:
 
 
 @dataclass(frozen=True, slots=True)
-class Space:
-    """Where designs are: bounds (N,), linear rows, ranges (N,)."""
+class FeasibleSet:
+    """The designs that keep bounds (N,) and linear rows; range (N,): the unit of each variable."""
 
     lower: Floats
     upper: Floats
@@ -61,13 +61,8 @@ class Space:
     range: Floats
 
 
-def merit(objective: float, levels: Floats, price: Floats) -> float:
-    """What a step must decrease: the objective and the price of the largest violation of each constraint (J,)."""
-    return objective + float(price @ np.maximum(levels, 0.0)) if len(price) else objective
-
-
 def subproblem(
-    bundle: Bundle, x: Floats, space: Space, box: tuple[Floats, Floats], price: Floats, curvature: Curvature
+    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], price: Floats, curvature: Curvature
 ) -> Trial:
     """Solve the model in the box (lower, upper) of designs around x (N,).
 
@@ -96,12 +91,12 @@ def subproblem(
         linear[used] = found.linear
     trial = repair(np.clip(x + d, box[0], box[1]), box[0], box[1], space.linear)
     d = trial - x
-    levels = highest(bundle.values_at(d), bundle.group, len(price) + 1)
+    levels = largest_of_groups(bundle.values_at(d), bundle.group, len(price) + 1)
     return Trial(trial, multipliers, linear, levels, 0.5 * float(d @ curvature.times(d)), solved)
 
 
 def least_violation(
-    bundle: Bundle, x: Floats, space: Space, box: tuple[Floats, Floats], weight: Floats
+    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], weight: Floats
 ) -> Trial:
     """The step to the least sum of violations in the box, times weight (J,); of the rows of constraints alone."""
     only = bundle.of_places(bundle.group > 0)
@@ -152,7 +147,7 @@ def learnt_from(steps: Floats, changes: Floats, steepest: float, range_: Floats)
     return found.scaled(1.0 / range_, 1.0)
 
 
-def residual(own: Bundle, x: Floats, space: Space, price: Floats, steepest: float) -> float:
+def residual(own: Bundle, x: Floats, space: FeasibleSet, price: Floats, steepest: float) -> float:
     """The projected KKT residual at x, relative to the largest gradient entry `steepest`.
 
     own: the iterate's rows; price (J,): bounds of the constraints' multipliers. The multipliers are those of the
@@ -172,7 +167,7 @@ def residual(own: Bundle, x: Floats, space: Space, price: Floats, steepest: floa
 
 
 def residual_of(
-    lines: Bundle, multipliers: Floats, linear: Floats, x: Floats, space: Space, steepest: float
+    lines: Bundle, multipliers: Floats, linear: Floats, x: Floats, space: FeasibleSet, steepest: float
 ) -> float:
     """The residual with given multipliers of the rows (K,) and the linear rows (m,); see `residual`."""
     gradient = (multipliers @ lines.slope + linear @ space.linear.A) / steepest
