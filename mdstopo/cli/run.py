@@ -222,7 +222,12 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "starts": [
             None
             if each is None
-            else {"status": str(each.status), "objective": each.best_objective, "kkt": each.kkt, "left": each.left}
+            else {
+                "status": str(each.status),
+                "objective": each.best_objective,
+                "kkt": each.kkt,
+                "dropped": each.dropped,
+            }
             for each in outcome.states
         ],
         "best_start": outcome.best_start,

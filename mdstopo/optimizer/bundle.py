@@ -34,7 +34,7 @@ class Bundle:
     group: Ints
     own: Bools
     idle: Ints
-    far: Floats
+    distance: Floats
 
     @classmethod
     def empty(cls, n: int) -> "Bundle":
@@ -104,19 +104,21 @@ class Bundle:
         """The largest value of each group (groups,) at the iterate, -inf of one without rows."""
         return largest_of_groups(self.values(), self.group, groups)
 
-    def moved(self, d: Floats, way: float) -> "Bundle":
+    def moved(self, d: Floats, length: float) -> "Bundle":
         """The same rows seen from another iterate: d (N,) away, way in ranges (2-norm); none is its own."""
-        return self._with(vector=self.vectors_at(d), own=np.zeros(len(self), dtype=np.bool_), far=self.far + way)
+        return self._with(
+            vector=self.vectors_at(d), own=np.zeros(len(self), dtype=np.bool_), distance=self.distance + length
+        )
 
-    def lowered(self, levels: Floats, bend: Floats) -> "Bundle":
+    def lowered(self, levels: Floats, concavity: Floats) -> "Bundle":
         """No row above the levels (groups,), rows from elsewhere below them by bend (groups,) times the way squared."""
-        caps = levels[self.group] - np.where(self.own, 0.0, bend[self.group] * self.far**2)
+        caps = levels[self.group] - np.where(self.own, 0.0, concavity[self.group] * self.distance**2)
         beyond = np.maximum(self.values() - caps, 0.0)
         vector = self.vector.copy()
         vector[:, 0] -= np.where(self.norm, 0.0, beyond)
         return self._with(vector=vector, excess=self.excess + beyond)
 
-    def of_places(self, places: Ints | Bools) -> "Bundle":
+    def subset(self, places: Ints | Bools) -> "Bundle":
         """Some of the rows."""
         return Bundle(*(getattr(self, f.name)[places] for f in fields(Bundle)))
 
@@ -144,7 +146,7 @@ class Bundle:
                 if np.abs(self.slope[k] - self.slope[i]).max() <= SAME * steepest[i]:
                     kept[i] = False
                     break
-        return self if kept.all() else self.of_places(kept)
+        return self if kept.all() else self.subset(kept)
 
     def thinned(self) -> "Bundle":
         """At most as many rows as there is room for: the iterate's own, those that were used last, the newest."""
@@ -153,7 +155,7 @@ class Bundle:
         if len(self) <= most:
             return self
         order = np.lexsort((-np.arange(len(self)), self.idle, ~self.own))
-        return self.of_places(np.sort(order[: max(most, int(self.own.sum()))]))
+        return self.subset(np.sort(order[: max(most, int(self.own.sum()))]))
 
     def used(self, multipliers: Floats, enough: Floats) -> "Bundle":
         """The same after a subproblem with multipliers (K,); enough (groups,): the least that counts."""

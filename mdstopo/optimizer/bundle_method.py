@@ -16,15 +16,15 @@ from mdstopo.optimizer.rows import (
     FLOOR,
     MARGIN,
     NOTHING,
+    NULL_STEP_SHRINK,
     RAISE,
     RAISES,
     STEER,
     STEPS,
-    TOLD,
     FeasibleSet,
     Trial,
-    changes_of,
-    learnt_from,
+    curvature_of,
+    gradient_change,
     least_violation,
     residual,
     subproblem,
@@ -33,18 +33,18 @@ from mdstopo.optimizer.safeguards import merit, residual_unit
 from mdstopo.optimizer.state import State
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
-FRESH_TRUST = 0.05
+RESET_TRUST = 0.05
 #: steps in a row without a decrease that counts, before rows from elsewhere are forgotten, or the run ends
 PATIENCE = 8
 #: how often in a row rows from elsewhere are forgotten, each time with a box so much smaller
-FORGETS, SMALLER = 3, 0.2
+RESETS, RESET_SHRINK = 3, 0.2
 #: share of the row's reach in the box that is rounding of the subproblem; the least price, of the first
 ROUNDING, CHEAPEST = 1e-8, 1e-2
 #: what is left of the bend from trial to trial
-BEND_FALL = 0.9
+CONCAVITY_FALL = 0.9
 #: iterates whose violation has not fallen to this share of what it was, after which limits are restored first; and the
 #: factor on prices when that is done
-RESISTS, FALLS, DEARER = 6, 0.8, 10.0
+STAGNANT, VIOLATION_FALL, RESTORED_PRICE = 6, 0.8, 10.0
 #: share of the box below which a step leaves it too wide
 NARROW = 0.1
 
@@ -76,8 +76,8 @@ class BundleMethod:
             state.price = np.zeros(0)
         else:
             state.price = self.first_price(rows)
-        state.bend = np.zeros(len(state.price) + 1)
-        state.resisted, state.mark = 0, float("inf")
+        state.concavity = np.zeros(len(state.price) + 1)
+        state.stagnation, state.violation_mark = 0, float("inf")
         state.kkt = float("nan")
 
     def first_price(self, rows: Bundle) -> Floats:
@@ -92,19 +92,19 @@ class BundleMethod:
     def judge(self, state: State, sample: Sample) -> bool:
         """Whether the evaluated trial is accepted; its rows join the bundle in any case, seen from the next iterate.
 
-        Adapts the trust box, the curvature's steps, the bend, and the counts of steps without decrease.
+        Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
         """
         settings, space = self.settings, self.space
         new = self._bundle(sample, state.restoring)
         groups = len(state.price) + 1
-        here, there = state.bundle.of_places(state.bundle.own).levels(groups), new.levels(groups)
+        here, there = state.bundle.subset(state.bundle.own).levels(groups), new.levels(groups)
         actual = merit(here[0], here[1:], state.price) - merit(there[0], there[1:], state.price)
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         d = state.trial - state.alpha
         self._learn(state, new, d)
         scaled = d / space.range
-        size, way = float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
-        seen, moved = new.moved(-d, way), state.bundle.moved(d, way)
+        size, length = float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
+        seen, moved = new.moved(-d, length), state.bundle.moved(d, length)
         self._bend(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])
         small = abs(actual) <= negligible and abs(state.predicted) <= negligible
@@ -121,30 +121,30 @@ class BundleMethod:
             elif size < NARROW * state.trust:  # a box of the size of the steps is solved to more digits
                 state.trust = max(0.5 * state.trust, size / NARROW)
             if not small:
-                state.forgets = 0
+                state.resets = 0
         else:
             above = seen.values() - here[seen.group]
             decisive = new.values() >= there[new.group] - 1e-12 * np.abs(there[new.group])
-            told = bool((above[decisive] <= 1e-9 * np.abs(here[seen.group][decisive])).all())
+            null_step = bool((above[decisive] <= 1e-9 * np.abs(here[seen.group][decisive])).all())
             state.bundle = seen.joined(state.bundle)
-            state.trust = TOLD * state.trust if told else 0.5 * min(state.trust, size)
+            state.trust = NULL_STEP_SHRINK * state.trust if null_step else 0.5 * min(state.trust, size)
         state.bundle = state.bundle.without_repeats().thinned()
         return accepted
 
     def propose(self, state: State) -> None:
         """Solve the model and set the next trial, what it promises, and the KKT residual."""
         space = self.space
-        own = state.bundle.of_places(state.bundle.own)
+        own = state.bundle.subset(state.bundle.own)
         steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
         if np.isnan(state.kkt):
             price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * 1e3
             unit = steepest if state.restoring else residual_unit(state, steepest)
             state.kkt = residual(own, state.alpha, space, price, unit)
-        B = learnt_from(state.steps, state.changes, max(steepest, 1e-300), space.range)
+        B = curvature_of(state.steps, state.changes, max(steepest, 1e-300), space.range)
         box = self._box(state)
 
         here = own.levels(len(state.price) + 1)
-        rows = state.bundle.lowered(here, state.bend)
+        rows = state.bundle.lowered(here, state.concavity)
 
         def solved(price: Floats) -> Trial:
             return subproblem(rows, state.alpha, space, box, price, B)
@@ -173,7 +173,7 @@ class BundleMethod:
 
     def _learn(self, state: State, new: Bundle, d: Floats) -> None:
         """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
-        change = changes_of(state.bundle, new, d, state.multipliers)
+        change = gradient_change(state.bundle, new, d, state.multipliers)
         if change is None or not float(np.abs(d).max(initial=0.0)) > 0.0:
             return
         most = STEPS if len(d) <= FEW else FEW_STEPS
@@ -224,15 +224,18 @@ class BundleMethod:
     def _mark(self, state: State, there: Floats) -> None:
         """Count iterates whose largest violation is not much below that of the one that the count began with."""
         violation = float(there[1:].max(initial=0.0))
-        if violation <= self.settings.tolerance or violation < FALLS * state.mark:
-            state.resisted, state.mark = 0, violation if violation > self.settings.tolerance else float("inf")
+        if violation <= self.settings.tolerance or violation < VIOLATION_FALL * state.violation_mark:
+            state.stagnation, state.violation_mark = (
+                0,
+                violation if violation > self.settings.tolerance else float("inf"),
+            )
         else:
-            state.resisted += 1
+            state.stagnation += 1
 
     def _bend(self, state: State, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
         """How much each group was seen to bend downwards: a row from one end of a step above the value at the other."""
-        state.bend = BEND_FALL * state.bend
+        state.concavity = CONCAVITY_FALL * state.concavity
         for rows, levels in ((seen, here), (moved, there)):
-            some = rows.far > 0.0
-            over = (rows.values() - levels[rows.group])[some] / rows.far[some] ** 2
-            np.maximum.at(state.bend, rows.group[some], over)
+            some = rows.distance > 0.0
+            over = (rows.values() - levels[rows.group])[some] / rows.distance[some] ** 2
+            np.maximum.at(state.concavity, rows.group[some], over)

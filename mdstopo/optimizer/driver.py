@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.bundle_method import DEARER, FORGETS, FRESH_TRUST, PATIENCE, RESISTS, SMALLER, BundleMethod
+from mdstopo.optimizer.bundle_method import (
+    PATIENCE,
+    RESET_SHRINK,
+    RESET_TRUST,
+    RESETS,
+    RESTORED_PRICE,
+    STAGNANT,
+    BundleMethod,
+)
 from mdstopo.optimizer.interior import Optimum
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
@@ -42,7 +50,7 @@ from mdstopo.optimizer.safeguards import (
     verdict,
 )
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import History, Shape, State, Step
+from mdstopo.optimizer.state import History, RowDetails, State, Step
 from mdstopo.optimizer.subproblem import solve
 from mdstopo.optimizer.wide import WIDE, Measures, ShiftRule, Space, is_wide, next_wide_shift, propose, ranges
 from mdstopo.status import RunStatus
@@ -113,19 +121,19 @@ class Gsao:
             convex=self.settings.number("convex_start"),
             price=price,
             charge=price,
-            shape=Shape.of(sample),
+            row_details=RowDetails.of(sample),
             bundle=Bundle.empty(n),
             multipliers=np.zeros(0),
             steps=np.zeros((0, n)),
             changes=np.zeros((0, n)),
-            competing=False,
+            uses_bundle=False,
             restoring=False,
-            forgets=0,
-            bend=np.zeros(1),
-            resisted=0,
-            mark=float("inf"),
-            left=False,
-            slope=0.0,
+            resets=0,
+            concavity=np.zeros(1),
+            stagnation=0,
+            violation_mark=float("inf"),
+            dropped=False,
+            largest_gradient=0.0,
             iteration=0,
             evaluations=1,
             small=0,
@@ -146,7 +154,7 @@ class Gsao:
             if self.bundle is not None and self.competes:
                 self._begin_bundle(state)
             self._propose(state)
-            self._change_piece(state)  # where the first design is one that the piece at work cannot leave
+            self._switch_method(state)  # where the first design is one that the piece at work cannot leave
         return self._finish(state, sample, alpha, 0.0, not wrong, began)
 
     def step(self, state: State) -> State:
@@ -171,7 +179,7 @@ class Gsao:
             accepted = self._judge(state, sample)
         if state.running:
             self._propose(state)
-            self._change_piece(state)
+            self._switch_method(state)
         change, _ = self._measures.change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
 
@@ -191,7 +199,7 @@ class Gsao:
             state.best_alpha, state.best_objective = state.trial, sample.objective
             state.best_violation, state.best_plain = violation, plain
         state.failed = 0
-        if state.competing:
+        if state.uses_bundle:
             assert self.bundle is not None
             accepted = self.bundle.judge(state, sample)
             if accepted:
@@ -232,26 +240,26 @@ class Gsao:
         state.objective, state.violation = sample.objective, scaled_violation(sample)
         state.rows, state.gradients = sample.rows, sample.gradients
         state.constraint_rows, state.constraint_gradients = sample.constraint_rows, sample.constraint_gradients
-        state.shape = Shape.of(sample)
+        state.row_details = RowDetails.of(sample)
 
     def _begin_bundle(self, state: State, trust: float | None = None, price: Floats | None = None) -> None:
         """The bundle method goes on from the iterate."""
         assert self.bundle is not None
-        state.competing, state.small = True, 0
+        state.uses_bundle, state.small = True, 0
         if trust is not None:
             state.trust = trust
         self.bundle.begin(state, price)
 
-    def _change_piece(self, state: State) -> None:
+    def _switch_method(self, state: State) -> None:
         """Where the piece at work gets no further: another one, or the same without what it knows from elsewhere."""
         if self.bundle is None or state.status is not RunStatus.RUNNING:
             return
         tolerance = self.settings.tolerance
         done = state.kkt <= tolerance
         stuck = self._is_stuck(state)
-        if not state.competing:
+        if not state.uses_bundle:
             if stuck and not (done and state.violation <= tolerance):
-                self._begin_bundle(state, max(state.trust, FRESH_TRUST))
+                self._begin_bundle(state, max(state.trust, RESET_TRUST))
                 self._propose(state)
             return
         if state.restoring:
@@ -260,33 +268,33 @@ class Gsao:
             if kept or ((stuck or done) and state.violation <= tolerance):
                 state.restoring = False
                 self._begin_bundle(state, max(state.trust, 1e-3))
-                state.price = DEARER * state.price
+                state.price = RESTORED_PRICE * state.price
                 self._propose(state)
             elif stuck and not is_least(state, tolerance):
-                self._forget(state)
+                self._reset_bundle(state)
             return
         resists = len(state.price) > 0 and state.violation > tolerance
-        if resists and (stuck or done or state.resisted >= RESISTS):
-            state.restoring, state.forgets = True, 0
-            self._begin_bundle(state, max(state.trust, FRESH_TRUST))
+        if resists and (stuck or done or state.stagnation >= STAGNANT):
+            state.restoring, state.resets = True, 0
+            self._begin_bundle(state, max(state.trust, RESET_TRUST))
             self._propose(state)
         elif stuck and not done:
-            self._forget(state)
+            self._reset_bundle(state)
 
-    def _forget(self, state: State) -> None:
+    def _reset_bundle(self, state: State) -> None:
         """Go on without rows from elsewhere, which may forbid what is possible; not too often at one place."""
-        if state.forgets >= FORGETS:
+        if state.resets >= RESETS:
             return
-        trust = FRESH_TRUST * SMALLER**state.forgets
+        trust = RESET_TRUST * RESET_SHRINK**state.resets
         self._begin_bundle(state, min(trust, max(state.trust, 1e-2 * trust)), state.price)
-        state.forgets += 1
+        state.resets += 1
         self._propose(state)
 
     def _is_stuck(self, state: State) -> bool:
         """Whether the next step would change next to nothing, or the last ones have."""
         if self._move(state) <= self.settings.number("change_tolerance"):
             return True
-        if state.competing:
+        if state.uses_bundle:
             return state.small >= PATIENCE or not state.predicted > 1e-13 * abs(state.objective)
         return state.small >= 2 and state.violation <= self.settings.tolerance
 
@@ -305,7 +313,7 @@ class Gsao:
 
     def _propose(self, state: State) -> None:
         """Approximate at the iterate, solve, and set the next trial and the KKT residual."""
-        if state.competing:
+        if state.uses_bundle:
             assert self.bundle is not None
             self.bundle.propose(state)
             return
@@ -442,11 +450,11 @@ class Gsao:
         )
         state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
         if state.status is RunStatus.CONVERGED:
-            self._tell_of(state)
+            self._report_iterate(state)
         return state
 
     @staticmethod
-    def _tell_of(state: State) -> None:
+    def _report_iterate(state: State) -> None:
         """What has converged is what is told, where a design before it is better by no more than limits are kept to."""
         if abs(state.objective - state.best_objective) <= EQUAL * abs(state.best_objective):
             state.best_alpha, state.best_objective = state.alpha, state.objective

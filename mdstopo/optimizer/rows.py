@@ -31,9 +31,9 @@ STEPS, FEW_STEPS = 60, 12
 #: the least curvature, of the largest gradient entry over the range
 FLOOR = 1e-5
 #: cosine of two gradients from which on they are taken for those of one peak
-LIKENESS = 0.5
+MATCH_COSINE = 0.5
 #: how much a rejected trial shrinks the box where its rows tell what stood in the way
-TOLD = 0.7
+NULL_STEP_SHRINK = 0.7
 #: a violation below this share of the tolerance is none
 NOTHING = 1e-3
 
@@ -95,11 +95,9 @@ def subproblem(
     return Trial(trial, multipliers, linear, levels, 0.5 * float(d @ curvature.times(d)), solved)
 
 
-def least_violation(
-    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], weight: Floats
-) -> Trial:
+def least_violation(bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], weight: Floats) -> Trial:
     """The step to the least sum of violations in the box, times weight (J,); of the rows of constraints alone."""
-    only = bundle.of_places(bundle.group > 0)
+    only = bundle.subset(bundle.group > 0)
     nothing = Bundle(
         np.zeros((1, 2)), np.zeros((1, len(x))), np.zeros((1, only.across.shape[1])), np.array([np.nan]),
         np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.int64), np.zeros(1),
@@ -109,7 +107,7 @@ def least_violation(
     return subproblem(nothing.joined(only), x, space, box, weight, flat)
 
 
-def changes_of(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
     """How the gradient of the Lagrangian has changed over a step d beyond what the rows foresee, (N,), or None.
 
     The iterate's own rows that carried a multiplier are compared with those of the trial (`new`, seen from there) which
@@ -120,7 +118,7 @@ def changes_of(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> F
     own = np.flatnonzero(bundle.own & (multipliers > 0.0))
     total = np.bincount(bundle.group, weights=multipliers, minlength=groups)
     mine = np.bincount(bundle.group[own], weights=multipliers[own], minlength=groups)
-    slopes, fresh = bundle.of_places(own).slopes_at(d), new.slopes_at(np.zeros(len(d)))
+    slopes, fresh = bundle.subset(own).slopes_at(d), new.slopes_at(np.zeros(len(d)))
     change, matched = np.zeros(len(d)), False
     sizes = np.sqrt((fresh**2).sum(axis=1))
     for k, slope in zip(own.tolist(), slopes, strict=True):
@@ -129,14 +127,14 @@ def changes_of(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> F
             continue
         cosine = np.where(new.group == bundle.group[k], fresh @ slope / np.maximum(size * sizes, 1e-300), -1.0)
         best = int(cosine.argmax()) if len(cosine) else 0
-        if len(cosine) and cosine[best] >= LIKENESS:
+        if len(cosine) and cosine[best] >= MATCH_COSINE:
             weight = multipliers[k] * total[bundle.group[k]] / mine[bundle.group[k]]
             change += weight * (fresh[best] - slope)
             matched = True
     return change if matched else None
 
 
-def learnt_from(steps: Floats, changes: Floats, steepest: float, range_: Floats) -> Curvature:
+def curvature_of(steps: Floats, changes: Floats, steepest: float, range_: Floats) -> Curvature:
     """B in the variables' own units; it is learnt in ranges.
 
     steps, changes (m, N): as `curvature.learnt`, in the variables' own units; steepest: the largest gradient entry of
@@ -159,7 +157,7 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, price: Floats, steepest
         return 0.0
     lines = Bundle(
         np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
-        np.full(len(own), np.nan), own.group, own.own, own.idle, own.far,
+        np.full(len(own), np.nan), own.group, own.own, own.idle, own.distance,
     )  # fmt: skip
     flat = Curvature.diagonal_of(np.full(len(x), steepest))
     trial = subproblem(lines, x, space, (space.lower, space.upper), price, flat)

@@ -40,16 +40,16 @@ LATELY = 10
 # Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
 # Share of the largest gradient so far that residuals are relative to at least.
-FADED = 1e-5
+GRADIENT_SHARE = 1e-5
 # What a residual may be at most, in shares of the violation that it says cannot be made smaller.
-RESOLVED = 0.1
+RESIDUAL_SHARE = 0.1
 
 
 def residual_unit(state: State, steepest: float) -> float:
     """What the KKT residual is relative to: the largest |dU/dalpha| here, `steepest`, or a share of the largest of any
     iterate: at a smooth minimum inside the bounds the gradient itself vanishes. The largest is kept in the state."""
-    state.slope = max(state.slope, steepest)
-    return max(steepest, FADED * state.slope)
+    state.largest_gradient = max(state.largest_gradient, steepest)
+    return max(steepest, GRADIENT_SHARE * state.largest_gradient)
 
 
 def failure(sample: Sample, steepest: Callable[[Floats], Floats]) -> str:
@@ -234,7 +234,7 @@ def is_least(state: State, tolerance: float) -> bool:
     it is tiny could vanish within the residual."""
     rows, slopes = state.constraint_rows, state.constraint_gradients
     left = state.kkt * float(np.abs(slopes).max(initial=0.0))
-    return bool(state.kkt <= tolerance and left <= RESOLVED * float(rows.max(initial=0.0)))
+    return bool(state.kkt <= tolerance and left <= RESIDUAL_SHARE * float(rows.max(initial=0.0)))
 
 
 def _without_limits(state: State, settings: Settings) -> tuple[RunStatus, str]:

@@ -128,7 +128,7 @@ class Step:
 
 
 @dataclass(frozen=True, slots=True)
-class Shape:
+class RowDetails:
     """What a sample says of its rows beside values and gradients; see `problem.Sample`."""
 
     constraint_groups: Ints
@@ -138,7 +138,7 @@ class Shape:
     constraint_across: Floats
 
     @classmethod
-    def of(cls, sample: Sample) -> "Shape":
+    def of(cls, sample: Sample) -> "RowDetails":
         """That of a sample."""
         return cls(*(getattr(sample, f.name) for f in fields(cls)))
 
@@ -149,17 +149,17 @@ class State:
 
     The iterate and what was found there: `alpha` (N,), `objective`, `rows` (R,), `gradients` (R, N),
     `constraint_rows` (C,), `constraint_gradients` (C, N), `violation` (`safeguards.scaled_violation`), and
-    `shape`, which rows are norms and which constraint each belongs to. What rejected trials have
+    `row_details`, which rows are norms and which constraint each belongs to. What rejected trials have
     shown: `cuts` (K,), rows that were the highest there, linearised and seen from the iterate, and `cut_gradients`
     (K, N); `forgotten`, the objective at which they were last dropped.
     The design to be evaluated next: `trial` (N,), with `predicted`, the decrease of the merit function that
     the model promises, and `kkt`, the residual at `alpha`. The adaptation: `shift` (N,) distances of the
     shifts, `step` the last accepted step, in files its difference (N,), `trust` the half width of the trust box in
-    ranges, `competing` which piece makes the steps: `bundle` with the `multipliers` (K,) of its rows, `steps` and
+    ranges, `uses_bundle` which method makes the steps: `bundle` with the `multipliers` (K,) of its rows, `steps` and
     `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
-    objective, `forgets` how often in a row rows were forgotten, `bend` (J + 1,) how the groups bend downwards,
-    `resisted` how many iterates the largest violation has not fallen well below `mark`,
-    `left` whether others of several starts go on instead, `slope` the largest |dU/dalpha| of any iterate;
+    objective, `resets` how often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups
+    (`Bundle.lowered`), `stagnation` how many iterates the largest violation has not fallen well below `violation_mark`,
+    `dropped` whether others of several starts go on instead, `largest_gradient` the largest |dU/dalpha| of any iterate;
     or else `convex` the relative weight of the quadratic term. Of each constraint: `price` (J,) of violations in the
     subproblem, `charge` (J,) in the separable approximation's merit. Counters: `iteration`, `evaluations`, `small`
     steps in a row, `failed` evaluations in a row, `seconds`.
@@ -186,19 +186,19 @@ class State:
     convex: float
     price: Floats
     charge: Floats
-    shape: Shape
+    row_details: RowDetails
     bundle: Bundle
     multipliers: Floats
     steps: Floats
     changes: Floats
-    competing: bool
+    uses_bundle: bool
     restoring: bool
-    forgets: int
-    bend: Floats
-    resisted: int
-    mark: float
-    left: bool
-    slope: float
+    resets: int
+    concavity: Floats
+    stagnation: int
+    violation_mark: float
+    dropped: bool
+    largest_gradient: float
     iteration: int
     evaluations: int
     small: int
@@ -226,11 +226,11 @@ class State:
             self.gradients,
             self.constraint_rows,
             self.constraint_gradients,
-            self.shape.constraint_groups,
-            self.shape.excess,
-            self.shape.across,
-            self.shape.constraint_excess,
-            self.shape.constraint_across,
+            self.row_details.constraint_groups,
+            self.row_details.excess,
+            self.row_details.across,
+            self.row_details.constraint_excess,
+            self.row_details.constraint_across,
         )
 
     def copy(self) -> "State":
@@ -244,7 +244,7 @@ class State:
             value = getattr(self, f.name)
             if isinstance(value, History):
                 out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
-            elif isinstance(value, (Bundle, Shape)):
+            elif isinstance(value, (Bundle, RowDetails)):
                 out |= {f"{f.name}/{part.name}": getattr(value, part.name) for part in fields(value)}
             elif isinstance(value, (Step, Shifts)):
                 out[f.name] = value.array().copy()
@@ -284,6 +284,6 @@ class State:
 
 
 #: fields that are arrays by name themselves
-_PARTS: dict[str, type[Bundle] | type[Shape]] = {"bundle": Bundle, "shape": Shape}
+_PARTS: dict[str, type[Bundle] | type[RowDetails]] = {"bundle": Bundle, "row_details": RowDetails}
 
 _values = attrgetter(*(f.name for f in fields(State)))

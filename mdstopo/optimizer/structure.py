@@ -63,8 +63,10 @@ class StructureProblem:
         self.lower, self.upper = self.space.bounds(case.lower, case.upper)
         self._responses = [(i, row) for i, row in enumerate(case.constraints) if isinstance(row, ResponseRow)]
         #: whether rows compete from the start: limits on responses, objectives that are no energy, parameters of laws
-        self.competes = bool(self._responses) or self.even > 0 or any(
-            objective.response.kind != "energy" for objective in self._objectives
+        self.competes = (
+            bool(self._responses)
+            or self.even > 0
+            or any(objective.response.kind != "energy" for objective in self._objectives)
         )
         looked: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
         members = any(each.response.kind == "member_force" for each in looked)

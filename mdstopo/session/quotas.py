@@ -1,7 +1,7 @@
-"""Several starts in quotas: all go a little way, those that find what another has found are left, the best go on.
+"""Several starts in quotas: all go a little way, those that find what another found are dropped, the best go on.
 
-Which go on depends on the states alone, and is written into them (`State.left`): a resumed run, and one on any number
-of processes, decides alike.
+Which go on depends on the states alone, and is written into them (`State.dropped`): a resumed run, and one on any
+number of processes, decides alike.
 """
 
 import math
@@ -14,7 +14,7 @@ from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_count
 from mdstopo.optimizer.starts import Family, best_run, family_of, rank
 from mdstopo.optimizer.state import State
-from mdstopo.session.starts import Leg
+from mdstopo.session.starts import StartTask
 from mdstopo.status import RunStatus
 
 #: iterations after which it is decided who goes on; the share of the starts that do
@@ -29,32 +29,33 @@ SAME_VALUE, SAME_DESIGN = 1e-3, 2e-2
 States = list[State | None]
 
 
-def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> Iterator[list[Leg]]:
+def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> Iterator[list[StartTask]]:
     """What every start does next, round by round; `states` are to be up to date when the next round is asked for."""
     count = len(states)
     families = [family_of(index, count) for index in range(count)]
     if count == 1 or stage_count(case) > 1:
-        yield [Leg(index, families[index]) for index in range(count)]
+        yield [StartTask(index, families[index]) for index in range(count)]
         return
     late = [index for index in range(count) if families[index] is Family.NEIGHBOUR]
     early = [index for index in range(count) if index not in late]
-    yield [Leg(index, families[index], QUOTAS[0]) for index in early]
+    yield [StartTask(index, families[index], QUOTAS[0]) for index in early]
     best = states[best_run(states, case.optimizer.tolerance)]
     for index in late:
-        yield [Leg(index, families[index], QUOTAS[0], None if best is None else best.best_alpha)]
+        yield [StartTask(index, families[index], QUOTAS[0], None if best is None else best.best_alpha)]
     for quota, following in zip(QUOTAS, (*QUOTAS[1:], None), strict=True):
-        leave(case, states, quota, keep)
-        yield [Leg(i, families[i], following) for i, state in enumerate(states) if state is not None and not state.left]
+        drop(case, states, quota, keep)
+        going = [i for i, state in enumerate(states) if state is not None and not state.dropped]
+        yield [StartTask(i, families[i], following) for i in going]
 
 
-def leave(case: Case, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
+def drop(case: Case, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
     """Mark the starts that do not go on after so many iterations.
 
     The best third of the distinct ones goes on, and those that are still falling fast. Where one has gone on from here
     it is decided already: a resumed run must not decide again by what that one has found since.
     """
     tolerance = case.optimizer.tolerance
-    begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.left]
+    begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.dropped]
     if any(state.iteration > quota for _, state in begun):
         return
     order = sorted(begun, key=lambda each: (*rank(each[1], tolerance), each[0]))
@@ -66,8 +67,8 @@ def leave(case: Case, states: States, quota: int, keep: Callable[[int, State], N
             kept.append(state)
         elif state.running:
             why = "another start came to the same" if twin else "other starts were better"
-            reason = f"left after {state.iteration} iterations: {why}"
-            states[index] = marked = replace(state, left=True, status=RunStatus.MAX_ITERATIONS, reason=reason)
+            reason = f"dropped after {state.iteration} iterations: {why}"
+            states[index] = marked = replace(state, dropped=True, status=RunStatus.MAX_ITERATIONS, reason=reason)
             keep(index, marked)
 
 

@@ -28,7 +28,7 @@ from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
 from mdstopo.session.stages import first_row, is_done, iterations_of, run_stages, stage_of
-from mdstopo.session.starts import NOTHING_VARIES, Leg, is_moved, replaced, unshared
+from mdstopo.session.starts import NOTHING_VARIES, StartTask, is_moved, replaced, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers
@@ -296,30 +296,30 @@ class _Run:
 
         if workers > 1 and chosen.starts == 1:
             self.notify("one start needs one process: the other workers are not used")
-        for legs in rounds(self.case, self.states, keep):
-            if workers > 1 and len(legs) > 1:
+        for tasks in rounds(self.case, self.states, keep):
+            if workers > 1 and len(tasks) > 1:
                 from mdstopo.session.workers import run_in_workers  # most runs need no other process
 
                 job = (self.case, self.initial, make, scalarisation)
-                run_in_workers(job, self.states, legs, workers, keep, self.stop_requested)
+                run_in_workers(job, self.states, tasks, workers, keep, self.stop_requested)
             else:
-                for leg in legs:
+                for task in tasks:
                     if self.stop_requested():
                         break
-                    state = self.states[leg.index]
-                    self.states[leg.index] = run_stages(
-                        self.case, make, problem, leg, state, self.initial, keep, self.stop_requested
+                    state = self.states[task.index]
+                    self.states[task.index] = run_stages(
+                        self.case, make, problem, task, state, self.initial, keep, self.stop_requested
                     )
             # who goes on is decided only where all have come as far as they were to: not in a run that is stopped
-            if not all(self.is_through(leg) for leg in legs):
+            if not all(self.is_through(task) for task in tasks):
                 break
 
-    def is_through(self, leg: Leg) -> bool:
+    def is_through(self, task: StartTask) -> bool:
         """Whether a start has gone the part of its way that it was to go."""
-        state = self.states[leg.index]
+        state = self.states[task.index]
         if state is None:
             return False
-        return is_done(self.case, state) or (leg.quota is not None and state.iteration >= leg.quota)
+        return is_done(self.case, state) or (task.quota is not None and state.iteration >= task.quota)
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""

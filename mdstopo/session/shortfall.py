@@ -52,7 +52,7 @@ def holders(case: Case, state: State) -> list[str]:
     Known of the bundle method; empty where another one ended the run.
     """
     rows = state.bundle
-    if not state.competing or state.restoring or not len(rows) or len(rows) != len(state.multipliers):
+    if not state.uses_bundle or state.restoring or not len(rows) or len(rows) != len(state.multipliers):
         return []
     weights = state.multipliers * np.abs(rows.slope).max(axis=1, initial=0.0)
     whose = [-1]

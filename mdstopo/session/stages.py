@@ -16,7 +16,7 @@ from mdstopo.case.stages import stage_case, stage_count
 from mdstopo.optimizer.problem import Problem, Sample
 from mdstopo.optimizer.state import History, State
 from mdstopo.session.engine import MakeEngine
-from mdstopo.session.starts import Leg, make_optimizer, run_start
+from mdstopo.session.starts import StartTask, make_optimizer, run_start
 from mdstopo.status import RunStatus
 
 Floats = NDArray[np.float64]
@@ -59,7 +59,7 @@ def run_stages(
     case: Case,
     make: MakeEngine,
     problem: Problem,
-    leg: Leg,
+    task: StartTask,
     state: State | None,
     initial: Floats | None,
     keep: Callable[[int, State], None],
@@ -68,19 +68,19 @@ def run_stages(
     """As `starts.run_start`, through all stages of the case. problem: that of the last one, make: makes engines."""
     count = stage_count(case)
     if count == 1:
-        return run_start(case, problem, leg, state, initial, keep, stop)
+        return run_start(case, problem, task, state, initial, keep, stop)
 
     def problem_at(stage: int) -> Problem:
         return _Marked(problem if stage == count - 1 else make(stage_case(case, stage)).problem(), stage)
 
     here = problem_at(0 if state is None else stage_of(state))
     while True:
-        state = run_start(case, here, leg, state, initial, keep, stop)
+        state = run_start(case, here, task, state, initial, keep, stop)
         if state is None or state.running or is_done(case, state) or stop():
             return state
         here = problem_at(stage_of(state) + 1)
         state = _next(state, make_optimizer(case, here).start(state.best_alpha))
-        keep(leg.index, state)
+        keep(task.index, state)
 
 
 def _next(before: State, fresh: State) -> State:

@@ -82,7 +82,7 @@ def unshared(case: Case, initial: Floats | None) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Leg:
+class StartTask:
     """A part of a start's way. index: which start; family: where it begins; quota: iterations after which it pauses,
     None: it goes on to its end; best: the best design of all starts so far (N,), for a neighbour of it."""
 
@@ -93,7 +93,7 @@ class Leg:
 
 
 def run_start(
-    case: Case, problem: Problem, leg: Leg, state: State | None, initial: Floats | None, keep: Keep, stop: Stop
+    case: Case, problem: Problem, task: StartTask, state: State | None, initial: Floats | None, keep: Keep, stop: Stop
 ) -> State | None:
     """Step until the optimiser ends, the quota is used or `stop` says so; `keep` gets every state.
 
@@ -103,29 +103,29 @@ def run_start(
     optimizer = make_optimizer(case, problem)
     if state is None:
         own = None if initial is None else case.space.reduce(case.whole(initial))
-        first = design_of_family(problem, case.optimizer.seed, leg.index, leg.family, leg.best)
+        first = design_of_family(problem, case.optimizer.seed, task.index, task.family, task.best)
         first = own if first is None else first
         before = 0
-        if leg.family is Family.SOFTENED and hasattr(problem, "softened"):
+        if task.family is Family.SOFTENED and hasattr(problem, "softened"):
             soft = _soften(case, problem, first, stop)
             if soft is None:
                 return None
             first, before = soft.best_alpha, soft.evaluations
         state = _counted(optimizer.start(first), before)
-        keep(leg.index, state)
-    elif not state.left:
+        keep(task.index, state)
+    elif not state.dropped:
         state = optimizer.reopen(state)
     latest = state
 
     def reached(new: State) -> None:
         nonlocal latest
         latest = new
-        keep(leg.index, new)
+        keep(task.index, new)
 
     def paused() -> bool:
-        return stop() or (leg.quota is not None and latest.iteration >= leg.quota)
+        return stop() or (task.quota is not None and latest.iteration >= task.quota)
 
-    if latest.left:
+    if latest.dropped:
         return latest
     return run(optimizer, latest, on_iteration=reached, stop_requested=paused)
 

@@ -24,12 +24,12 @@ def main() -> None:
     engine = make_engine(case)
     get_ready(case, engine, problem_of(engine, even(case)), initial)
     problem = problem_of(engine, scalarisation)
-    while (task := inbox.get()) is not None:
-        leg, arrays = task
+    while (message := inbox.get()) is not None:
+        task, arrays = message
         sender = _Sender(output)
         state = None if arrays is None else State.from_arrays(arrays)
-        last = run_stages(case, make_engine, problem, leg, state, initial, sender.keep, stopped.is_set)
-        sender.send("done", leg.index, last)
+        last = run_stages(case, make_engine, problem, task, state, initial, sender.keep, stopped.is_set)
+        sender.send("done", task.index, last)
         if stopped.is_set():
             return
 

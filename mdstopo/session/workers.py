@@ -17,7 +17,7 @@ from mdstopo.optimizer.state import State
 from mdstopo.session.crew import WorkerProcess
 from mdstopo.session.engine import MakeEngine
 from mdstopo.session.errors import WorkerError
-from mdstopo.session.starts import Leg
+from mdstopo.session.starts import StartTask
 
 Floats = NDArray[np.float64]
 
@@ -29,12 +29,12 @@ _PATIENCE = 0.1  # seconds between two looks at whether to stop
 def run_in_workers(
     job: Job,
     states: Sequence[State | None],
-    legs: Sequence[Leg],
+    tasks: Sequence[StartTask],
     workers: int,
     keep: Callable[[int, State], None],
     stop_requested: Callable[[], bool],
 ) -> None:
-    """Go every leg; `keep` gets their states as they arrive, the last one of each always.
+    """Go every task; `keep` gets their states as they arrive, the last one of each always.
 
     job: the case, the first design, what makes the engine, and U of several objectives.
 
@@ -43,7 +43,7 @@ def run_in_workers(
     WorkerError
         if a worker dies; the states kept so far are good.
     """
-    todo = list(legs)
+    todo = list(tasks)
     inbox: queue.Queue[tuple[WorkerProcess, Any]] = queue.Queue()
     crew = [WorkerProcess("mdstopo.session.worker", job, workers, inbox) for _ in range(min(workers, len(todo)))]
     try:
@@ -55,11 +55,11 @@ def run_in_workers(
                 for worker in crew:
                     worker.stop()
             while idle and todo:
-                leg = todo.pop(0)
-                state = states[leg.index]
+                task = todo.pop(0)
+                state = states[task.index]
                 worker = idle.pop(0)
                 worker.busy = True
-                worker.send((leg, None if state is None else state.to_arrays()))
+                worker.send((task, None if state is None else state.to_arrays()))
             if not any(worker.busy for worker in crew):
                 break
             try:

@@ -7,7 +7,7 @@ import pytest
 from fakes import FakeEngineWithEvaluations, hand_made_case, limited
 
 from mdstopo.optimizer.state import State
-from mdstopo.session.quotas import QUOTAS, leave
+from mdstopo.session.quotas import QUOTAS, drop
 from mdstopo.session.starts import make_optimizer
 from mdstopo.status import RunStatus
 
@@ -30,11 +30,11 @@ def decided(states: list[State | None]) -> list[bool]:
     def keep(index: int, state: State) -> None:
         assert states[index] is state
 
-    leave(case, states, QUOTAS[0], keep)
-    return [state is not None and state.left for state in states]
+    drop(case, states, QUOTAS[0], keep)
+    return [state is not None and state.dropped for state in states]
 
 
-def test_starts_that_lag_behind_are_left_at_their_quota(first: State) -> None:
+def test_starts_that_lag_behind_are_dropped_at_their_quota(first: State) -> None:
     states: list[State | None] = [at(first, QUOTAS[0], value) for value in (0.3, 0.1, 0.11, 0.9)]
     assert decided(states) == [True, False, False, True]
     assert states[3] is not None

@@ -67,7 +67,7 @@ def test_only_a_stalled_run_whose_limits_hold_is_told(done) -> None:
 
 
 def test_what_holds_a_run_is_not_known_of_the_separable_model(done) -> None:
-    (told,) = shortfall.of_run(done.case, stalled(done.states[0], competing=False))
+    (told,) = shortfall.of_run(done.case, stalled(done.states[0], uses_bundle=False))
     assert "held by" not in told
 
 

@@ -1,4 +1,4 @@
-"""Several starts in quotas: a stopped and resumed run decides as an uninterrupted one; who was left stays left."""
+"""Several starts in quotas: a resumed run decides as an uninterrupted one; who was dropped stays dropped."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -34,14 +34,14 @@ def test_starts_take_turns_in_families_and_the_last_is_a_neighbour_of_the_best()
     assert Family.NEIGHBOUR not in [family_of(index, 3) for index in range(3)]
 
 
-def test_starts_that_lag_are_left_at_a_quota_and_a_third_goes_on(straight: tuple[Outcome, Path]) -> None:
+def test_starts_that_lag_are_dropped_at_a_quota_and_a_third_goes_on(straight: tuple[Outcome, Path]) -> None:
     states = [state for state in straight[0].states if state is not None]
     assert len(states) == STARTS
-    left = [state for state in states if state.left]
-    assert left
-    assert all(state.iteration in quotas.QUOTAS and "left after" in state.reason for state in left)
+    dropped = [state for state in states if state.dropped]
+    assert dropped
+    assert all(state.iteration in quotas.QUOTAS and "dropped after" in state.reason for state in dropped)
     assert 1 <= sum(state.iteration == 50 for state in states) <= STARTS // 3 + 1
-    assert not states[straight[0].best_start].left
+    assert not states[straight[0].best_start].dropped
 
 
 @pytest.mark.parametrize("asked", [7, 30, 70, 125, 150])
@@ -54,7 +54,7 @@ def test_a_run_that_is_stopped_anywhere_goes_on_as_if_it_had_not_been(
     assert_same_files(straight[1], path)
 
 
-def test_who_was_left_stays_left_when_the_limit_is_raised(straight: tuple[Outcome, Path], tmp_path: Path) -> None:
+def test_who_was_dropped_stays_dropped_when_the_limit_is_raised(straight: tuple[Outcome, Path], tmp_path: Path) -> None:
     path = tmp_path / "raised.h5"
     path.write_bytes(straight[1].read_bytes())
     before = straight[0].states
@@ -62,8 +62,8 @@ def test_who_was_left_stays_left_when_the_limit_is_raised(straight: tuple[Outcom
     for old, new in zip(before, after, strict=True):
         assert old is not None
         assert new is not None
-        assert new.left == old.left
-        assert new.iteration == (old.iteration if old.left else 60)
+        assert new.dropped == old.dropped
+        assert new.iteration == (old.iteration if old.dropped else 60)
 
 
 def test_equal_optima_are_told_once_best_first_with_all_their_evaluations(straight: tuple[Outcome, Path]) -> None:
