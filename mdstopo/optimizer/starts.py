@@ -17,8 +17,6 @@ from mdstopo.optimizer.state import State
 SHARPNESS = 4
 #: share of the members that a sparse design has, and of those that a neighbour exchanges
 SPARSE, EXCHANGED = 0.1, 0.15
-#: starts from which on the last of them is a neighbour of the best
-NEIGHBOUR_FROM = 4
 
 
 class Family(enum.StrEnum):
@@ -30,10 +28,15 @@ class Family(enum.StrEnum):
     SPARSE = "a few whole members"
     UNIFORM = "a random design"
     NEIGHBOUR = "near the best design so far"
+    OTHER_FROM = "the best design so far, its members' ends exchanged on the bodies they come from"
+    OTHER_TO = "the best design so far, its members' ends exchanged on the bodies they go to"
 
 
 #: the families that take turns after the first two starts
 TURNS = (Family.RANDOM, Family.SPARSE, Family.UNIFORM)
+#: the families that begin at the best design of the others, with how many starts there have to be for one of each; the
+#: first of them is the last start
+FROM_BEST = ((Family.OTHER_TO, 4), (Family.OTHER_FROM, 6), (Family.NEIGHBOUR, 8))
 #: the share of the strengths with which a softened start begins
 SOFT_STRENGTH = 0.25
 
@@ -42,9 +45,15 @@ def family_of(index: int, starts: int) -> Family:
     """The family of start `index` of so many."""
     if index == 0:
         return Family.STATED
-    if starts >= NEIGHBOUR_FROM and index == starts - 1:
-        return Family.NEIGHBOUR
+    for place, (family, least) in enumerate(FROM_BEST, start=1):
+        if starts >= least and index == starts - place:
+            return family
     return Family.SOFTENED if index == 1 else TURNS[(index - 2) % len(TURNS)]
+
+
+def begins_at_best(family: Family) -> bool:
+    """Whether a start of this family begins at the best design that other starts have found."""
+    return any(family is each for each, _ in FROM_BEST)
 
 
 def design_of_family(
@@ -57,8 +66,13 @@ def design_of_family(
         return sparse(problem, seed, index)
     if family is Family.UNIFORM:
         return uniform(problem, seed, index)
-    if family is Family.NEIGHBOUR and best is not None:
-        return neighbour(problem, seed, index, best)
+    if begins_at_best(family) and best is not None:
+        exchange = None if family is Family.NEIGHBOUR else getattr(problem, "exchange_ends", None)
+        if exchange is None:
+            return neighbour(problem, seed, index, best)
+        side = "to" if family is Family.OTHER_TO else "from"
+        other = exchange(best, side, np.random.default_rng([seed, index]))
+        return project(other, problem.lower, problem.upper, problem.linear)
     return random_feasible(problem, seed, index)
 
 

@@ -16,6 +16,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
+from mdstopo.optimizer.exchange import Side, exchange_ends
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals
@@ -123,6 +124,14 @@ class StructureProblem:
         case = self._evaluator.case
         other._factor = np.concatenate([share ** (1.0 / case.power), np.ones(case.space.length - case.n_design)])
         return other
+
+    def exchange_ends(self, x: Floats, side: Side, rng: np.random.Generator) -> Floats:
+        """The design x (n,) with the members' ends on one side exchanged; variables keep their values."""
+        design = self.space.expand(x)
+        groups = self._evaluator.case.design_groups
+        n = self.space.n_alpha
+        other = np.concatenate([exchange_ends(groups, design[:n], side, rng), design[n:]])
+        return np.asarray(self.space.reduce(other))
 
     def _design(self, x: Floats) -> Floats:
         design = self.space.expand(x)

@@ -12,7 +12,7 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_count
-from mdstopo.optimizer.starts import Family, best_run, family_of, rank
+from mdstopo.optimizer.starts import begins_at_best, best_run, family_of, rank
 from mdstopo.optimizer.state import State
 from mdstopo.session.starts import StartTask
 from mdstopo.status import RunStatus
@@ -36,7 +36,7 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     if count == 1 or stage_count(case) > 1:
         yield [StartTask(index, families[index]) for index in range(count)]
         return
-    late = [index for index in range(count) if families[index] is Family.NEIGHBOUR]
+    late = [index for index in range(count) if begins_at_best(families[index])]
     early = [index for index in range(count) if index not in late]
     yield [StartTask(index, families[index], QUOTAS[0]) for index in early]
     best = states[best_run(states, case.optimizer.tolerance)]

@@ -380,7 +380,7 @@ class _Run:
             for row, value in zip(self.case.constraints, self.constraints.tolist(), strict=True)
         ]
         i = int(np.argmax(excess))
-        if not excess[i] > 0.0:  # the optimiser failed before it had looked at any design
+        if not (np.isfinite(state.best_violation) and excess[i] > 0.0):  # no design was ever evaluated
             return status, reason
         row = self.case.constraints[i]
         word = {"limit": "above its limit", "at_least": "below its least", "equals": "away from its"}[row.sense]

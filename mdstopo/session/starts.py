@@ -84,7 +84,7 @@ def unshared(case: Case, initial: Floats | None) -> str:
 @dataclass(frozen=True, slots=True)
 class StartTask:
     """A part of a start's way. index: which start; family: where it begins; quota: iterations after which it pauses,
-    None: it goes on to its end; best: the best design of all starts so far (N,), for a neighbour of it."""
+    None: it goes on to its end; best: the best design of all starts so far (N,), for families that begin there."""
 
     index: int
     family: Family

@@ -8,6 +8,7 @@ from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.projection import satisfied
 from mdstopo.optimizer.starts import (
     Family,
+    begins_at_best,
     best_run,
     design_of_family,
     family_of,
@@ -49,15 +50,16 @@ def test_failed_and_missing_runs_are_never_the_best():
     assert best_run([None, *runs], 1e-6) == 1 + lower
 
 
-def test_families_take_turns_between_the_first_starts_and_the_neighbour():
+def test_families_take_turns_between_the_first_starts_and_those_that_begin_at_the_best():
     families = [family_of(index, 8) for index in range(8)]
     assert families[:2] == [Family.STATED, Family.SOFTENED]
-    assert families[2:7] == [Family.RANDOM, Family.SPARSE, Family.UNIFORM, Family.RANDOM, Family.SPARSE]
-    assert families[7] is Family.NEIGHBOUR
-    assert Family.NEIGHBOUR not in [family_of(index, 3) for index in range(3)]
+    assert families[2:5] == [Family.RANDOM, Family.SPARSE, Family.UNIFORM]
+    assert families[5:] == [Family.NEIGHBOUR, Family.OTHER_FROM, Family.OTHER_TO]
+    for starts, last in ((1, 0), (3, 0), (4, 1), (6, 2), (20, 3)):
+        assert sum(begins_at_best(family_of(index, starts)) for index in range(starts)) == last
 
 
-@pytest.mark.parametrize("family", [Family.RANDOM, Family.SPARSE, Family.UNIFORM, Family.NEIGHBOUR])
+@pytest.mark.parametrize("family", [Family.RANDOM, Family.SPARSE, Family.UNIFORM, Family.NEIGHBOUR, Family.OTHER_TO])
 def test_designs_of_every_family_keep_bounds_and_rows_and_can_be_repeated(family):
     problem, best = make(40), np.linspace(0.1, 0.9, 40)
     x = design_of_family(problem, 3, 5, family, best)

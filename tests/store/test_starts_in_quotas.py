@@ -8,7 +8,6 @@ import pytest
 from fakes import FakeEngineWithEvaluations, hand_made_case, limited
 from test_session import assert_same_files, stop_after
 
-from mdstopo.optimizer.starts import Family, family_of
 from mdstopo.session import quotas
 from mdstopo.session.outcome import Outcome
 from mdstopo.session.run import run_session
@@ -25,13 +24,6 @@ def go(path: Path, iterations: int = 50, **options: Any) -> Outcome:
 def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
     path = tmp_path_factory.mktemp("quotas") / "straight.h5"
     return go(path), path
-
-
-def test_starts_take_turns_in_families_and_the_last_is_a_neighbour_of_the_best() -> None:
-    found = [family_of(index, 8) for index in range(8)]
-    assert found[:5] == [Family.STATED, Family.SOFTENED, Family.RANDOM, Family.SPARSE, Family.UNIFORM]
-    assert found[-1] is Family.NEIGHBOUR
-    assert Family.NEIGHBOUR not in [family_of(index, 3) for index in range(3)]
 
 
 def test_starts_that_lag_are_dropped_at_a_quota_and_a_third_goes_on(straight: tuple[Outcome, Path]) -> None:
