@@ -27,7 +27,7 @@ def exchange_ends(groups: Sequence[MemberGroup], alpha: Floats, side: Side, rng:
         own = alpha[first : first + len(group)]
         parts.append(own[_places(group, side, rng)])
         first += len(group)
-    return np.concatenate(parts)
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def _places(group: MemberGroup, side: Side, rng: np.random.Generator) -> Ints:

@@ -67,12 +67,7 @@ def design_of_family(
     if family is Family.UNIFORM:
         return uniform(problem, seed, index)
     if begins_at_best(family) and best is not None:
-        exchange = None if family is Family.NEIGHBOUR else getattr(problem, "exchange_ends", None)
-        if exchange is None:
-            return neighbour(problem, seed, index, best)
-        side = "to" if family is Family.OTHER_TO else "from"
-        other = exchange(best, side, np.random.default_rng([seed, index]))
-        return project(other, problem.lower, problem.upper, problem.linear)
+        return elsewhere(problem, seed, index, family, best)
     return random_feasible(problem, seed, index)
 
 
@@ -108,6 +103,17 @@ def neighbour(problem: Problem, seed: int, index: int, best: Floats) -> Floats:
     share = np.divide(best - problem.lower, width, out=np.zeros(len(out)), where=width > 0.0)
     out[some] = problem.lower[some] + rng.permutation(share[some]) * width[some]
     return project(out, problem.lower, problem.upper, problem.linear)
+
+
+def elsewhere(problem: Problem, seed: int, index: int, family: Family, best: Floats) -> Floats:
+    """The best design with its members' ends exchanged, projected on the linear rows; a neighbour where it has none."""
+    exchange = getattr(problem, "exchange_ends", None)
+    if family is not Family.NEIGHBOUR and exchange is not None:
+        side = "to" if family is Family.OTHER_TO else "from"
+        other = exchange(best, side, np.random.default_rng([seed, index]))
+        if not np.array_equal(other, best):
+            return project(other, problem.lower, problem.upper, problem.linear)
+    return neighbour(problem, seed, index, best)
 
 
 def _feasible(problem: Problem, share: Floats, uniform: Floats) -> Floats:

@@ -5,6 +5,7 @@ import pytest
 
 from mdstopo.case.reader import read_case
 from mdstopo.optimizer.exchange import exchange_ends
+from mdstopo.optimizer.starts import Family, design_of_family, neighbour
 from mdstopo.session.engine import make_engine
 
 HEAD = """
@@ -69,3 +70,12 @@ def test_alphas_that_are_shared_stay_one_value(rng):
     problem = make_engine(case).problem()
     x = problem.exchange_ends(np.full(len(problem.lower), 0.4), "to", rng)
     assert np.allclose(x, 0.4)
+
+
+def test_a_case_without_members_of_its_own_starts_near_the_best_instead(rng):
+    text = HEAD + members("all", ", design: false") + TAIL
+    text += "design: {variables: {c: {group: web, parameter: stiffness, each: group, lower: 100, upper: 1000}}}\n"
+    problem = make_engine(read_case(text)).problem()
+    best = np.array([0.3])
+    assert np.array_equal(problem.exchange_ends(best, "to", rng), best)
+    assert np.array_equal(design_of_family(problem, 0, 3, Family.OTHER_TO, best), neighbour(problem, 0, 3, best))
