@@ -72,17 +72,17 @@ def ranked(rows: list[FloatArray], closeness: float, most: int, span: float) -> 
     order = sorted(rows, key=lambda row: (-row[SIGN] * row[VALUE], row[TIME]))
     best = order[0][SIGN] * order[0][VALUE]
     kept: list[FloatArray] = []
+    alike: dict[tuple[float, float], list[FloatArray]] = {}
     for row in order:
         if row[SIGN] * row[VALUE] < best - closeness * abs(best) or len(kept) == most:
             break
+        others = alike.setdefault((float(row[WHO]), float(row[SIGN])), [])
         if not any(
-            row[WHO] == other[WHO]
-            and row[SIGN] == other[SIGN]
-            and abs(row[TIME] - other[TIME]) <= RIPPLE_TIME * span
-            and abs(row[VALUE] - other[VALUE]) <= RIPPLE * abs(best)
-            for other in kept
+            abs(row[TIME] - other[TIME]) <= RIPPLE_TIME * span and abs(row[VALUE] - other[VALUE]) <= RIPPLE * abs(best)
+            for other in others
         ):
             kept.append(row)
+            others.append(row)
     return kept
 
 

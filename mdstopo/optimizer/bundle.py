@@ -137,10 +137,14 @@ class Bundle:
             return self
         steepest = np.abs(self.slope).max(axis=1)
         values, kept = self.values(), np.ones(len(self), dtype=np.bool_)
+        # slopes that are the same have nearly the same sum: most pairs need no look at all their entries
+        total = np.einsum("rn->r", self.slope)
+        apart = 2.0 * SAME * self.slope.shape[1] * steepest
         for i in range(len(self) - 1):
             near = np.flatnonzero(
                 (self.group[i + 1 :] == self.group[i])
                 & (np.abs(values[i + 1 :] - values[i]) <= SAME * max(steepest[i], 1e-300))
+                & (np.abs(total[i + 1 :] - total[i]) <= apart[i])
             )
             for k in (near + i + 1).tolist():
                 if np.abs(self.slope[k] - self.slope[i]).max() <= SAME * steepest[i]:

@@ -27,6 +27,9 @@ SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
 #: how far below the highest a peak may be to be a row, and how many of one response; of many members' forces more,
 #: because a design that lowers the largest raises others that are far below it
 NEAR, ALL = (0.3, 12), (0.6, 60)
+#: where the last row told is within this share of the largest, so many times as many are asked for, up to so many: in a
+#: good design most members share the largest force, and a step that knows nothing of one of them raises it
+TIED, GROWTH, MOST_ROWS = 0.1, 4, 960
 
 
 class StructureProblem:
@@ -78,7 +81,7 @@ class StructureProblem:
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows of U at x; a design that cannot be computed comes back with its status."""
-        evaluation = self._evaluator.evaluate(self._design(x), gradient, rows=self.rows)
+        evaluation = self._with_all_that_compete(self._design(x), gradient)
         info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
         for place, objective in zip(self._places, self._objectives, strict=True):
             info["objectives"][place] = evaluation.objectives[objective.name]
@@ -111,6 +114,16 @@ class StructureProblem:
         if not gradient:
             return Sample(float(rows[0]), rows, constraint_rows=limits, constraint_groups=groups, info=info)
         return Sample(float(rows[0]), rows, gradients, limits, slopes, groups, *cones, *own_cones, info=info)
+
+    def _with_all_that_compete(self, design: Floats, gradient: bool) -> Evaluation:
+        """An evaluation with as many rows as compete: more than usual where those are cut off among the largest."""
+        rows = self.rows
+        while True:
+            evaluation = self._evaluator.evaluate(design, gradient, rows=rows)
+            most = rows.most
+            if not gradient or most is None or most >= MOST_ROWS or not _is_cut_off(evaluation, most):
+                return evaluation
+            rows = rows._replace(most=GROWTH * most)
 
     def _cones(self, objective: Objective, sign: float, evaluation: Evaluation) -> "Cones":
         """What the rows of the only objective are norms of."""
@@ -209,6 +222,16 @@ class Cones(NamedTuple):
         return Cones(
             np.concatenate([self.excess, np.full(more, np.nan)]), np.concatenate([self.across, np.zeros((more, width))])
         )
+
+
+def _is_cut_off(evaluation: Evaluation, most: int) -> bool:
+    """Whether as many peaks of anything were told as were asked for, and the last is near the largest."""
+    if evaluation.all_compete or not evaluation.status.usable:
+        return False
+    told = [*evaluation.peaks.values(), *evaluation.constraint_peaks.values()]
+    return any(
+        len(peaks) == most and abs(peaks[-1].value - peaks[0].value) <= TIED * abs(peaks[0].value) for peaks in told
+    )
 
 
 def _signed(sign: float, slope: Floats) -> Floats:
