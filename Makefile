@@ -3,7 +3,7 @@
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
 #   make test-lowest              the same with the lowest versions of dependencies that pyproject.toml allows
-#   make lint, make types         ruff; mypy
+#   make lint, make types         ruff, and who may import whom; mypy
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
 #   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
@@ -83,6 +83,7 @@ test-lowest: $(LOWEST)/.ready
 
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
+	$(BIN)/lint-imports --no-cache
 
 types: $(VENV)/.ready-dev
 	$(BIN)/mypy

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo import Case
+from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer.driver import Gsao, run
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.scalarisation import Scalarisation
-from mdstopo.optimizer.structure import StructureProblem
 
 Floats = NDArray[np.float64]
 #: ends P and Q of one member, in m, global axes, at the start
@@ -105,7 +105,7 @@ def even(case: Case) -> list[tuple[str, list[int]]]:
 class Sizes:
     """The problem of a case with one variable for each part of a hand design; all other members are at their bound."""
 
-    def __init__(self, problem: StructureProblem, parts: list[tuple[str, list[int]]]) -> None:
+    def __init__(self, problem: DesignProblem, parts: list[tuple[str, list[int]]]) -> None:
         self.problem = problem
         self.spread = np.zeros((len(problem.initial), len(parts)))
         for k, (_, chosen) in enumerate(parts):
@@ -133,7 +133,7 @@ class Sizes:
 
 def sized(case: Case, parts: list[tuple[str, list[int]]], score: Scalarisation) -> Floats:
     """The design (N,) with the sizes of its parts that the optimiser finds best, from the best of several starts."""
-    problem = Sizes(StructureProblem(Evaluator(case), score), parts)
+    problem = Sizes(DesignProblem(Evaluator(case), score), parts)
     chosen = settings(max_iterations=ITERATIONS)
     ends = [run(Gsao(problem, chosen), Gsao(problem, chosen).start(share * problem.upper)) for share in STARTS]
     best = min(ends, key=lambda state: (max(state.best_violation, 1e-6), state.best_objective))

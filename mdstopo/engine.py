@@ -240,9 +240,9 @@ class Evaluator:
 
     def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":
         """The case as the optimiser sees it; several objectives need a scalarisation."""
-        from mdstopo.optimizer.structure import StructureProblem
+        from mdstopo.design_problem import DesignProblem
 
-        return StructureProblem(self, scalarisation)
+        return DesignProblem(self, scalarisation)
 
     def looking_at(self, objectives: Sequence[str]) -> "Evaluator":
         """The evaluator of the same case with some of its objectives alone: the others cost nothing."""

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
+from mdstopo.design_problem import sign_of
 from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, repeated, scaled, spacing
 from mdstopo.front.plan import TOLERATED, Front
 from mdstopo.front.tasks import Found
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.structure import sign_of
 from mdstopo.status import RunStatus
 from mdstopo.store.contents import Datasets
 from mdstopo.store.errors import DamagedError

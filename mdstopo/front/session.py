@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.design_problem import sign_of
 from mdstopo.front.content import Quality, begun_part, front_part, quality, read_begun, read_tasks, tasks_part
 from mdstopo.front.jobs import Setting, perform
 from mdstopo.front.plan import Front, NoEndError, Planner, Request
@@ -19,7 +20,6 @@ from mdstopo.front.tasks import Found, StoppedError, Task, case_key, failed
 from mdstopo.native.threads import cores
 from mdstopo.optimizer.starts import random_feasible
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even
 from mdstopo.session.engine import make_engine

@@ -7,8 +7,8 @@ import numpy as np
 
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.uncertain import Measure
+from mdstopo.design_problem import sign_of
 from mdstopo.evaluation import Evaluation, FloatArray
-from mdstopo.optimizer.structure import sign_of
 from mdstopo.robust.crew import Crew
 from mdstopo.robust.ensemble import NOMINAL, Ensemble
 from mdstopo.robust.intervals import Estimate, estimate

@@ -11,11 +11,11 @@ import numpy as np
 
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.uncertain import Measure
+from mdstopo.design_problem import competes, sign_of
 from mdstopo.engine import Evaluator
 from mdstopo.error_estimate import ErrorEstimate
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
-from mdstopo.optimizer.structure import competes, sign_of
 from mdstopo.robust.measures import rows, slopes
 from mdstopo.robust.points import evaluator_at, name_of, nominal_case
 from mdstopo.robust.sample import Sample, design_sample

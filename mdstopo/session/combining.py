@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
+from mdstopo.design_problem import sign_of
 from mdstopo.front.plan import NoEndError, Planner, Request
 from mdstopo.front.tasks import Found, StoppedError, Task, case_key, solve
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.structure import sign_of
 from mdstopo.session.callbacks import ignore
 from mdstopo.session.engine import Engine
 from mdstopo.session.errors import NoUtopiaError

@@ -6,8 +6,8 @@ import numpy as np
 
 from mdstopo.case.model import Case, ResponseRow
 from mdstopo.case.units import words
+from mdstopo.design_problem import SIGNS
 from mdstopo.optimizer.state import State
-from mdstopo.optimizer.structure import SIGNS
 from mdstopo.status import RunStatus
 
 TRY = (

@@ -7,20 +7,22 @@ of several peaks (a maximum that is minimised, a minimum that is maximised) ever
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
-from mdstopo.engine import Evaluator
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.exchange import Side, exchange_ends
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.engine import Evaluator
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
@@ -32,14 +34,14 @@ NEAR, ALL = (0.3, 12), (0.6, 60)
 TIED, GROWTH, MOST_ROWS = 0.1, 4, 960
 
 
-class StructureProblem:
+class DesignProblem:
     """The `Problem` of a case: volume rows, constraints on responses, and one objective or a scalarisation of several.
 
     scalarisation: of all objectives of the case; those it leaves out are neither simulated nor differentiated. None:
     the case's only objective. Raises CaseError where the case asks for what is not computed.
     """
 
-    def __init__(self, evaluator: Evaluator, scalarisation: Scalarisation | None = None) -> None:
+    def __init__(self, evaluator: "Evaluator", scalarisation: Scalarisation | None = None) -> None:
         case = evaluator.case
         refused = refusals(case)
         if refused:
@@ -131,7 +133,7 @@ class StructureProblem:
             return Cones.none()
         return Cones.of([(peak, 1.0, 0.0) for peak in evaluation.peaks[objective.name]], self._pull)
 
-    def softened(self, share: float) -> "StructureProblem":
+    def softened(self, share: float) -> "DesignProblem":
         """The same problem with members that have only a share of their strength: alpha^mu f, times the share."""
         other = copy(self)
         case = self._evaluator.case
