@@ -1,1 +1,1 @@
-"""What the README says about accuracy and speed, measured: `python -m benchmarks` or `make bench`."""
+"""What the documentation says about accuracy and speed, measured: `python -m benchmarks` or `make bench`."""

@@ -8,7 +8,7 @@ from importlib import import_module
 from pathlib import Path
 
 from benchmarks.outside import outside
-from benchmarks.readme import replace_block, write_pages
+from benchmarks.readme import replace_block, write_five_rows, write_pages
 from mdstopo.bench.machine import description
 from mdstopo.bench.tables import Table
 
@@ -41,15 +41,22 @@ CAMPAIGNS = ("damage", "hunt")
 #: sections that take an hour, or measure nothing, are run where they are named
 NAMED = (*PEERS, *CAMPAIGNS, "optimum")
 
-#: what has no place in the README
-ELSEWHERE = (*NAMED, "applications", "bound", "rows")
+#: the page that holds the tables of each section which `--readme` writes
+PAGES = {
+    "speed": "docs/performance.md",
+    "process": "docs/performance.md",
+    "bars": "docs/performance.md",
+    "orders": "docs/accuracy.md",
+    "chain": "docs/performance.md",
+    "fronts": "docs/performance.md",
+}
 
 
 def main() -> int:
-    """Measure, print, and on demand put the tables into the README."""
+    """Measure, print, and on demand put the tables into the documentation."""
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
-        description="Measure what the README says about accuracy and speed.",
+        description="Measure what the documentation says about accuracy and speed.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="sections:\n" + "\n".join(f"  {name:12} {what}" for name, what in SECTIONS.items()),
     )
@@ -60,7 +67,11 @@ def main() -> int:
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     parser.add_argument("--minutes", type=float, default=10.0, metavar="M", help="how long to hunt (default: 10)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the first scene of a hunt (default: 0)")
-    parser.add_argument("--readme", action="store_true", help="write the tables into README.md too")
+    parser.add_argument(
+        "--readme",
+        action="store_true",
+        help="write the tables into docs/performance.md and docs/accuracy.md, five of their rows into README.md",
+    )
     parser.add_argument(
         "--pages",
         action="store_true",
@@ -85,14 +96,16 @@ def main() -> int:
                 summary.append(text)
             print(text, flush=True)
         print(f"({name}: {time.perf_counter() - began:.0f} s)\n", flush=True)
-        if chosen.readme and name not in ELSEWHERE:
-            replace_block(Path("README.md"), name, "\n".join([*printed, machine]))
+        if chosen.readme and name in PAGES:
+            replace_block(Path(PAGES[name]), name, "\n".join([*printed, machine]))
         if chosen.pages and name == "applications":
             write_pages(printed, machine)
         if chosen.pages and name == "bound":
             replace_block(Path("docs/theory/bound.md"), name, "\n".join([*printed, machine]))
         if chosen.pages and name in PEERS:
             replace_block(Path("docs/comparison.md"), name, "\n".join([*summary, machine]))
+    if chosen.readme:
+        write_five_rows()
     return 0
 
 

@@ -1,7 +1,7 @@
 """The pictures of the documentation: `python -m benchmarks.pictures [NAME ...] [--fronts]` draws them.
 
-NAME is an application, or `limits`: how a run with limits on responses goes. Designs are those of `cases/designs`;
-fronts are computed, which takes minutes each, only with `--fronts`.
+NAME is an application, `limits`: how a run with limits on responses goes, or `moving`: the README's picture. Designs
+are those of `cases/designs`; fronts are computed, which takes minutes each, only with `--fronts`.
 """
 
 import sys
@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks.applications import APPLICATIONS
+from benchmarks.moving import draw_moving
 from benchmarks.optimum import problems
 from benchmarks.scenes import CASES
 from mdstopo import optimize
@@ -82,8 +83,11 @@ def draw_limits() -> None:
 
 def main(asked: list[str]) -> None:
     """Draw them; an unknown name is a KeyError."""
-    names = [name for name in asked if name != "--fronts"] or [*APPLICATIONS, "limits"]
+    names = [name for name in asked if name != "--fronts"] or [*APPLICATIONS, "limits", "moving"]
     for name in names:
+        if name == "moving":
+            draw_moving(IMAGES / "moving.svg")
+            continue
         if name == "limits":
             draw_limits()
             continue

@@ -1,112 +1,19 @@
-"""What the project says about itself is true: README, changelog, layout, start-up."""
+"""What the project says about itself is true: changelog, peers, docstrings, start-up."""
 
 import ast
 import re
 import subprocess
 import sys
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.cli.commands import COMMANDS
 
 ROOT = Path(__file__).resolve().parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
 SOURCES = sorted((ROOT / "mdstopo").rglob("*.py"))
 HEAVY = ("numpy", "numba", "scipy", "h5py", "rich", "yaml", "click", "llvmlite")
-
-
-def blocks(mark: str) -> list[str]:
-    """The fenced blocks of the README that stand below a mark."""
-    return re.findall(rf"<!-- {mark} -->\n```\w+\n(.*?)```", README, re.DOTALL)
-
-
-@pytest.mark.parametrize("snippet", blocks("runs"))
-def test_readme_python_runs_and_gives_what_it_says(snippet, monkeypatch, capsys):
-    monkeypatch.chdir(ROOT)
-    names: dict[str, object] = {}
-    exec(compile(snippet, "README.md", "exec"), names)
-    first, second, third = capsys.readouterr().out.strip().rsplit("\n", 2)
-    assert names["motion"].at([0.05, 0.1]).q.shape == (2, 6)
-    assert first.startswith("0.2 ")
-    assert second.endswith("(1020,)")
-    assert third.split()[0] in ("converged", "max_iterations")
-    assert names["result"].objectives["G"] < 7.0
-
-
-def test_readme_has_a_python_snippet_and_a_case():
-    assert len(blocks("runs")) == 1
-    assert len(blocks("case")) == 2
-
-
-@pytest.mark.parametrize(("number", "members"), [(0, 20 * 17), (1, 6 * 5)])
-def test_readme_cases_can_be_optimised(number, members):
-    import mdstopo
-    from mdstopo.case.reader import read_case
-    from mdstopo.scene.refusals import refusals
-
-    case = read_case(blocks("case")[number])
-    assert case.n_design == members
-    assert refusals(case) == []
-    assert mdstopo.evaluate(case).status.ok
-
-
-def test_readme_names_all_commands_and_no_others():
-    named = set(re.findall(r"mdstopo ([a-z]+)\b", README.partition("## The commands")[2].partition("(Outputs")[0]))
-    assert named == set(COMMANDS)
-
-
-def test_options_in_the_readme_exist():
-    found = re.findall(r"`?mdstopo ([a-z]+) ([^`\n]*)", README) + re.findall(r"`(gradient) (--[a-z]+)`", README)
-    used = [(name, option) for name, rest in found for option in re.findall(r"--[a-z][a-z-]*", rest)]
-    assert ("run", "--resume") in used
-    for name, option in used:
-        command = import_module(f"mdstopo.cli.{name}").command
-        assert option in {text for parameter in command.params for text in parameter.opts}, f"{name} {option}"
-
-
-def test_readme_names_every_integrator_sensitivity_and_preset():
-    from mdstopo.api import METHODS as SENSITIVITIES
-    from mdstopo.integrators.choice import METHODS as INTEGRATORS
-    from mdstopo.optimizer.presets import PRESETS
-
-    part = README.partition("## Integrators")[2].partition("\n## ")[0]
-    rows = re.findall(r"^\| `([a-z_]+)` \|", part, re.MULTILINE)
-    assert sorted(rows) == sorted([*INTEGRATORS, *(name for name in SENSITIVITIES if name != "auto")])
-    assert all(f"`{name}`" in part for name in PRESETS)
-
-
-def test_paths_in_the_readme_exist():
-    part = README.partition("## The code")[2].partition("\n## ")[0]
-    named = [name for name in re.findall(r"`([\w/]+/[\w.]+|mdstopo/\w+)`", part) if not name.startswith("results")]
-    assert len(named) > 10
-    for name in named:
-        assert (ROOT / name).exists() or (ROOT / "mdstopo" / name).exists(), name
-
-
-def test_make_targets_in_the_readme_exist():
-    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    targets = set(re.findall(r"^([a-z]+):", makefile, re.MULTILINE))
-    named = set(re.findall(r"(?:^|`|  )make ([a-z]+)\b", README, re.MULTILINE))
-    assert {"run", "test", "bench", "readme"} <= named <= targets
-
-
-def test_benchmarks_have_their_place_in_the_readme(tmp_path, monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT))
-    from benchmarks.__main__ import ELSEWHERE, SECTIONS
-    from benchmarks.readme import replace_block
-
-    copy = tmp_path / "README.md"
-    copy.write_text(README, encoding="utf-8")
-    for name in SECTIONS.keys() - set(ELSEWHERE):
-        replace_block(copy, name, f"the new {name}")
-    for name in SECTIONS.keys() - set(ELSEWHERE):
-        assert f"<!-- benchmarks: {name} -->\n\nthe new {name}\n\n<!-- end -->" in copy.read_text(encoding="utf-8")
-    with pytest.raises(ValueError, match="has no block"):
-        replace_block(copy, "weather", "fine")
 
 
 def test_joining_the_peers_is_the_same_problem(monkeypatch):
