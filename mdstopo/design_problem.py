@@ -13,9 +13,9 @@ import numpy as np
 
 from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
+from mdstopo.case.exchange import Side, exchange_ends
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
-from mdstopo.optimizer.exchange import Side, exchange_ends
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
 from mdstopo.scene.refusals import refusals

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from mdstopo.case.exchange import exchange_ends
 from mdstopo.case.reader import read_case
-from mdstopo.optimizer.exchange import exchange_ends
 from mdstopo.optimizer.starts import Family, design_of_family, neighbour
 from mdstopo.session.engine import make_engine
 

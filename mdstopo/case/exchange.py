@@ -11,8 +11,8 @@ from typing import Literal
 
 import numpy as np
 
+from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.parts import MemberGroup
-from mdstopo.optimizer.problem import Floats, Ints
 
 #: on which end of the members points take each other's places
 Side = Literal["from", "to"]
@@ -20,7 +20,7 @@ Side = Literal["from", "to"]
 FOUND = 0.5
 
 
-def exchange_ends(groups: Sequence[MemberGroup], alpha: Floats, side: Side, rng: np.random.Generator) -> Floats:
+def exchange_ends(groups: Sequence[MemberGroup], alpha: FloatArray, side: Side, rng: np.random.Generator) -> FloatArray:
     """The design alpha (N,) of these groups, the design's own, with the points of one side exchanged at random."""
     parts, first = [], 0
     for group in groups:
@@ -30,7 +30,7 @@ def exchange_ends(groups: Sequence[MemberGroup], alpha: Floats, side: Side, rng:
     return np.concatenate([np.zeros(0), *parts])
 
 
-def _places(group: MemberGroup, side: Side, rng: np.random.Generator) -> Ints:
+def _places(group: MemberGroup, side: Side, rng: np.random.Generator) -> IndexArray:
     """Which member's value each one takes (M,): its own where none joins its points after the exchange."""
     n_from, n_to = len(group.from_local), len(group.to_local)
     of_from, of_to = np.arange(n_from), np.arange(n_to)
