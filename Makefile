@@ -6,10 +6,10 @@
 #   make lint, make types         ruff, and who may import whom; mypy
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
-#   make bench                    measure what the README quotes (SECTIONS="speed bars" for some of it)
+#   make bench                    measure what the pages quote (SECTIONS="speed bars" for some of it)
 #   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
 #   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
-#   make readme                   measure everything and put the numbers into the README
+#   make readme                   measure everything, put the tables into docs/, five rows into the README
 #   make clean                    remove the environment and whatever was made; results stay
 
 PYTHON ?= $(or $(shell command -v python3.11),python3)
