@@ -54,7 +54,7 @@ def five_rows(performance: str, comparison: str) -> str:
             "bench",
             "speed",
         ),
-        (f"the same in {peer}, the fastest of other programs", other["its ms"], "ms", "peers", "peers"),
+        (f"the same in {peer}, the fastest other program measured", other["its ms"], "ms", "peers", "peers"),
         ("`mdstopo run cases/fig6.yaml`, start to file", median(process["seconds"]), "s", "bench", "process"),
         ("a step of a chain of 1,000 jointed bodies", chain["generalized_alpha"], "ms", "bench", "chain"),
         ("a Pareto front of 21 points, 1,020 members", front["seconds"], "s", "bench", "fronts"),

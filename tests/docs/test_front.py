@@ -34,7 +34,11 @@ def test_the_readme_is_short_and_has_a_picture_that_exists() -> None:
     assert len(README.splitlines()) <= 120
     pictures = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", README)
     assert pictures
-    assert all((ROOT / picture).is_file() for picture in pictures)
+    for picture in pictures:
+        drawn = (ROOT / picture).read_text(encoding="utf-8")
+        assert len(drawn) < 100_000, "a picture at the front stays small"
+        assert "<script" not in drawn
+        assert "://" not in drawn.replace("http://www.w3.org/2000/svg", "")
 
 
 def test_links_of_the_files_at_the_front_lead_somewhere() -> None:
