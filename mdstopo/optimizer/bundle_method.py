@@ -29,7 +29,7 @@ from mdstopo.optimizer.rows import (
     residual,
     subproblem,
 )
-from mdstopo.optimizer.safeguards import merit, residual_unit
+from mdstopo.optimizer.safeguards import is_least, merit, plain_violation, residual_unit, scaled_violation
 from mdstopo.optimizer.state import State
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
@@ -45,8 +45,21 @@ CONCAVITY_FALL = 0.9
 #: iterates whose violation has not fallen to this share of what it was, after which limits are restored first; and the
 #: factor on prices when that is done
 STAGNANT, VIOLATION_FALL, RESTORED_PRICE = 6, 0.8, 10.0
+#: the least box, in ranges, in which the objective is returned to once limits are restored; and the least one in which
+#: rows are dropped, in shares of the widest
+RETURN_TRUST, LEAST_RESET_TRUST = 1e-3, 1e-2
+#: factor on the box, or on a step that was shorter, where the model proves poor; and the least box, in ranges, after it
+SHRINK, LEAST_TRUST = 0.5, 1e-12
 #: share of the box below which a step leaves it too wide
 NARROW = 0.1
+#: share of the objective below which a promised decrease is none
+NO_DECREASE = 1e-13
+#: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
+#: for a null step, both in shares of those levels
+DECISIVE, NOT_ABOVE = 1e-12, 1e-9
+#: multipliers of constraints that the residual may have at most, in prices; share of its group's largest possible
+#: multiplier above which a row has carried one
+BOUND, CARRIED = 1e3, 1e-6
 
 
 class BundleMethod:
@@ -60,12 +73,34 @@ class BundleMethod:
         self.space = space
         self.settings = settings
 
-    def begin(self, state: State, price: Floats | None = None) -> None:
-        """Start again at the iterate, with its rows alone and without curvature.
+    def begin(self, state: State) -> None:
+        """Go on from the iterate, with its rows alone and without curvature."""
+        self._begin(state)
 
-        price (J,): what violations cost from here on; None: as `first_price` says, and nothing while restoring.
+    def begin_anew(self, state: State, stuck: bool) -> bool:
+        """Where no further step is found: restore the limits, return to the objective, or drop rows from elsewhere.
+
+        stuck: whether the last steps or the next one change next to nothing. Whether a new step is to be proposed.
         """
+        tolerance = self.settings.tolerance
+        done = state.kkt <= tolerance
+        if state.restoring:
+            kept = plain_violation(state.sample) <= NOTHING * tolerance
+            # what is left may be rounding of a steep limit: within the tolerance it is kept
+            if kept or ((stuck or done) and state.violation <= tolerance):
+                self._return_to_objective(state)
+                return True
+            return stuck and not is_least(state, tolerance) and self._reset(state)
+        resists = len(state.price) > 0 and state.violation > tolerance
+        if resists and (stuck or done or state.stagnation >= STAGNANT):
+            self._restore(state)
+            return True
+        return stuck and not done and self._reset(state)
+
+    def _begin(self, state: State, price: Floats | None = None) -> None:
+        """Begin. price (J,): of violations from here on; None: as `first_price` says, and nothing while restoring."""
         sample = state.sample
+        state.uses_bundle, state.small = True, 0
         rows = self._bundle(sample, state.restoring)
         state.bundle, state.multipliers = rows, np.zeros(len(rows))
         n = len(state.alpha)
@@ -79,6 +114,29 @@ class BundleMethod:
         state.concavity = np.zeros(len(state.price) + 1)
         state.stagnation, state.violation_mark = 0, float("inf")
         state.kkt = float("nan")
+
+    def _restore(self, state: State) -> None:
+        """Make the largest violation the objective."""
+        state.restoring, state.resets = True, 0
+        state.trust = max(state.trust, RESET_TRUST)
+        self._begin(state)
+
+    def _return_to_objective(self, state: State) -> None:
+        """Go on with the objective, now that limits hold."""
+        state.restoring = False
+        state.trust = max(state.trust, RETURN_TRUST)
+        self._begin(state)
+        state.price = RESTORED_PRICE * state.price
+
+    def _reset(self, state: State) -> bool:
+        """Drop rows from elsewhere, which may forbid what is possible; whether that was not too often at one place."""
+        if state.resets >= RESETS:
+            return False
+        trust = RESET_TRUST * RESET_SHRINK**state.resets
+        state.trust = min(trust, max(state.trust, LEAST_RESET_TRUST * trust))
+        self._begin(state, state.price)
+        state.resets += 1
+        return True
 
     def first_price(self, rows: Bundle) -> Floats:
         """The price of each constraint (J,): its gradient then weighs as much as the objective's."""
@@ -114,21 +172,16 @@ class BundleMethod:
             self._mark(state, there)
             state.bundle = moved.joined(new)
             state.kkt = float("nan")
-            if ratio > settings.number("good_ratio") and size > 0.5 * state.trust:
-                state.trust = min(1.0, settings.number("trust_grow") * state.trust)
-            elif ratio < settings.number("poor_ratio"):
-                state.trust = max(0.5 * min(state.trust, size), 1e-12)
-            elif size < NARROW * state.trust:  # a box of the size of the steps is solved to more digits
-                state.trust = max(0.5 * state.trust, size / NARROW)
+            state.trust = self._trust_after_step(state.trust, size, ratio)
             if not small:
                 state.resets = 0
         else:
-            above = seen.values() - here[seen.group]
-            decisive = new.values() >= there[new.group] - 1e-12 * np.abs(there[new.group])
-            null_step = bool((above[decisive] <= 1e-9 * np.abs(here[seen.group][decisive])).all())
+            null_step = _is_null_step(seen, here, new.values(), there)
             state.bundle = seen.joined(state.bundle)
-            state.trust = NULL_STEP_SHRINK * state.trust if null_step else 0.5 * min(state.trust, size)
+            state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
         state.bundle = state.bundle.without_repeats().thinned()
+        if accepted:
+            state.take(sample, scaled_violation(sample))
         return accepted
 
     def propose(self, state: State) -> None:
@@ -137,7 +190,7 @@ class BundleMethod:
         own = state.bundle.subset(state.bundle.own)
         steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
         if np.isnan(state.kkt):
-            price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * 1e3
+            price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * BOUND
             unit = steepest if state.restoring else residual_unit(state, steepest)
             state.kkt = residual(own, state.alpha, space, price, unit)
         B = curvature_of(state.steps, state.changes, max(steepest, 1e-300), space.range)
@@ -158,10 +211,25 @@ class BundleMethod:
         state.predicted = merit(here[0], here[1:], state.price) - promised
         state.trial = trial.x
         state.multipliers = trial.multipliers
-        enough = 1e-6 * np.concatenate([[1.0], state.price])
+        enough = CARRIED * np.concatenate([[1.0], state.price])
         state.bundle = state.bundle.used(trial.multipliers, enough)
 
+    def is_exhausted(self, state: State) -> bool:
+        """Whether the last steps have changed next to nothing, or the model promises no decrease."""
+        return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
+
     # -- how
+
+    def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:
+        """The box after an accepted step of this size, both in ranges; ratio: of actual to predicted decrease."""
+        settings = self.settings
+        if ratio > settings.number("good_ratio") and size > 0.5 * trust:
+            return min(1.0, settings.number("trust_grow") * trust)
+        if ratio < settings.number("poor_ratio"):
+            return max(SHRINK * min(trust, size), LEAST_TRUST)
+        if size < NARROW * trust:  # a box of the size of the steps is solved to more digits
+            return max(SHRINK * trust, size / NARROW)
+        return trust
 
     def _bundle(self, sample: Sample, restoring: bool) -> Bundle:
         """The sample's rows; while limits are restored, those of all constraints as the objective's."""
@@ -239,3 +307,14 @@ class BundleMethod:
             some = rows.distance > 0.0
             over = (rows.values() - levels[rows.group])[some] / rows.distance[some] ** 2
             np.maximum.at(state.concavity, rows.group[some], over)
+
+
+def _is_null_step(seen: Bundle, here: Floats, values: Floats, there: Floats) -> bool:
+    """Whether the rows that made a trial fail tell what stood in the way: none claims more of the iterate than is true.
+
+    seen: the trial's rows from the iterate; values (K,): theirs at the trial; here, there (groups,): the levels at
+    both.
+    """
+    above = seen.values() - here[seen.group]
+    decisive = values >= there[seen.group] - DECISIVE * np.abs(there[seen.group])
+    return bool((above[decisive] <= NOT_ABOVE * np.abs(here[seen.group][decisive])).all())

@@ -233,6 +233,14 @@ class State:
             self.row_details.constraint_across,
         )
 
+    def take(self, sample: Sample, violation: float) -> None:
+        """The trial, whose sample and violation (`safeguards.scaled_violation`) these are, becomes the iterate."""
+        self.alpha = self.trial
+        self.objective, self.violation = sample.objective, violation
+        self.rows, self.gradients = sample.rows, sample.gradients
+        self.constraint_rows, self.constraint_gradients = sample.constraint_rows, sample.constraint_gradients
+        self.row_details = RowDetails.of(sample)
+
     def copy(self) -> "State":
         """Another state with the same values; `dataclasses.replace` takes several times as long."""
         return State(*_values(self))
