@@ -16,14 +16,14 @@ from mdstopo.optimizer.problem import Floats, Sample
 from mdstopo.optimizer.rows import FeasibleSet
 from mdstopo.optimizer.safeguards import (
     CUT_SHRINK,
-    PRICE_CEILING,
-    PRICE_GROWTH,
+    PENALTY_CEILING,
+    PENALTY_GROWTH,
     cuts_from,
     cuts_of,
-    first_price,
+    first_penalty,
     merit,
-    next_charge,
     next_convex,
+    next_merit_penalty,
     next_shift,
     next_trust,
     no_cuts,
@@ -69,7 +69,7 @@ class SeparableMethod:
 
     def begin(self, state: State) -> None:
         """Start at the iterate of a new state, whose shifts, trust box and convex term are those of the settings."""
-        state.price = state.charge = first_price(state.sample, self.settings)
+        state.penalty = state.merit_penalty = first_penalty(state.sample, self.settings)
 
     # -- the steps
 
@@ -79,8 +79,8 @@ class SeparableMethod:
         Adapts the trust box, the convex term, shifts and cuts, and the count of steps without decrease.
         """
         settings = self.settings
-        before = merit(state.objective, state.sample.constraint_levels, state.charge)
-        after = merit(sample.objective, sample.constraint_levels, state.charge)
+        before = merit(state.objective, state.sample.constraint_levels, state.merit_penalty)
+        after = merit(sample.objective, sample.constraint_levels, state.merit_penalty)
         actual = before - after
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         # A decrease that rounding decides is none: both sums carry it.
@@ -114,20 +114,20 @@ class SeparableMethod:
         promised, constraints = model.model(optimum.x)
         if optimum.converged:
             multipliers = optimum.multipliers[model.n_objective :]
-            carried = np.bincount(sample.groups, weights=multipliers, minlength=len(state.price)).astype(np.float64)
-            state.charge = next_charge(state.charge, carried, state.price)
-        before = merit(state.objective, sample.constraint_levels, state.charge)
+            carried = np.bincount(sample.groups, weights=multipliers, minlength=len(state.penalty)).astype(np.float64)
+            state.merit_penalty = next_merit_penalty(state.merit_penalty, carried, state.penalty)
+        before = merit(state.objective, sample.constraint_levels, state.merit_penalty)
         state.trial = optimum.x
-        state.predicted = before - merit(promised, sample.levels_of(constraints), state.charge)
+        state.predicted = before - merit(promised, sample.levels_of(constraints), state.merit_penalty)
         state.kkt = self._kkt(state, model, optimum) if optimum.converged else float("nan")
         if not optimum.converged and not state.predicted > 0.0:
             state.status = RunStatus.FAILED
             state.reason = "the approximate subproblem could not be solved; the best design so far is kept"
-        if len(state.price) and state.violation > self.settings.tolerance:
-            bought = sample.levels_of(optimum.multipliers[model.n_objective :]) >= REACHED * state.price
-            dearest = PRICE_CEILING * first_price(sample, self.settings)
-            dearer = np.minimum(PRICE_GROWTH * state.price, np.maximum(dearest, state.price))
-            state.price = np.where(bought, dearer, state.price)
+        if len(state.penalty) and state.violation > self.settings.tolerance:
+            reached = sample.levels_of(optimum.multipliers[model.n_objective :]) >= REACHED * state.penalty
+            ceiling = PENALTY_CEILING * first_penalty(sample, self.settings)
+            raised = np.minimum(PENALTY_GROWTH * state.penalty, np.maximum(ceiling, state.penalty))
+            state.penalty = np.where(reached, raised, state.penalty)
 
     def is_exhausted(self, state: State) -> bool:
         """Whether the last steps have changed next to nothing."""
@@ -148,9 +148,10 @@ class SeparableMethod:
         found = propose(state, chosen, self._measures, self.settings)
         if found is None:
             return False
-        if len(state.charge):
-            state.charge = next_charge(state.charge, np.zeros_like(state.charge), state.price)
-        before = merit(state.objective, state.sample.constraint_levels, state.charge)
+        if len(state.merit_penalty):
+            none = np.zeros_like(state.merit_penalty)
+            state.merit_penalty = next_merit_penalty(state.merit_penalty, none, state.penalty)
+        before = merit(state.objective, state.sample.constraint_levels, state.merit_penalty)
         state.trial, state.kkt = found.trial, found.kkt
         state.predicted = before - found.promised
         return True
@@ -160,14 +161,14 @@ class SeparableMethod:
         linear = self.space.linear
         model = self._approximate(state, chosen)
         lower, upper = self._box(state, model)
-        price = state.price[state.sample.groups] if len(state.price) else state.price
-        optimum = solve(model, lower, upper, linear, price)
+        penalty = state.penalty[state.sample.groups] if len(state.penalty) else state.penalty
+        optimum = solve(model, lower, upper, linear, penalty)
         for weight in RESCUE_WEIGHTS:
             if optimum.converged:
                 break
             steepest = float(np.abs(model.slopes[: model.n_objective]).max())
             model = replace(model, kappa=model.kappa + weight * steepest / self.space.range)
-            optimum = solve(model, lower, upper, linear, price)
+            optimum = solve(model, lower, upper, linear, penalty)
         return model, optimum
 
     def _competing(self, state: State) -> Indices:
