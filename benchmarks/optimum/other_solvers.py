@@ -16,11 +16,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.optimum.kkt import competing, gradient_of
+from benchmarks.optimum.kkt import SIGNS, competing, gradient_of, volume_rows
 from benchmarks.optimum.measure import excess, value_of
 from mdstopo import Case, evaluate
-from mdstopo.case.model import ResponseRow, VolumeRow
-from mdstopo.optimizer.problem import LinearRows
+from mdstopo.case.model import ResponseRow
 from mdstopo.optimizer.projection import project
 
 Floats = NDArray[np.float64]
@@ -61,14 +60,7 @@ class Smooth:
         self.n, self.k = self.space.size, len(case.objectives)
         self.signs = np.array([-1.0 if each.sense == "maximize" else 1.0 for each in case.objectives])
         self.units = np.ones(self.k)
-        volumes = [row for row in case.constraints if isinstance(row, VolumeRow)]
-        own = [self.space.row(row) for row in volumes]
-        turned = np.array([-1.0 if row.sense == "at_least" else 1.0 for row in volumes])
-        self.linear = LinearRows(
-            np.array([a for a, _ in own]).reshape(len(own), self.n) * turned[:, None],
-            np.array([b for _, b in own]) * turned,
-            np.array([row.sense == "equals" for row in volumes], dtype=np.bool_),
-        )
+        self.linear = volume_rows(case)
         self._x: Floats | None = None
         self._kept: tuple[Floats, Floats] = np.zeros(0), np.zeros((0, 0))
 
@@ -103,7 +95,7 @@ class Smooth:
         design = self.space.expand(x)
         found = evaluate(case, design[: case.n_design], variables=self.space.named(design))
         size = self.k * PEAKS + sum(
-            LIMIT_PEAKS * _sides(row) for row in case.constraints if isinstance(row, ResponseRow)
+            LIMIT_PEAKS * len(SIGNS[row.sense]) for row in case.constraints if isinstance(row, ResponseRow)
         )
         if not found.status.usable:
             self.visited.append((count, float("inf"), float("inf")))
@@ -124,7 +116,7 @@ class Smooth:
         for i, row in enumerate(case.constraints):
             if isinstance(row, ResponseRow):
                 scale = abs(row.bound) or 1.0
-                for sign in {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}[row.sense]:
+                for sign in SIGNS[row.sense]:
                     peaks = competing(row, sign, found.constraint_peaks[i])
                     for r in range(LIMIT_PEAKS):
                         peak = peaks[min(r, len(peaks) - 1)]
@@ -189,10 +181,6 @@ class Smooth:
         rows[:, self.n] = -1.0
         rows[np.arange(self.k - 1), self.n + 1 + np.arange(self.k - 1)] = weights[1:] / weights[0]
         return rows
-
-
-def _sides(row: ResponseRow) -> int:
-    return 2 if row.sense == "equals" else 1
 
 
 def ipopt(problem: Smooth, first: Floats) -> None:

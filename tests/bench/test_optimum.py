@@ -12,14 +12,14 @@ from benchmarks.optimum.problems import Problem
 from mdstopo import evaluate, simulate
 
 
-def rows(peaks, slopes, x, lower=0.0, upper=1.0, c=(), held=(), A=(), b=(), equal=()):
+def rows(peaks, slopes, x, lower=0.0, upper=1.0, c=(), c_slopes=(), A=(), b=(), equal=()):
     """Rows of one objective at x."""
     x, n = np.asarray(x, dtype=float), len(x)
     peaks = np.asarray(peaks, dtype=float)
     A = np.array(A, dtype=float).reshape(len(b), n)
     return Rows(
         peaks - peaks.max(), np.array(slopes, dtype=float), np.zeros(len(peaks), dtype=int), np.array(c, dtype=float),
-        np.array(held, dtype=float).reshape(len(c), n), A @ x - np.array(b), A, np.array(equal, dtype=bool),
+        np.array(c_slopes, dtype=float).reshape(len(c), n), A @ x - np.array(b), A, np.array(equal, dtype=bool),
         x - lower, upper - x,
     )  # fmt: skip
 
@@ -34,7 +34,7 @@ def test_the_residual_vanishes_where_competing_peaks_balance():
 def test_the_residual_counts_constraints_volume_rows_and_bounds():
     # Least -x - 2 y under x + y = 1, x >= 0.2: at (0.2, 0.8) the multipliers of both rows are 1 and 2.
     at = [0.2, 0.8]
-    found = residual(rows([-1.8], [[-1, -2]], at, c=[0.0], held=[[-1, 0]], A=[[1, 1]], b=[1], equal=[True]))
+    found = residual(rows([-1.8], [[-1, -2]], at, c=[0.0], c_slopes=[[-1, 0]], A=[[1, 1]], b=[1], equal=[True]))
     assert found.scaled < 1e-8
     assert found.constraints == pytest.approx([1.0])
     assert found.linear == pytest.approx([2.0])
@@ -46,7 +46,7 @@ def test_the_residual_is_that_of_a_step_against_the_gradient():
     assert residual(rows([1.0], [[2.0, -0.5]], [0.5, 0.5])).scaled == pytest.approx(0.5, rel=0.1)
     assert residual(rows([1.0], [[2.0, -0.2]], [0.0, 0.5])).scaled == pytest.approx(0.1, rel=0.1)
     # an inactive constraint may not carry a multiplier for nothing
-    slack = residual(rows([1.0], [[1.0, 0.0]], [0.5, 0.5], c=[-0.2], held=[[-1.0, 0.0]]))
+    slack = residual(rows([1.0], [[1.0, 0.0]], [0.5, 0.5], c=[-0.2], c_slopes=[[-1.0, 0.0]]))
     assert 0.1 < slack.scaled < 0.5
 
 
