@@ -38,8 +38,10 @@ RESET_TRUST = 0.05
 PATIENCE = 8
 #: how often in a row rows from elsewhere are forgotten, each time with a box so much smaller
 RESETS, RESET_SHRINK = 3, 0.2
-#: share of the row's reach in the box that is rounding of the subproblem; the least penalty, of the first
-ROUNDING, LEAST_PENALTY = 1e-8, 1e-2
+#: share of the row's reach in the box that is rounding of the subproblem
+ROUNDING = 1e-8
+#: the least penalty, in the first one, and what is left of one at least from step to step
+LEAST_PENALTY, PENALTY_FALL = 1e-2, 0.5
 #: what is left of the concavity from trial to trial
 CONCAVITY_FALL = 0.9
 #: iterates whose violation has not fallen to this share of what it was, after which limits are restored first; and the
@@ -50,8 +52,8 @@ STAGNANT, VIOLATION_FALL, RESTORED_PENALTY = 6, 0.8, 10.0
 RETURN_TRUST, LEAST_RESET_TRUST = 1e-3, 1e-2
 #: factor on the box, or on a step that was shorter, where the model proves poor; and the least box, in ranges, after it
 SHRINK, LEAST_TRUST = 0.5, 1e-12
-#: share of the box below which a step leaves it too wide
-NARROW = 0.1
+#: shares of the box above which a step is held back by it, and below which a step leaves it too wide
+LONG, NARROW = 0.5, 0.1
 #: share of the objective below which a promised decrease is none
 NO_DECREASE = 1e-13
 #: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
@@ -66,7 +68,7 @@ class BundleMethod:
     """Begin, judge and propose for one problem.
 
     space: bounds, linear rows and ranges; settings: from `presets.settings`. Each method changes the state that it is
-    given; the driver copies it first, and takes an accepted trial as the iterate.
+    given; the driver copies it first.
     """
 
     def __init__(self, space: FeasibleSet, settings: Settings) -> None:
@@ -148,7 +150,7 @@ class BundleMethod:
     # -- the steps
 
     def judge(self, state: State, sample: Sample) -> bool:
-        """Whether the evaluated trial is accepted; its rows join the bundle in any case, seen from the next iterate.
+        """Whether the evaluated trial is accepted, and then the iterate; its rows join the bundle in any case.
 
         Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
         """
@@ -223,7 +225,7 @@ class BundleMethod:
     def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:
         """The box after an accepted step of this size, both in ranges; ratio: of actual to predicted decrease."""
         settings = self.settings
-        if ratio > settings.number("good_ratio") and size > 0.5 * trust:
+        if ratio > settings.number("good_ratio") and size > LONG * trust:
             return min(1.0, settings.number("trust_grow") * trust)
         if ratio < settings.number("poor_ratio"):
             return max(SHRINK * min(trust, size), LEAST_TRUST)
@@ -286,18 +288,19 @@ class BundleMethod:
         state.penalty = np.where(
             trial.levels[1:] > tiny,
             state.penalty,
-            np.maximum(np.maximum(MARGIN * carried, 0.5 * state.penalty), LEAST_PENALTY * self.first_penalty(rows)),
+            np.maximum(
+                np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * self.first_penalty(rows)
+            ),
         )
         return trial
 
     def _count_stagnation(self, state: State, there: Floats) -> None:
         """Count iterates whose largest violation is not much below that of the one that the count began with."""
         violation = float(there[1:].max(initial=0.0))
-        if violation <= self.settings.tolerance or violation < VIOLATION_FALL * state.violation_mark:
-            state.stagnation, state.violation_mark = (
-                0,
-                violation if violation > self.settings.tolerance else float("inf"),
-            )
+        if violation <= self.settings.tolerance:
+            state.stagnation, state.violation_mark = 0, float("inf")
+        elif violation < VIOLATION_FALL * state.violation_mark:
+            state.stagnation, state.violation_mark = 0, violation
         else:
             state.stagnation += 1
 
