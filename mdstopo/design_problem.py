@@ -191,9 +191,9 @@ class DesignProblem:
 
 
 class Cones(NamedTuple):
-    """`excess` (R,) and `across` (R, N) of rows; see `problem.Sample`."""
+    """`offset` (R,) and `across` (R, N) of rows; see `problem.Sample`."""
 
-    excess: Floats
+    offset: Floats
     across: Floats
 
     @classmethod
@@ -203,26 +203,26 @@ class Cones(NamedTuple):
 
     @classmethod
     def of(cls, rows: Sequence[tuple[Peak, float, float]], pull: Callable[[Floats], Floats]) -> "Cones":
-        """Those of rows (peak, scale, excess): scale |w| - excess, or of none of them (scale NaN)."""
+        """Those of rows (peak, scale, offset): scale |w| - offset, or of none of them (scale NaN)."""
         shaped = [peak.gradient is not None and peak.shape != "plain" and scale == scale for peak, scale, _ in rows]
         if not any(shaped):
             return cls.none()
-        excess = np.array([c if is_norm else np.nan for is_norm, (_, _, c) in zip(shaped, rows, strict=True)])
+        offset = np.array([c if is_norm else np.nan for is_norm, (_, _, c) in zip(shaped, rows, strict=True)])
         found = [
             scale * pull(peak.across) if is_norm and peak.across is not None else None
             for is_norm, (peak, scale, _) in zip(shaped, rows, strict=True)
         ]
         first = next(peak.gradient for peak, _, _ in rows if peak.gradient is not None)
         nothing = np.zeros(len(pull(first)))
-        return cls(excess, np.array([nothing if each is None else each for each in found]))
+        return cls(offset, np.array([nothing if each is None else each for each in found]))
 
     def extended(self, more: int) -> "Cones":
         """With so many more rows that are no norms."""
-        if not len(self.excess):
+        if not len(self.offset):
             return self
         width = self.across.shape[1]
         return Cones(
-            np.concatenate([self.excess, np.full(more, np.nan)]), np.concatenate([self.across, np.zeros((more, width))])
+            np.concatenate([self.offset, np.full(more, np.nan)]), np.concatenate([self.across, np.zeros((more, width))])
         )
 
 

@@ -19,7 +19,7 @@ def main() -> int:
     parser.add_argument("--parts", nargs="+", choices=tables.PARTS, default=tables.PARTS, help="default: all")
     parser.add_argument("--exact", action="store_true", help="solve the cone programs again (needs the extra optimum)")
     parser.add_argument(
-        "--rivals", action="store_true", help="run the other optimisers again (needs the extra optimum)"
+        "--other-solvers", action="store_true", help="run the other optimisers again (needs the extra optimum)"
     )
     parser.add_argument("--starts", type=int, default=race.STARTS, metavar="N", help="of each optimiser")
     parser.add_argument("--budget", type=int, default=race.BUDGET, metavar="N", help="evaluations of each start")
@@ -36,8 +36,8 @@ def main() -> int:
     if chosen.exact:
         problems.write_exact(picked)
         return 0
-    if chosen.rivals:
-        race.write_rivals(picked, chosen.starts, chosen.budget)
+    if chosen.other_solvers:
+        race.write_other_solvers(picked, chosen.starts, chosen.budget)
         return 0
     machine = f"Measured on: {description()}."
     print(machine + "\n", flush=True)

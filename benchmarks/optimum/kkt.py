@@ -26,6 +26,7 @@ from benchmarks.optimum.measure import slopes_of
 from mdstopo import Case, Evaluation
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.evaluation import Peak
+from mdstopo.optimizer.problem import LinearRows
 
 Floats = NDArray[np.float64]
 Truths = NDArray[np.bool_]
@@ -34,6 +35,8 @@ Truths = NDArray[np.bool_]
 SMALLEST, APART = 1e-9, 1.05
 #: reductions over time whose peaks compete where the value is bounded from above, and from below
 UPPER, LOWER = ("max", "max_abs"), ("min",)
+#: by sense of a constraint on a response, the signs with which it is bounded from above
+SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
 
 
 @dataclass(frozen=True)
@@ -41,15 +44,15 @@ class Rows:
     """What competes at a design x (n,), as of minimise U, c <= 0.
 
     peaks: values (R,) less the highest of their own objective, times dU/dG; slopes (R, n); objective (R,): whose they
-    are. c (C,), held (C, n): constraints on responses. slack (m,) = A x - b, A (m, n), equal (m,): volume rows. below,
-    above (n,): distances from the bounds.
+    are. c (C,), c_slopes (C, n): constraints on responses. slack (m,) = A x - b, A (m, n), equal (m,): volume rows.
+    below, above (n,): distances from the bounds.
     """
 
     peaks: Floats
     slopes: Floats
     objective: NDArray[np.int64]
     c: Floats
-    held: Floats
+    c_slopes: Floats
     slack: Floats
     A: Floats
     equal: Truths
@@ -90,14 +93,22 @@ def rows_of(case: Case, design: Floats, found: Evaluation, driven: bool = False)
     owners, values = np.array(objective), np.array(peaks)
     for k in set(objective):
         values[owners == k] -= values[owners == k].max()
-    c, held = _constraints(case, design, found, driven)
-    volumes = [row for row in case.constraints if isinstance(row, VolumeRow)]
-    signs = np.array([-1.0 if row.sense == "at_least" else 1.0 for row in volumes])
-    own_rows = [space.row(row) for row in volumes]
-    A = np.array([a for a, _ in own_rows]).reshape(len(volumes), len(x)) * signs[:, None]
-    slack = A @ x - signs * np.array([b for _, b in own_rows])
-    equal = np.array([row.sense == "equals" for row in volumes], dtype=np.bool_)
-    return Rows(values, np.array(slopes), owners, c, held, slack, A, equal, x - lower, upper - x)
+    c, c_slopes = _constraints(case, design, found, driven)
+    volumes = volume_rows(case)
+    slack = volumes.A @ x - volumes.b
+    return Rows(values, np.array(slopes), owners, c, c_slopes, slack, volumes.A, volumes.equal, x - lower, upper - x)
+
+
+def volume_rows(case: Case) -> LinearRows:
+    """The volume rows of the optimiser's variables, `at_least` with its signs turned."""
+    rows = [row for row in case.constraints if isinstance(row, VolumeRow)]
+    own = [case.space.row(row) for row in rows]
+    signs = np.array([-1.0 if row.sense == "at_least" else 1.0 for row in rows])
+    return LinearRows(
+        np.array([a for a, _ in own]).reshape(len(own), case.space.size) * signs[:, None],
+        np.array([b for _, b in own]) * signs,
+        np.array([row.sense == "equals" for row in rows], dtype=np.bool_),
+    )
 
 
 def _members(case: Case, design: Floats, looked: Objective | ResponseRow, peaks: Sequence[Peak]) -> Sequence[Peak]:
@@ -121,17 +132,17 @@ def _members(case: Case, design: Floats, looked: Objective | ResponseRow, peaks:
 def _constraints(case: Case, design: Floats, found: Evaluation, driven: bool) -> tuple[Floats, Floats]:
     """Excesses relative to the bounds and their gradients, a row a peak."""
     c: list[float] = []
-    held: list[Floats] = []
+    c_slopes: list[Floats] = []
     for i, row in enumerate(case.constraints):
         if not isinstance(row, ResponseRow):
             continue
         scale = abs(row.bound) or 1.0
-        for sign in {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}[row.sense]:
+        for sign in SIGNS[row.sense]:
             peaks = found.constraint_peaks[i]
             for peak in competing(row, sign, _members(case, design, row, peaks) if driven else peaks):
                 c.append(sign * (peak.value - row.bound) / scale)
-                held.append(sign * case.space.pull(gradient_of(peak)) / scale)
-    return np.array(c), np.array(held).reshape(len(c), case.space.size)
+                c_slopes.append(sign * case.space.pull(gradient_of(peak)) / scale)
+    return np.array(c), np.array(c_slopes).reshape(len(c), case.space.size)
 
 
 def competing(looked: Objective | ResponseRow, sign: float, peaks: Sequence[Peak]) -> Sequence[Peak]:
@@ -154,9 +165,9 @@ def residual(rows: Rows) -> Residual:
     highest = [int(np.flatnonzero(rows.objective == k)[np.argmax(rows.peaks[rows.objective == k])]) for k in owners]
     steepest = float(np.abs(rows.slopes[highest].sum(axis=0)).max(initial=0.0)) or 1.0
     # Multipliers of the constraints are scaled by their own gradients, so that the program's numbers are of one size.
-    sizes = np.maximum(np.abs(rows.held).max(axis=1, initial=0.0), 1e-300)
+    sizes = np.maximum(np.abs(rows.c_slopes).max(axis=1, initial=0.0), 1e-300)
     coarse = np.maximum(np.abs(rows.A).max(axis=1, initial=0.0), 1e-300)
-    matrix = np.concatenate([rows.slopes / steepest, rows.held / sizes[:, None], rows.A / coarse[:, None]]).T
+    matrix = np.concatenate([rows.slopes / steepest, rows.c_slopes / sizes[:, None], rows.A / coarse[:, None]]).T
     gaps = np.concatenate(
         [-rows.peaks / steepest, np.abs(rows.c) / sizes, np.where(rows.equal, 0.0, np.abs(rows.slack) / coarse)]
     )

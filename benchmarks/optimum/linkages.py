@@ -136,15 +136,12 @@ SLIDER_CRANK = Linkage(
 
 #: Watt's second chain: two four-bars, the rocker of the first is the input of the second
 WATT = Linkage(
-    points={"a": (0, 0), "b": (0, 0.2), "c": (0.55, 0.5), "d": (0.6, 0), "e": (0.85, 0.4), "f": (1.35, 0.55),
+    points={**FOUR_BAR.points, "e": (0.85, 0.4), "f": (1.35, 0.55),
             "g": (1.35, 0)},
     links={"crank": ("a", "b"), "coupler": ("b", "c"), "rocker": ("d", "c", "e"), "rod": ("e", "f"),
            "lever": ("g", "f")},
     pins={
-        "A": ("ground", "crank", "a"),
-        "B": ("crank", "coupler", "b"),
-        "C": ("coupler", "rocker", "c"),
-        "D": ("rocker", "ground", "d"),
+        **FOUR_BAR.pins,
         "E": ("rocker", "rod", "e"),
         "F": ("rod", "lever", "f"),
         "G": ("lever", "ground", "g"),
@@ -154,15 +151,12 @@ WATT = Linkage(
 
 #: Watt's first chain: the second loop floats on the coupler and the rocker of the first
 WATT_FLOATING = Linkage(
-    points={"a": (0, 0), "b": (0, 0.2), "c": (0.55, 0.5), "d": (0.6, 0), "e": (0.25, 0.65), "h": (0.8, 0.45),
+    points={**FOUR_BAR.points, "e": (0.25, 0.65), "h": (0.8, 0.45),
             "f": (0.6, 0.9)},
     links={"crank": ("a", "b"), "coupler": ("b", "c", "e"), "rocker": ("d", "c", "h"), "rod": ("e", "f"),
            "lever": ("h", "f")},
     pins={
-        "A": ("ground", "crank", "a"),
-        "B": ("crank", "coupler", "b"),
-        "C": ("coupler", "rocker", "c"),
-        "D": ("rocker", "ground", "d"),
+        **FOUR_BAR.pins,
         "E": ("coupler", "rod", "e"),
         "F": ("rod", "lever", "f"),
         "H": ("lever", "rocker", "h"),
@@ -172,15 +166,12 @@ WATT_FLOATING = Linkage(
 
 #: Stephenson's third chain: a dyad from the coupler to the ground
 STEPHENSON = Linkage(
-    points={"a": (0, 0), "b": (0, 0.2), "c": (0.55, 0.5), "d": (0.6, 0), "e": (0.3, 0.7), "f": (0.95, 1.05),
+    points={**FOUR_BAR.points, "e": (0.3, 0.7), "f": (0.95, 1.05),
             "g": (1.25, 0.3)},
     links={"crank": ("a", "b"), "coupler": ("b", "c", "e"), "rocker": ("d", "c"), "rod": ("e", "f"),
            "lever": ("g", "f")},
     pins={
-        "A": ("ground", "crank", "a"),
-        "B": ("crank", "coupler", "b"),
-        "C": ("coupler", "rocker", "c"),
-        "D": ("rocker", "ground", "d"),
+        **FOUR_BAR.pins,
         "E": ("coupler", "rod", "e"),
         "F": ("rod", "lever", "f"),
         "G": ("lever", "ground", "g"),
@@ -190,13 +181,10 @@ STEPHENSON = Linkage(
 
 #: a four-bar whose coupler pushes a slider
 SIX_BAR_SLIDER = Linkage(
-    points={"a": (0, 0), "b": (0, 0.2), "c": (0.55, 0.5), "d": (0.6, 0), "e": (0.3, 0.7), "f": (1.1, 0.7)},
+    points={**FOUR_BAR.points, "e": (0.3, 0.7), "f": (1.1, 0.7)},
     links={"crank": ("a", "b"), "coupler": ("b", "c", "e"), "rocker": ("d", "c"), "rod": ("e", "f")},
     pins={
-        "A": ("ground", "crank", "a"),
-        "B": ("crank", "coupler", "b"),
-        "C": ("coupler", "rocker", "c"),
-        "D": ("rocker", "ground", "d"),
+        **FOUR_BAR.pins,
         "E": ("coupler", "rod", "e"),
         "F": ("rod", "ram", "f"),
     },
@@ -226,16 +214,24 @@ def largest(response: Document, **more: Any) -> Document:
     return {"response": response, "over_time": "max", **more}
 
 
+@dataclass(frozen=True)
+class Candidates:
+    """What a linkage may be tied with: points and groups of members, by name, and rows on their volume."""
+
+    points: Document
+    members: Document
+    volumes: Sequence[Document]
+
+
 def document(
     linkage: Linkage,
     title: str,
-    points: Document,
-    members: Document,
-    objectives: Document,
-    constraints: Sequence[Document],
+    candidates: Candidates,
+    objectives: Sequence[str],
+    limits: Mapping[str, float],
     **more: Any,
 ) -> Document:
-    """The case document of a linkage with candidate members."""
+    """The case document of a linkage with candidate members; objectives, limits: forces, named as in `_limits`."""
     return {
         "format": 1,
         "title": title,
@@ -244,11 +240,11 @@ def document(
         "bodies": linkage.bodies(),
         "joints": linkage.joints(),
         "motions": [{"body": linkage.driven, "angle": {"velocity": linkage.speed}}],
-        "points": points,
-        "members": members,
+        "points": candidates.points,
+        "members": candidates.members,
         "design": {"initial": 0.3, "lower": 0.0, "upper": 1.0},
-        "objectives": objectives,
-        "constraints": list(constraints),
+        "objectives": _objectives(objectives),
+        "constraints": [*candidates.volumes, *_limits(limits)],
         "optimizer": {"max_iterations": 200},
         **more,
     }
@@ -286,8 +282,8 @@ def four_bar(objectives: Sequence[str], limits: Mapping[str, float], fraction: f
         "springs": {"from": "anchors", "to": "coupler", "law": _spring(300)},
         "taut": {"from": "anchors", "to": "rocker", "min_length": 0.1, "law": _spring(300, free_length=0.3)},
     }
-    rows = [{"volume": "all", "fraction": fraction}, *_limits(limits)]
-    return document(own, "Driven four-bar", points, members, _objectives(objectives), rows, **more)
+    candidates = Candidates(points, members, [{"volume": "all", "fraction": fraction}])
+    return document(own, "Driven four-bar", candidates, objectives, limits, **more)
 
 
 def slider_crank(objectives: Sequence[str], limits: Mapping[str, float], **more: Any) -> Document:
@@ -295,8 +291,8 @@ def slider_crank(objectives: Sequence[str], limits: Mapping[str, float], **more:
     own = SLIDER_CRANK
     points = {"rod": on_link(own, "rod", 4), "anchors": anchors((-0.4, -0.4), (0.9, 0.4), (4, 2))}
     members = {"springs": {"from": "anchors", "to": "rod", "law": _spring(400)}}
-    rows = [{"volume": "all", "fraction": 0.3}, *_limits(limits)]
-    return document(own, "Driven slider-crank", points, members, _objectives(objectives), rows, **more)
+    candidates = Candidates(points, members, [{"volume": "all", "fraction": 0.3}])
+    return document(own, "Driven slider-crank", candidates, objectives, limits, **more)
 
 
 def watt(objectives: Sequence[str], limits: Mapping[str, float], **more: Any) -> Document:
@@ -313,8 +309,8 @@ def watt(objectives: Sequence[str], limits: Mapping[str, float], **more: Any) ->
         "levers": {"from": "anchors", "to": "lever", "min_length": 0.1, "law": _spring(200)},
         "rockers": {"from": "anchors", "to": "rocker", "law": _spring(200, free_length=0.4)},
     }
-    rows = [{"volume": "all", "equals": 12}, *_limits(limits)]
-    return document(own, "Watt's six-bar", points, members, _objectives(objectives), rows, **more)
+    candidates = Candidates(points, members, [{"volume": "all", "equals": 12}])
+    return document(own, "Watt's six-bar", candidates, objectives, limits, **more)
 
 
 def watt_floating(objectives: Sequence[str], limits: Mapping[str, float], **more: Any) -> Document:
@@ -331,8 +327,8 @@ def watt_floating(objectives: Sequence[str], limits: Mapping[str, float], **more
         "rods": {"from": "anchors", "to": "rod", "law": _spring(200)},
         "cross": {"from": "coupler", "to": "lever", "law": _spring(300, free_length=0.3)},
     }
-    rows = [{"volume": "all", "fraction": 0.4}, {"volume": ["cross"], "limit": 2}, *_limits(limits)]
-    return document(own, "Watt's six-bar, floating", points, members, _objectives(objectives), rows, **more)
+    candidates = Candidates(points, members, [{"volume": "all", "fraction": 0.4}, {"volume": ["cross"], "limit": 2}])
+    return document(own, "Watt's six-bar, floating", candidates, objectives, limits, **more)
 
 
 def stephenson(objectives: Sequence[str], limits: Mapping[str, float], **more: Any) -> Document:
@@ -349,8 +345,8 @@ def stephenson(objectives: Sequence[str], limits: Mapping[str, float], **more: A
         "rods": {"from": "anchors", "to": "rod", "law": _spring(200)},
         "levers": {"from": "anchors", "to": "lever", "min_length": 0.05, "law": _spring(300)},
     }
-    rows = [{"volume": "all", "fraction": 0.3}, *_limits(limits)]
-    return document(own, "Stephenson's six-bar", points, members, _objectives(objectives), rows, **more)
+    candidates = Candidates(points, members, [{"volume": "all", "fraction": 0.3}])
+    return document(own, "Stephenson's six-bar", candidates, objectives, limits, **more)
 
 
 def six_bar_slider(objectives: Sequence[str], limits: Mapping[str, float], **more: Any) -> Document:
@@ -365,5 +361,5 @@ def six_bar_slider(objectives: Sequence[str], limits: Mapping[str, float], **mor
         "springs": {"from": "anchors", "to": "coupler", "law": _spring(200)},
         "rods": {"from": "anchors", "to": "rod", "law": _spring(200)},
     }
-    rows = [{"volume": "all", "fraction": 0.3}, *_limits(limits)]
-    return document(own, "Six-bar with a slider", points, members, _objectives(objectives), rows, **more)
+    candidates = Candidates(points, members, [{"volume": "all", "fraction": 0.3}])
+    return document(own, "Six-bar with a slider", candidates, objectives, limits, **more)

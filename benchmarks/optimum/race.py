@@ -22,8 +22,8 @@ Floats = NDArray[np.float64]
 #: evaluations of all starts so far, best value so far
 Improvements = list[tuple[int, float]]
 
-#: where the others' results are kept; `python -m benchmarks.optimum --rivals` writes it
-KEPT_RESULTS = Path(__file__).with_name("rivals.json")
+#: where the others' results are kept; `python -m benchmarks.optimum --other-solvers` writes it
+KEPT_RESULTS = Path(__file__).with_name("other_solvers.json")
 #: starts and evaluations of each, unless asked otherwise
 STARTS, BUDGET = 20, 150
 #: methods that need a dense matrix of all variables squared are left out beyond so many
@@ -72,7 +72,7 @@ def ours(problem: Problem, starts: int, iterations: int) -> tuple[Improvements, 
 
 def race(problem: Problem, starts: int, budget: int) -> dict[str, Any]:
     """What the others reach. Needs CasADi and NLopt."""
-    from benchmarks.optimum.rivals import METHODS, attempt
+    from benchmarks.optimum.other_solvers import METHODS, attempt
 
     case = problem.case()
     entry: dict[str, Any] = {"digest": problem.digest, "starts": starts, "budget": budget, "methods": {}}
@@ -98,7 +98,7 @@ def race(problem: Problem, starts: int, budget: int) -> dict[str, Any]:
     return entry
 
 
-def write_rivals(chosen: Sequence[Problem], starts: int, budget: int) -> None:
+def write_other_solvers(chosen: Sequence[Problem], starts: int, budget: int) -> None:
     """Race the others and keep what they reach, and the best of mdstopo with as many starts."""
     for problem in chosen:
         if problem.kind != "dynamic":
@@ -113,7 +113,7 @@ def write_rivals(chosen: Sequence[Problem], starts: int, budget: int) -> None:
             print(f"{problem.name:20} {method:6} {each['evaluations']} evaluations, best {last}", flush=True)
 
 
-def rivals_of(problem: Problem) -> dict[str, Any] | None:
+def other_solvers_of(problem: Problem) -> dict[str, Any] | None:
     """What the others reached; None where it is not kept, or was reached on another text."""
     kept = json.loads(KEPT_RESULTS.read_text()).get(problem.name) if KEPT_RESULTS.exists() else None
     return kept if kept is not None and kept["digest"] == problem.digest else None
@@ -123,7 +123,7 @@ def best_known(problem: Problem) -> float | None:
     """The exact value, or the best that is kept of anybody; None where nobody found any design."""
     if problem.exact is not None:
         return problem.exact
-    entry = rivals_of(problem)
+    entry = other_solvers_of(problem)
     if entry is None:
         return None
     lasts = [each["improvements"][-1][1] for each in entry["methods"].values() if each["improvements"]]

@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from benchmarks.optimum.held import applications, eight_starts
+from benchmarks.optimum.acceptance import applications, eight_starts
 from benchmarks.optimum.problems import Problem, named
-from benchmarks.optimum.race import BUDGET, NEAR, STARTS, best_known, ours, rivals_of, within
+from benchmarks.optimum.race import BUDGET, NEAR, STARTS, best_known, other_solvers_of, ours, within
 from benchmarks.optimum.runs import KEPT, LEAST, REACHED, Run, run
 from mdstopo.bench.tables import Table, verdict
 
@@ -15,7 +15,7 @@ ITERATIONS = (200, 50, 1000)
 #: evaluations within which a convex problem's optimum is to be reached
 WITHIN = 100
 #: what the tables are called on the command line
-PARTS = ("convex", "dynamic", "race", "applications", "held")
+PARTS = ("convex", "dynamic", "race", "applications", "bars")
 
 
 def everything(
@@ -35,7 +35,7 @@ def everything(
         yield from race([each for each in chosen if each.kind == "dynamic"], starts, budget)
     if "applications" in parts and not names:
         yield from applications()
-    if "held" in parts and not names:
+    if "bars" in parts and not names:
         from benchmarks.bars import bars
 
         yield from eight_starts()
@@ -127,7 +127,7 @@ def race(chosen: Sequence[Problem], starts: int, budget: int) -> Iterator[Table]
     rows, level, quick, told = [], 0, 0, set()
     methods = ("IPOPT", "MMA", "CCSAQ", "SLSQP")
     for problem in chosen:
-        entry = rivals_of(problem)
+        entry = other_solvers_of(problem)
         if entry is None:
             continue
         told.add((entry["starts"], entry["budget"]))
@@ -147,7 +147,7 @@ def race(chosen: Sequence[Problem], starts: int, budget: int) -> Iterator[Table]
         rows.append(
             [
                 problem.name, f"{best:.5g}", _share(own, best), _count(mine), str(evaluations),
-                *(_rival(entry, name, best, counts) for name in methods), verdict(good), verdict(fast),
+                *(_other_solver(entry, name, best, counts) for name in methods), verdict(good), verdict(fast),
             ]
         )  # fmt: skip
     if not rows:
@@ -206,7 +206,7 @@ def _count(count: int | None) -> str:
     return "never" if count is None else str(count)
 
 
-def _rival(entry: dict[str, object], name: str, best: float, counts: dict[str, int | None]) -> str:
+def _other_solver(entry: dict[str, object], name: str, best: float, counts: dict[str, int | None]) -> str:
     methods = entry["methods"]
     assert isinstance(methods, dict)
     if name not in methods:

@@ -176,14 +176,14 @@ def _trouble(column: Any) -> str:
 
 
 def _warnings(done: "Finalized") -> tuple[str, ...]:
-    return (*done.outcome.warnings, *done.told, *([done.rest.moved] if done.rest.moved else []))
+    return (*done.outcome.warnings, *done.told, *([done.equilibria.moved] if done.equilibria.moved else []))
 
 
 def _why(done: "Finalized") -> str:
     if not done.columns:
         return "the run was interrupted"
-    if done.rest.fallen:
-        return f"{done.rest.fallen}; keep more members"
+    if done.equilibria.lost:
+        return f"{done.equilibria.lost}; keep more members"
     if any(not column.found.status.usable for column in done.columns[-2:]):
         return "the motion of its design cannot be computed"
     return "all members have alpha = 0"

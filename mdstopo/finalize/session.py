@@ -14,8 +14,8 @@ from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.equilibria import Comparison, compare_equilibria
 from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
-from mdstopo.finalize.rest import Rest, compare_rest
 from mdstopo.finalize.text import text_of
 from mdstopo.finalize.values import Parameter, told_apart
 from mdstopo.scene.refusals import refusals
@@ -57,8 +57,8 @@ class Finalized:
     columns: full design, kept, re-optimised, verified, the last two those of the final case where there are such
     parameters and it says all. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words.
     text: the final case, empty where there is none; told: what it cannot say. difference: largest relative one between
-    its objectives and those of the re-optimised design, None where it has none. rest: where the final design settles,
-    beside the full one; there is no text where it has fallen.
+    its objectives and those of the re-optimised design, None where it has none. equilibria: where the final design
+    settles, beside the full one; there is no text where that is lost.
     """
 
     case: Case
@@ -74,7 +74,7 @@ class Finalized:
     told: list[str]
     difference: float | None
     values: list[Parameter]
-    rest: Rest = field(default_factory=Rest)
+    equilibria: Comparison = field(default_factory=Comparison)
 
 
 def opened(
@@ -168,12 +168,12 @@ def finalize(
     now = reduced.space.expand(first_design(reduced, problem_of(engine, even(reduced)), reached)[1])
     own = places(case, kept)
     values = told_apart(case, held, before[count:], now[count:])
-    rest = Rest()
+    equilibria = Comparison()
 
     def made(columns: tuple[Column, ...], words: str, text: str, told: list[str], gap: float | None) -> Finalized:
         sizes, stated = now[:count], before[:count]
         return Finalized(
-            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, rest
+            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, equilibria
         )
 
     if outcome.status is RunStatus.INTERRUPTED:
@@ -201,8 +201,8 @@ def finalize(
     end = design.copy()  # the final design as one of the full case: members left out have no size
     end[: case.n_design] = 0.0
     end[kept], end[case.n_design + held] = now[:count], now[count:]
-    rest = compare_rest(joined, design, end, reduced, now)
-    if rest.fallen:
+    equilibria = compare_equilibria(joined, design, end, reduced, now)
+    if equilibria.lost:
         return made(columns, words, "", [], None)
     return made(columns, words, text, told, difference)
 

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from mdstopo.general.members import rate_of_row
 from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import (
     CLOSED,
@@ -62,15 +63,6 @@ def contact_rows(model, j, q, v, rows, rates):  # type: ignore[no-untyped-def]
     along = rows[0, 3] * zx + rows[0, 4] * zy - (c[8] * c[6] + c[9] * c[7])
     height = rows[1, 3] * zx + rows[1, 4] * zy - (c[8] * c[7] - c[9] * c[6])
     return along, height
-
-
-@kernel
-def rate_of_row(model, p, row, v):  # type: ignore[no-untyped-def]
-    """row (6,) of pair p times v (n,)."""
-    total = 0.0
-    for r in range(6):
-        total += row[r] * v[3 * model.pair[p, r // 3] + r % 3]
-    return total
 
 
 @kernel

@@ -12,6 +12,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.evaluation import USUAL, Rows, Shape
+from mdstopo.general.competing_members import compete, members_peaks
 from mdstopo.general.compile import GeneralScene
 from mdstopo.general.extremes import (
     COLUMNS,
@@ -29,8 +30,7 @@ from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
 from mdstopo.general.minima import minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.ready import Ready
-from mdstopo.general.rivals import compete, members_peaks
-from mdstopo.general.rows_back import RowsBack
+from mdstopo.general.row_gradients import RowGradients
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.track import GRAZES, track_room
@@ -83,7 +83,7 @@ class GeneralDriver:
         #: what `visit` is given for one place, and `pull`
         self._one = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
         self._pulled = np.zeros(n_design + varied)
-        self._rows_back = RowsBack(self)
+        self._row_gradients = RowGradients(self)
         self._make_rows(ROWS)
         self.pulled_start = np.zeros(n if case.solver.settle else 0)
         self.events = 0
@@ -183,7 +183,7 @@ class GeneralDriver:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient, window)
             if gradient:
-                self._rows_back(count, across)
+                self._row_gradients(count, across)
         grazing, meeting = self._grazing(), int(self.where[1])
         return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import block_design
+from mdstopo.general.members import block_design, rate_of_row
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
@@ -83,10 +83,7 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type
                 continue
             for i in range(lo, lo + model.block[k, 5]):
                 f = inerter_force(model, k, i, stage[j, 0], stage[j, 1], stage[j, 2], row)
-                value = 0.0
-                for r in range(6):
-                    value += row[r] * z[j, 3 * model.pair[p, r // 3] + r % 3]
-                out[i] -= f * value
+                out[i] -= f * rate_of_row(model, p, row, z[j])
     if model.varied.shape[0] > 0:
         for j in range(count):
             add_parameters(model, segment, when[j], strength, stage[j, 0], stage[j, 1], stage[j, 2], z[j], weight, out)

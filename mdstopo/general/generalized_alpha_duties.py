@@ -11,7 +11,7 @@ from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
 from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
-from mdstopo.integrators.generalized_alpha_linear import hermite
+from mdstopo.integrators.generalized_alpha_linear import cubic, hermite
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.jit import kernel, part
 
@@ -19,13 +19,7 @@ from mdstopo.jit import kernel, part
 @kernel
 def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
     """The cubic between the ends of step k, and its derivative."""
-    h = track.t[k + 1] - track.t[k]
-    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
-    start = track.state[k]
-    end = track.state[k + 1]
-    for d in range(q.shape[0]):
-        q[d] = q0 * start[0, d] + q1 * end[0, d] + h * (v0 * start[1, d] + v1 * end[1, d])
-        v[d] = (dq0 * start[0, d] + dq1 * end[0, d]) / h + dv0 * start[1, d] + dv1 * end[1, d]
+    cubic(track.state[k], track.state[k + 1], track.t[k + 1] - track.t[k], c, q, v)
     return k
 
 
@@ -33,12 +27,7 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
 def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
     """Further along the cubic."""
     h = track.t[k + 1] - track.t[k]
-    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c + e / h)
-    start = track.state[k]
-    end = track.state[k + 1]
-    for d in range(q.shape[0]):
-        q_out[d] = q0 * start[0, d] + q1 * end[0, d] + h * (v0 * start[1, d] + v1 * end[1, d])
-        v_out[d] = (dq0 * start[0, d] + dq1 * end[0, d]) / h + dv0 * start[1, d] + dv1 * end[1, d]
+    cubic(track.state[k], track.state[k + 1], h, c + e / h, q_out, v_out)
 
 
 @kernel

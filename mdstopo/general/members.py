@@ -59,6 +59,15 @@ def stretch_of(member, i, r):  # type: ignore[no-untyped-def]
     return length - member[4, i], bx * r[4] + by * r[5] + bt * r[6]
 
 
+@part
+def rate_of_row(model, p, row, v):  # type: ignore[no-untyped-def]
+    """row (6,) of pair p times v (n,), velocities or virtual displacements."""
+    total = 0.0
+    for r in range(6):
+        total += row[r] * v[3 * model.pair[p, r // 3] + r % 3]
+    return total
+
+
 @kernel
 def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no-untyped-def]
     """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C.

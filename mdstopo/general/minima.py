@@ -28,7 +28,7 @@ from mdstopo.general.extremes import (
     peaks,
     sample,
 )
-from mdstopo.general.hands import Lead, changes, is_led, leads
+from mdstopo.general.leading_members import Lead, changes, is_led, leads
 from mdstopo.general.responses import kinked
 from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.model import FloatArray, IndexArray

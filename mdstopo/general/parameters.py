@@ -25,6 +25,7 @@ import numpy as np
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import block_of, member_rows
 from mdstopo.general.forces import inerter_row
+from mdstopo.general.members import rate_of_row
 from mdstopo.general.model import INERTER
 from mdstopo.general.responses import value_at
 from mdstopo.general.track import restore_modes
@@ -72,9 +73,7 @@ def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):  # typ
         total = 0.0
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
             by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate)
-            pulled = 0.0
-            for r in range(6):
-                pulled += row[r] * z[3 * model.pair[model.block[k, 0], r // 3] + r % 3]
+            pulled = rate_of_row(model, model.block[k, 0], row, z)
             total += strength[0, i] * (own * by_energy - by_force * pulled)
         out[members + model.varied[e, 2]] += total
 

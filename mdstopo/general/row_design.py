@@ -7,7 +7,7 @@ row multiplies them with its own.
 import numpy as np
 
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import direction
+from mdstopo.general.members import direction, rate_of_row
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.switches import carriers
@@ -109,10 +109,7 @@ def _add_inerters(model, k, stage, z, j, out):  # type: ignore[no-untyped-def]
     for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
         f = inerter_force(model, k, i, stage[0], stage[1], stage[2], row)
         for m in range(out.shape[0]):
-            value = 0.0
-            for r in range(6):
-                value += row[r] * z[m, j, 3 * model.pair[model.block[k, 0], r // 3] + r % 3]
-            out[m, i] -= f * value
+            out[m, i] -= f * rate_of_row(model, model.block[k, 0], row, z[m, j])
 
 
 @kernel
@@ -133,9 +130,6 @@ def _add_parameters(model, segment, t, strength, stage, z, j, out):  # type: ign
                 model, k, i, place, segment, t, strength, stage[0], stage[1], stage[2], row, row_rate
             )
             for m in range(out.shape[0]):
-                pulled = 0.0
-                for r in range(6):
-                    pulled += row[r] * z[m, j, 3 * model.pair[model.block[k, 0], r // 3] + r % 3]
-                total[m] -= strength[0, i] * (slope * pulled)
+                total[m] -= strength[0, i] * (slope * rate_of_row(model, model.block[k, 0], row, z[m, j]))
         for m in range(out.shape[0]):
             out[m, members + model.varied[e, 2]] += total[m]

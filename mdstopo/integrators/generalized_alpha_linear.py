@@ -37,16 +37,19 @@ def hermite(c):  # type: ignore[no-untyped-def]
     )
 
 
-@kernel
-def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
-    """The cubic between the ends of step k, and its derivative."""
-    h = steps.t[k + 1] - steps.t[k]
+@part
+def cubic(start, end, h, c, q, v):  # type: ignore[no-untyped-def]
+    """The cubic between the ends of a step h, whose states (2 or more, n) are q and q'; and its derivative."""
     q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
-    start = steps.state[k]
-    end = steps.state[k + 1]
     for d in range(q.shape[0]):
         q[d] = q0 * start[0, d] + q1 * end[0, d] + h * (v0 * start[1, d] + v1 * end[1, d])
         v[d] = (dq0 * start[0, d] + dq1 * end[0, d]) / h + dv0 * start[1, d] + dv1 * end[1, d]
+
+
+@kernel
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+    """The cubic between the ends of step k, and its derivative."""
+    cubic(steps.state[k], steps.state[k + 1], steps.t[k + 1] - steps.t[k], c, q, v)
     return k, c
 
 

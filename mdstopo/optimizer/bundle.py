@@ -2,7 +2,7 @@
 iterate.
 
 A row belongs to the objective (group 0) or to a constraint (1, 2, ...) and is a line, or the norm of a two-vector less
-an excess (`conic`). No row may say more of the iterate than the largest of its group there: of a function that is not
+an offset (`conic`). No row may say more of the iterate than the largest of its group there: of a function that is not
 convex a row from elsewhere would, and is lowered, the more the farther it comes from and the more the function was seen
 to bend downwards (C. Lemarechal, 1975; K. C. Kiwiel, "Methods of descent for nondifferentiable optimization", 1985).
 """
@@ -23,17 +23,17 @@ SAME = 1e-9
 @dataclass(slots=True)
 class Bundle:
     """Rows by columns: vector (K, 2), of a line its value and 0; slope (K, N) of the first and across (K, N) of the
-    second component (no columns where no row is a norm); excess (K,), NaN of a line; group (K,); own (K,): whether it
-    is the iterate's; idle (K,): for how many subproblems it has had no multiplier; far (K,): the way from where it was
-    seen to the iterate, in ranges."""
+    second component (no columns where no row is a norm); offset (K,), NaN of a line; group (K,); own (K,): whether it
+    is the iterate's; age (K,): for how many subproblems it has had no multiplier; distance (K,): the way
+    from where it was seen to the iterate, in ranges."""
 
     vector: Floats
     slope: Floats
     across: Floats
-    excess: Floats
+    offset: Floats
     group: Ints
     own: Bools
-    idle: Ints
+    age: Ints
     distance: Floats
 
     @classmethod
@@ -50,20 +50,20 @@ class Bundle:
         value = np.concatenate([sample.rows[rows], sample.constraint_rows])
         slope = np.concatenate([sample.gradients[rows], sample.constraint_gradients.reshape(-1, n)])
         lines = np.full(len(sample.rows), np.nan), np.full(many, np.nan)
-        excess = np.concatenate(
-            [(sample.excess if len(sample.excess) else lines[0])[rows],
-             sample.constraint_excess if len(sample.constraint_excess) else lines[1]]
+        offset = np.concatenate(
+            [(sample.offset if len(sample.offset) else lines[0])[rows],
+             sample.constraint_offset if len(sample.constraint_offset) else lines[1]]
         )  # fmt: skip
-        norm = ~np.isnan(excess)
+        norm = ~np.isnan(offset)
         across = np.zeros((len(value), n if norm.any() else 0))
         if across.size:
             across[: len(rows)] = sample.across[rows] if sample.across.size else 0.0
             if many and sample.constraint_across.size:
                 across[len(rows) :] = sample.constraint_across
-        vector = np.stack([np.where(norm, value + excess, value), np.zeros(len(value))], axis=1)
+        vector = np.stack([np.where(norm, value + offset, value), np.zeros(len(value))], axis=1)
         group = np.concatenate([np.zeros(len(rows), dtype=np.int64), 1 + sample.groups])
         own = np.ones(len(value), dtype=np.bool_)
-        return cls(vector, slope, across, excess, group, own, np.zeros(len(value), dtype=np.int64),
+        return cls(vector, slope, across, offset, group, own, np.zeros(len(value), dtype=np.int64),
                    np.zeros(len(value)))  # fmt: skip
 
     def __len__(self) -> int:
@@ -72,7 +72,7 @@ class Bundle:
     @property
     def norm(self) -> Bools:
         """Which rows are norms, (K,)."""
-        return ~np.isnan(self.excess)
+        return ~np.isnan(self.offset)
 
     def vectors_at(self, d: Floats) -> Floats:
         """The vectors (K, 2) after a step d (N,)."""
@@ -84,11 +84,11 @@ class Bundle:
 
     def values_at(self, d: Floats) -> Floats:
         """The rows' values (K,) after a step d (N,)."""
-        return _values(self.vectors_at(d), self.excess)
+        return _values(self.vectors_at(d), self.offset)
 
     def values(self) -> Floats:
         """The rows' values (K,) at the iterate."""
-        return _values(self.vector, self.excess)
+        return _values(self.vector, self.offset)
 
     def slopes_at(self, d: Floats) -> Floats:
         """The rows' gradients (K, N) after a step d (N,)."""
@@ -111,12 +111,12 @@ class Bundle:
         )
 
     def lowered(self, levels: Floats, concavity: Floats) -> "Bundle":
-        """No row above the levels (groups,), rows from elsewhere below them by bend (groups,) times the way squared."""
+        """No row above levels (groups,), those from elsewhere below them by concavity (groups,) x distance squared."""
         caps = levels[self.group] - np.where(self.own, 0.0, concavity[self.group] * self.distance**2)
         beyond = np.maximum(self.values() - caps, 0.0)
         vector = self.vector.copy()
         vector[:, 0] -= np.where(self.norm, 0.0, beyond)
-        return self._with(vector=vector, excess=self.excess + beyond)
+        return self._with(vector=vector, offset=self.offset + beyond)
 
     def subset(self, places: Ints | Bools) -> "Bundle":
         """Some of the rows."""
@@ -128,8 +128,8 @@ class Bundle:
         wide = [np.zeros((len(b), width)) if b.across.shape[1] < width else b.across for b in (self, other)]
         columns = [np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(Bundle)
                    if f.name != "across"]  # fmt: skip
-        vector, slope, excess, group, own, idle, far = columns
-        return Bundle(vector, slope, np.concatenate(wide), excess, group, own, idle, far)
+        vector, slope, offset, group, own, age, distance = columns
+        return Bundle(vector, slope, np.concatenate(wide), offset, group, own, age, distance)
 
     def without_repeats(self) -> "Bundle":
         """The last one of rows that are the same within SAME."""
@@ -158,12 +158,12 @@ class Bundle:
         most = int(min(max(ROOM / n, LEAST), MOST))
         if len(self) <= most:
             return self
-        order = np.lexsort((-np.arange(len(self)), self.idle, ~self.own))
+        order = np.lexsort((-np.arange(len(self)), self.age, ~self.own))
         return self.subset(np.sort(order[: max(most, int(self.own.sum()))]))
 
-    def used(self, multipliers: Floats, enough: Floats) -> "Bundle":
+    def aged(self, multipliers: Floats, enough: Floats) -> "Bundle":
         """The same after a subproblem with multipliers (K,); enough (groups,): the least that counts."""
-        return self._with(idle=np.where(multipliers > enough[self.group], 0, self.idle + 1))
+        return self._with(age=np.where(multipliers > enough[self.group], 0, self.age + 1))
 
     def lines(self) -> tuple[Ints, Lines]:
         """The rows that are lines: their places and themselves."""
@@ -174,13 +174,13 @@ class Bundle:
         """The rows that are norms: their places and themselves."""
         at = np.flatnonzero(self.norm)
         across = self.across[at] if self.across.shape[1] else np.zeros((len(at), self.slope.shape[1]))
-        return at, Norms(self.vector[at], self.slope[at], across, self.excess[at], self.group[at])
+        return at, Norms(self.vector[at], self.slope[at], across, self.offset[at], self.group[at])
 
     def _with(self, **columns: Floats | Ints | Bools) -> "Bundle":
         return Bundle(*(columns.get(f.name, getattr(self, f.name)) for f in fields(Bundle)))
 
 
-def _values(vector: Floats, excess: Floats) -> Floats:
-    """The values (K,) of lines (excess NaN) and norms with vectors (K, 2)."""
+def _values(vector: Floats, offset: Floats) -> Floats:
+    """The values (K,) of lines (offset NaN) and norms with vectors (K, 2)."""
     size = np.sqrt(vector[:, 0] ** 2 + vector[:, 1] ** 2)
-    return np.where(np.isnan(excess), vector[:, 0], size - excess)
+    return np.where(np.isnan(offset), vector[:, 0], size - offset)

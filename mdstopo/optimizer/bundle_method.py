@@ -29,7 +29,7 @@ from mdstopo.optimizer.rows import (
     residual,
     subproblem,
 )
-from mdstopo.optimizer.safeguards import merit, residual_unit
+from mdstopo.optimizer.safeguards import is_least, merit, plain_violation, residual_unit, scaled_violation
 from mdstopo.optimizer.state import State
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
@@ -38,50 +38,110 @@ RESET_TRUST = 0.05
 PATIENCE = 8
 #: how often in a row rows from elsewhere are forgotten, each time with a box so much smaller
 RESETS, RESET_SHRINK = 3, 0.2
-#: share of the row's reach in the box that is rounding of the subproblem; the least price, of the first
-ROUNDING, CHEAPEST = 1e-8, 1e-2
-#: what is left of the bend from trial to trial
+#: share of the row's reach in the box that is rounding of the subproblem
+ROUNDING = 1e-8
+#: the least penalty, in the first one, and what is left of one at least from step to step
+LEAST_PENALTY, PENALTY_FALL = 1e-2, 0.5
+#: what is left of the concavity from trial to trial
 CONCAVITY_FALL = 0.9
 #: iterates whose violation has not fallen to this share of what it was, after which limits are restored first; and the
-#: factor on prices when that is done
-STAGNANT, VIOLATION_FALL, RESTORED_PRICE = 6, 0.8, 10.0
-#: share of the box below which a step leaves it too wide
-NARROW = 0.1
+#: factor on penalties when that is done
+STAGNANT, VIOLATION_FALL, RESTORED_PENALTY = 6, 0.8, 10.0
+#: the least box, in ranges, in which the objective is returned to once limits are restored; and the least one in which
+#: rows are dropped, in shares of the widest
+RETURN_TRUST, LEAST_RESET_TRUST = 1e-3, 1e-2
+#: factor on the box, or on a step that was shorter, where the model proves poor; and the least box, in ranges, after it
+SHRINK, LEAST_TRUST = 0.5, 1e-12
+#: shares of the box above which a step is held back by it, and below which a step leaves it too wide
+LONG, NARROW = 0.5, 0.1
+#: share of the objective below which a promised decrease is none
+NO_DECREASE = 1e-13
+#: how near to the highest of its group at the trial a row is decisive, and how far it may lie above the iterate's level
+#: for a null step, both in shares of those levels
+DECISIVE, NOT_ABOVE = 1e-12, 1e-9
+#: multipliers of constraints that the residual may have at most, in penalties; share of the largest multiplier that its
+#: group can have above which a row has carried one
+BOUND, CARRIED = 1e3, 1e-6
 
 
 class BundleMethod:
     """Begin, judge and propose for one problem.
 
     space: bounds, linear rows and ranges; settings: from `presets.settings`. Each method changes the state that it is
-    given; the driver copies it first, and takes an accepted trial as the iterate.
+    given; the driver copies it first.
     """
 
     def __init__(self, space: FeasibleSet, settings: Settings) -> None:
         self.space = space
         self.settings = settings
 
-    def begin(self, state: State, price: Floats | None = None) -> None:
-        """Start again at the iterate, with its rows alone and without curvature.
+    def begin(self, state: State) -> None:
+        """Go on from the iterate, with its rows alone and without curvature."""
+        self._begin(state)
 
-        price (J,): what violations cost from here on; None: as `first_price` says, and nothing while restoring.
+    def begin_anew(self, state: State, stuck: bool) -> bool:
+        """Where no further step is found: restore the limits, return to the objective, or drop rows from elsewhere.
+
+        stuck: whether the last steps or the next one change next to nothing. Whether a new step is to be proposed.
         """
+        tolerance = self.settings.tolerance
+        done = state.kkt <= tolerance
+        if state.restoring:
+            kept = plain_violation(state.sample) <= NOTHING * tolerance
+            # what is left may be rounding of a steep limit: within the tolerance it is kept
+            if kept or ((stuck or done) and state.violation <= tolerance):
+                self._return_to_objective(state)
+                return True
+            return stuck and not is_least(state, tolerance) and self._reset(state)
+        resists = len(state.penalty) > 0 and state.violation > tolerance
+        if resists and (stuck or done or state.stagnation >= STAGNANT):
+            self._restore(state)
+            return True
+        return stuck and not done and self._reset(state)
+
+    def _begin(self, state: State, penalty: Floats | None = None) -> None:
+        """Begin. penalty (J,): on violations from here on; None: that of `first_penalty`, and none while restoring."""
         sample = state.sample
+        state.uses_bundle, state.small = True, 0
         rows = self._bundle(sample, state.restoring)
         state.bundle, state.multipliers = rows, np.zeros(len(rows))
         n = len(state.alpha)
         state.steps, state.changes = np.zeros((0, n)), np.zeros((0, n))
-        if price is not None:
-            state.price = price
+        if penalty is not None:
+            state.penalty = penalty
         elif state.restoring:
-            state.price = np.zeros(0)
+            state.penalty = np.zeros(0)
         else:
-            state.price = self.first_price(rows)
-        state.concavity = np.zeros(len(state.price) + 1)
+            state.penalty = self.first_penalty(rows)
+        state.concavity = np.zeros(len(state.penalty) + 1)
         state.stagnation, state.violation_mark = 0, float("inf")
         state.kkt = float("nan")
 
-    def first_price(self, rows: Bundle) -> Floats:
-        """The price of each constraint (J,): its gradient then weighs as much as the objective's."""
+    def _restore(self, state: State) -> None:
+        """Make the largest violation the objective."""
+        state.restoring, state.resets = True, 0
+        state.trust = max(state.trust, RESET_TRUST)
+        self._begin(state)
+
+    def _return_to_objective(self, state: State) -> None:
+        """Go on with the objective, now that limits hold."""
+        state.restoring = False
+        state.trust = max(state.trust, RETURN_TRUST)
+        self._begin(state)
+        state.penalty = RESTORED_PENALTY * state.penalty
+
+    def _reset(self, state: State) -> bool:
+        """Drop rows from elsewhere, which may forbid what is possible; whether that was not too often at one place."""
+        if state.resets >= RESETS:
+            return False
+        trust = RESET_TRUST * RESET_SHRINK**state.resets
+        state.trust = min(trust, max(state.trust, LEAST_RESET_TRUST * trust))
+        self._begin(state, state.penalty)
+        state.resets += 1
+        return True
+
+    def first_penalty(self, rows: Bundle) -> Floats:
+        """The penalty of each constraint (J,): its gradient then weighs as much as the objective's."""
         groups = int(rows.group.max(initial=0)) + 1
         steepest = largest_of_groups(np.abs(rows.slope).max(axis=1, initial=0.0), rows.group, groups)
         steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
@@ -90,45 +150,40 @@ class BundleMethod:
     # -- the steps
 
     def judge(self, state: State, sample: Sample) -> bool:
-        """Whether the evaluated trial is accepted; its rows join the bundle in any case, seen from the next iterate.
+        """Whether the evaluated trial is accepted, and then the iterate; its rows join the bundle in any case.
 
         Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
         """
         settings, space = self.settings, self.space
         new = self._bundle(sample, state.restoring)
-        groups = len(state.price) + 1
+        groups = len(state.penalty) + 1
         here, there = state.bundle.subset(state.bundle.own).levels(groups), new.levels(groups)
-        actual = merit(here[0], here[1:], state.price) - merit(there[0], there[1:], state.price)
+        actual = merit(here[0], here[1:], state.penalty) - merit(there[0], there[1:], state.penalty)
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         d = state.trial - state.alpha
-        self._learn(state, new, d)
+        self._learn_curvature(state, new, d)
         scaled = d / space.range
         size, length = float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
         seen, moved = new.moved(-d, length), state.bundle.moved(d, length)
-        self._bend(state, seen, here, moved, there)
+        self._learn_concavity(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])
         small = abs(actual) <= negligible and abs(state.predicted) <= negligible
         state.small = state.small + 1 if small else 0
         accepted = ratio >= settings.number("accept_ratio")
         if accepted:
-            self._mark(state, there)
+            self._count_stagnation(state, there)
             state.bundle = moved.joined(new)
             state.kkt = float("nan")
-            if ratio > settings.number("good_ratio") and size > 0.5 * state.trust:
-                state.trust = min(1.0, settings.number("trust_grow") * state.trust)
-            elif ratio < settings.number("poor_ratio"):
-                state.trust = max(0.5 * min(state.trust, size), 1e-12)
-            elif size < NARROW * state.trust:  # a box of the size of the steps is solved to more digits
-                state.trust = max(0.5 * state.trust, size / NARROW)
+            state.trust = self._trust_after_step(state.trust, size, ratio)
             if not small:
                 state.resets = 0
         else:
-            above = seen.values() - here[seen.group]
-            decisive = new.values() >= there[new.group] - 1e-12 * np.abs(there[new.group])
-            null_step = bool((above[decisive] <= 1e-9 * np.abs(here[seen.group][decisive])).all())
+            null_step = _is_null_step(seen, here, new.values(), there)
             state.bundle = seen.joined(state.bundle)
-            state.trust = NULL_STEP_SHRINK * state.trust if null_step else 0.5 * min(state.trust, size)
+            state.trust = NULL_STEP_SHRINK * state.trust if null_step else SHRINK * min(state.trust, size)
         state.bundle = state.bundle.without_repeats().thinned()
+        if accepted:
+            state.take(sample, scaled_violation(sample))
         return accepted
 
     def propose(self, state: State) -> None:
@@ -137,31 +192,46 @@ class BundleMethod:
         own = state.bundle.subset(state.bundle.own)
         steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
         if np.isnan(state.kkt):
-            price = np.maximum(state.price, self.first_price(own) if len(state.price) else 0.0) * 1e3
+            penalty = np.maximum(state.penalty, self.first_penalty(own) if len(state.penalty) else 0.0) * BOUND
             unit = steepest if state.restoring else residual_unit(state, steepest)
-            state.kkt = residual(own, state.alpha, space, price, unit)
+            state.kkt = residual(own, state.alpha, space, penalty, unit)
         B = curvature_of(state.steps, state.changes, max(steepest, 1e-300), space.range)
         box = self._box(state)
 
-        here = own.levels(len(state.price) + 1)
+        here = own.levels(len(state.penalty) + 1)
         rows = state.bundle.lowered(here, state.concavity)
 
-        def solved(price: Floats) -> Trial:
-            return subproblem(rows, state.alpha, space, box, price, B)
+        def solved(penalty: Floats) -> Trial:
+            return subproblem(rows, state.alpha, space, box, penalty, B)
 
-        trial = self._steer(state, rows, solved(state.price), here, box, solved)
+        trial = self._steer(state, rows, solved(state.penalty), here, box, solved)
         if not trial.solved:
             state.bundle = rows = own
             B = Curvature.diagonal_of(np.full(len(state.alpha), FLOOR * steepest) / space.range**2)
-            trial = self._steer(state, rows, solved(state.price), here, box, solved)
-        promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.price)
-        state.predicted = merit(here[0], here[1:], state.price) - promised
+            trial = self._steer(state, rows, solved(state.penalty), here, box, solved)
+        promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
+        state.predicted = merit(here[0], here[1:], state.penalty) - promised
         state.trial = trial.x
         state.multipliers = trial.multipliers
-        enough = 1e-6 * np.concatenate([[1.0], state.price])
-        state.bundle = state.bundle.used(trial.multipliers, enough)
+        enough = CARRIED * np.concatenate([[1.0], state.penalty])
+        state.bundle = state.bundle.aged(trial.multipliers, enough)
+
+    def is_exhausted(self, state: State) -> bool:
+        """Whether the last steps have changed next to nothing, or the model promises no decrease."""
+        return state.small >= PATIENCE or not state.predicted > NO_DECREASE * abs(state.objective)
 
     # -- how
+
+    def _trust_after_step(self, trust: float, size: float, ratio: float) -> float:
+        """The box after an accepted step of this size, both in ranges; ratio: of actual to predicted decrease."""
+        settings = self.settings
+        if ratio > settings.number("good_ratio") and size > LONG * trust:
+            return min(1.0, settings.number("trust_grow") * trust)
+        if ratio < settings.number("poor_ratio"):
+            return max(SHRINK * min(trust, size), LEAST_TRUST)
+        if size < NARROW * trust:  # a box of the size of the steps is solved to more digits
+            return max(SHRINK * trust, size / NARROW)
+        return trust
 
     def _bundle(self, sample: Sample, restoring: bool) -> Bundle:
         """The sample's rows; while limits are restored, those of all constraints as the objective's."""
@@ -171,7 +241,7 @@ class BundleMethod:
         rows.group[:] = 0
         return rows
 
-    def _learn(self, state: State, new: Bundle, d: Floats) -> None:
+    def _learn_curvature(self, state: State, new: Bundle, d: Floats) -> None:
         """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
         change = gradient_change(state.bundle, new, d, state.multipliers)
         if change is None or not float(np.abs(d).max(initial=0.0)) > 0.0:
@@ -190,12 +260,12 @@ class BundleMethod:
         self, state: State, rows: Bundle, trial: Trial, here: Floats, box: tuple[Floats, Floats],
         solved: Callable[[Floats], Trial],
     ) -> Trial:  # fmt: skip
-        """The trial, at prices that make it take away enough of the violation that can go in the box.
+        """The trial, at penalties that make it take away enough of the violation that can go in the box.
 
-        Raises `state.price` until it does, and else lets it follow the multipliers. here (J + 1,): the groups' levels
-        at the iterate; solved: the trial at given prices.
+        Raises `state.penalty` until it does, and else lets it follow the multipliers. here (J + 1,): the groups' levels
+        at the iterate; solved: the trial at given penalties.
         """
-        if not len(state.price):
+        if not len(state.penalty):
             return trial
         limits = rows.group > 0
         reach = np.abs(rows.slope[limits]) @ (box[1] - box[0])
@@ -205,37 +275,50 @@ class BundleMethod:
             return float(np.maximum(levels[1:], 0.0).sum())
 
         if violation(trial.levels) > tiny:
-            least = least_violation(rows, state.alpha, self.space, box, np.ones(len(state.price)))
+            least = least_violation(rows, state.alpha, self.space, box, np.ones(len(state.penalty)))
             low = violation(least.levels)
             enough = low + (1.0 - STEER) * max(violation(here) - low, 0.0) + tiny
             for _ in range(RAISES):
                 if violation(trial.levels) <= enough:
                     break
-                state.price = np.where(trial.levels[1:] > tiny / len(state.price), RAISE * state.price, state.price)
-                trial = solved(state.price)
+                violated = trial.levels[1:] > tiny / len(state.penalty)
+                state.penalty = np.where(violated, RAISE * state.penalty, state.penalty)
+                trial = solved(state.penalty)
         carried = np.bincount(rows.group, weights=trial.multipliers, minlength=len(here))[1:]
-        state.price = np.where(
+        state.penalty = np.where(
             trial.levels[1:] > tiny,
-            state.price,
-            np.maximum(np.maximum(MARGIN * carried, 0.5 * state.price), CHEAPEST * self.first_price(rows)),
+            state.penalty,
+            np.maximum(
+                np.maximum(MARGIN * carried, PENALTY_FALL * state.penalty), LEAST_PENALTY * self.first_penalty(rows)
+            ),
         )
         return trial
 
-    def _mark(self, state: State, there: Floats) -> None:
+    def _count_stagnation(self, state: State, there: Floats) -> None:
         """Count iterates whose largest violation is not much below that of the one that the count began with."""
         violation = float(there[1:].max(initial=0.0))
-        if violation <= self.settings.tolerance or violation < VIOLATION_FALL * state.violation_mark:
-            state.stagnation, state.violation_mark = (
-                0,
-                violation if violation > self.settings.tolerance else float("inf"),
-            )
+        if violation <= self.settings.tolerance:
+            state.stagnation, state.violation_mark = 0, float("inf")
+        elif violation < VIOLATION_FALL * state.violation_mark:
+            state.stagnation, state.violation_mark = 0, violation
         else:
             state.stagnation += 1
 
-    def _bend(self, state: State, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
+    def _learn_concavity(self, state: State, seen: Bundle, here: Floats, moved: Bundle, there: Floats) -> None:
         """How much each group was seen to bend downwards: a row from one end of a step above the value at the other."""
         state.concavity = CONCAVITY_FALL * state.concavity
         for rows, levels in ((seen, here), (moved, there)):
             some = rows.distance > 0.0
             over = (rows.values() - levels[rows.group])[some] / rows.distance[some] ** 2
             np.maximum.at(state.concavity, rows.group[some], over)
+
+
+def _is_null_step(seen: Bundle, here: Floats, values: Floats, there: Floats) -> bool:
+    """Whether the rows that made a trial fail tell what stood in the way: none claims more of the iterate than is true.
+
+    seen: the trial's rows from the iterate; values (K,): theirs at the trial; here, there (groups,): the levels at
+    both.
+    """
+    above = seen.values() - here[seen.group]
+    decisive = values >= there[seen.group] - DECISIVE * np.abs(there[seen.group])
+    return bool((above[decisive] <= NOT_ABOVE * np.abs(here[seen.group][decisive])).all())

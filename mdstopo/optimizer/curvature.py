@@ -13,7 +13,7 @@ from mdstopo.optimizer.problem import Bools, Floats
 
 #: variables up to which B is a matrix, and the last steps that it is learnt from where it is none
 FEW, PAIRS = 250, 12
-#: the least y's over s'B s, before y is bent towards B s
+#: the least y's over s'B s, before y is damped
 DAMPING = 0.2
 
 
@@ -74,8 +74,8 @@ def learnt(steps: Floats, changes: Floats, floor: float) -> Curvature:
         sBs = float(s @ Bs)
         if not sBs > 0.0:
             continue
-        bent = _bent(s, y, Bs, sBs)
-        B = B - np.outer(Bs, Bs) / sBs + np.outer(bent, bent) / float(s @ bent)
+        damped = _damped(s, y, Bs, sBs)
+        B = B - np.outer(Bs, Bs) / sBs + np.outer(damped, damped) / float(s @ damped)
     return Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), 0.5 * (B + B.T))
 
 
@@ -88,8 +88,8 @@ def _first(steps: Floats, changes: Floats, floor: float) -> float:
     return floor
 
 
-def _bent(s: Floats, y: Floats, Bs: Floats, sBs: float) -> Floats:
-    """y (N,), bent towards B s where the function bends down along s (Powell's damping), so that B stays positive."""
+def _damped(s: Floats, y: Floats, Bs: Floats, sBs: float) -> Floats:
+    """y (N,), mixed with B s where the function is concave along s (Powell's damping), so that B stays positive."""
     sy = float(s @ y)
     if sy >= DAMPING * sBs:
         return y
@@ -108,7 +108,7 @@ def _compact(steps: Floats, changes: Floats, sigma: float) -> Curvature:
         sBs = float(s @ Bs)
         if not sBs > 0.0:
             continue
-        more_S, more_Y = np.column_stack([S, s]), np.column_stack([Y, _bent(s, y, Bs, sBs)])
+        more_S, more_Y = np.column_stack([S, s]), np.column_stack([Y, _damped(s, y, Bs, sBs)])
         found = _inner(more_S, more_Y, sigma)
         if found is not None:
             S, Y, inner = more_S, more_Y, found

@@ -82,7 +82,7 @@ OPTIONS: dict[str, Option] = {
         1.0,
         1e9,
         100.0,
-        "price of violating a nonlinear constraint, relative to the objective's gradient",
+        "penalty on violating a nonlinear constraint, relative to the objective's gradient",
     ),
     # The safeguards.
     "move_limit": Option(float, 1e-6, 1.0, 1.0, "largest change of a variable in one iteration, absolute"),

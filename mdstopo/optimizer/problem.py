@@ -72,8 +72,8 @@ class Sample:
     rows (R,), gradients (R, N): the competing pieces of U, highest first.
     constraint_rows (C,), constraint_gradients (C, N): nonlinear constraints, feasible where <= 0.
     constraint_groups (C,): which constraint each is a piece of, 0 ... J - 1 in order; none: each is one of its own.
-    excess (R,), across (R, N), constraint_excess, constraint_across: where a row is the norm of a two-vector less an
-        excess, that (NaN where it is not), and the gradient of the vector's component across its direction; the row's
+    offset (R,), across (R, N), constraint_offset, constraint_across: where a row is the norm of a two-vector less an
+        offset, that (NaN where it is not), and the gradient of the vector's component across its direction; the row's
         own gradient is that of the component along it. Nothing where no row is a norm. An absolute value is a norm
         whose `across` is zero.
     status: anything but `Status.OK` means the evaluation failed; values may then be missing.
@@ -88,9 +88,9 @@ class Sample:
     constraint_rows: Floats = field(default_factory=_no_rows)
     constraint_gradients: Floats = field(default_factory=_no_gradients)
     constraint_groups: Ints = field(default_factory=_no_groups)
-    excess: Floats = field(default_factory=_no_rows)
+    offset: Floats = field(default_factory=_no_rows)
     across: Floats = field(default_factory=_no_gradients)
-    constraint_excess: Floats = field(default_factory=_no_rows)
+    constraint_offset: Floats = field(default_factory=_no_rows)
     constraint_across: Floats = field(default_factory=_no_gradients)
     status: Status = Status.OK
     message: str = ""

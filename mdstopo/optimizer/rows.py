@@ -6,7 +6,7 @@ A sequential quadratic program with a bundle. At the iterate x the subproblem is
     subject to m_r(d) <= z,  m_r(d) <= s_j    for every row of the objective, and of constraint j, that is known
 
 with rows from the iterate and from trials near it, accepted or not, each a line or a norm (`bundle`, `conic`), one
-slack and one price a constraint, and B from the gradients of the Lagrangian (`curvature`). A step has to decrease the
+slack and one penalty a constraint, and B from the gradients of the Lagrangian (`curvature`). A step has to decrease the
 merit U + sum_j nu_j max(0, c_j), which is continuous whatever peaks come and go. Prices follow the multipliers, raised
 where a step leaves a violation that another in the box would not (steering: R. H. Byrd, J. Nocedal, R. A. Waltz, 2008).
 Where violation resists, the largest one becomes the objective itself (restoration) until limits hold, or until its own
@@ -24,7 +24,7 @@ from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
 from mdstopo.optimizer.projection import repair
 
 #: what violations cost, in multipliers; the least share of the violation that could go which has to go; the factor on
-#: prices until it does, and how often
+#: penalties until it does, and how often
 MARGIN, STEER, RAISE, RAISES = 2.0, 0.3, 5.0, 8
 #: steps that curvature is learnt from, where B is a matrix and where it is not
 STEPS, FEW_STEPS = 60, 12
@@ -62,11 +62,11 @@ class FeasibleSet:
 
 
 def subproblem(
-    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], price: Floats, curvature: Curvature
+    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], penalty: Floats, curvature: Curvature
 ) -> Trial:
     """Solve the model in the box (lower, upper) of designs around x (N,).
 
-    price (J,): of the constraints' violations; curvature: B. Fixed variables and linear rows without a free one are
+    penalty (J,): of the constraints' violations; curvature: B. Fixed variables and linear rows without a free one are
     left out; the trial keeps box and linear rows to rounding.
     """
     lower, upper = box[0] - x, box[1] - x
@@ -82,7 +82,7 @@ def subproblem(
             np.minimum(lower[free], 0.0), np.maximum(upper[free], 0.0),
             replace(lines, slope=lines.slope[:, free]),
             replace(norms, slope=norms.slope[:, free], across=norms.across[:, free]),
-            price, left, curvature.restricted(free),
+            penalty, left, curvature.restricted(free),
         )  # fmt: skip
         found: Solution = solve(program)
         solved = found.solved
@@ -91,7 +91,7 @@ def subproblem(
         linear[used] = found.linear
     trial = repair(np.clip(x + d, box[0], box[1]), box[0], box[1], space.linear)
     d = trial - x
-    levels = largest_of_groups(bundle.values_at(d), bundle.group, len(price) + 1)
+    levels = largest_of_groups(bundle.values_at(d), bundle.group, len(penalty) + 1)
     return Trial(trial, multipliers, linear, levels, 0.5 * float(d @ curvature.times(d)), solved)
 
 
@@ -145,10 +145,10 @@ def curvature_of(steps: Floats, changes: Floats, steepest: float, range_: Floats
     return found.scaled(1.0 / range_, 1.0)
 
 
-def residual(own: Bundle, x: Floats, space: FeasibleSet, price: Floats, steepest: float) -> float:
+def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float) -> float:
     """The projected KKT residual at x, relative to the largest gradient entry `steepest`.
 
-    own: the iterate's rows; price (J,): bounds of the constraints' multipliers. The multipliers are those of the
+    own: the iterate's rows; penalty (J,): bounds of the constraints' multipliers. The multipliers are those of the
     proximal step, whose curvature is that entry: they make the residual all but least. It is the largest of: what a
     step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
     the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
@@ -157,10 +157,10 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, price: Floats, steepest
         return 0.0
     lines = Bundle(
         np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
-        np.full(len(own), np.nan), own.group, own.own, own.idle, own.distance,
+        np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,
     )  # fmt: skip
     flat = Curvature.diagonal_of(np.full(len(x), steepest))
-    trial = subproblem(lines, x, space, (space.lower, space.upper), price, flat)
+    trial = subproblem(lines, x, space, (space.lower, space.upper), penalty, flat)
     return residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
 
 

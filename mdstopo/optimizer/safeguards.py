@@ -23,20 +23,20 @@ CONVEX_CEILING = 1e6
 # A minimiser of a linear function plus the convex term is promised half of the linear decrease: a step that gains much
 # more than promised was held back by that term.
 TOO_CONVEX = 1.5
-# Factor on the price of a constraint whose multiplier has come up to it while limits are violated.
-PRICE_GROWTH = 10.0
-# A merit is exact where violations cost more than the multipliers; every bit more only punishes what a step along a
-# curved limit violates in second order, and makes steps short.
-CHARGE = 2.0
-CHARGE_FALL = 0.5
-# Largest price, in first prices.
-PRICE_CEILING = 1e4
+# Factor on the penalty of a constraint whose multiplier has come up to it while limits are violated.
+PENALTY_GROWTH = 10.0
+# The merit's penalty in multipliers, and what is left of it at least from step to step: a merit is exact where
+# violations cost more than the multipliers; every bit more only punishes what a step along a curved limit violates in
+# second order, and makes steps short.
+MERIT_PENALTY, MERIT_PENALTY_FALL = 2.0, 0.5
+# Largest penalty, in first penalties.
+PENALTY_CEILING = 1e4
 # Rows of a rejected trial so near to its highest become cuts where the trust box is at most so wide, in ranges; further
 # off a line says little of a function that is curved. They are kept while they are so near to the highest row of the
 # iterate and the box is at most so wide; so many in all. Where one tells what stood in the way, the box shrinks less.
 CUT_WINDOW, CUT_TRUST, KEPT_WINDOW, KEPT_TRUST, MOST_CUTS, CUT_SHRINK = 0.02, 0.1, 0.15, 0.4, 24, 0.8
 # Iterations of which the last decrease is told.
-LATELY = 10
+RECENT = 10
 # Share of the objective by which it must have fallen since cuts were dropped, before they are dropped again.
 FRESH = 1e-5
 # Share of the largest gradient so far that residuals are relative to at least.
@@ -116,20 +116,20 @@ def outdated(state: State) -> bool:
     return len(state.cuts) > 0 and state.objective < state.forgotten - FRESH * abs(state.objective)
 
 
-def merit(objective: float, levels: Floats, price: Floats) -> float:
-    """What a step must decrease: the objective and the price of the largest violation of each constraint (J,)."""
-    if not len(price):
+def merit(objective: float, levels: Floats, penalty: Floats) -> float:
+    """What a step must decrease: the objective, and penalty (J,) times the largest violation of each constraint."""
+    if not len(penalty):
         return objective
-    return objective + float(np.einsum("i,i->", price, np.maximum(levels, 0.0)))
+    return objective + float(np.einsum("i,i->", penalty, np.maximum(levels, 0.0)))
 
 
-def next_charge(charge: Floats, multipliers: Floats, price: Floats) -> Floats:
-    """What violations cost in the merit, (J,): twice the multipliers, at most the price; it falls gradually."""
-    return np.minimum(np.maximum(CHARGE * multipliers, CHARGE_FALL * charge), price)
+def next_merit_penalty(merit_penalty: Floats, multipliers: Floats, penalty: Floats) -> Floats:
+    """The penalty in the merit, (J,): twice the multipliers, at most that of the subproblem; it falls gradually."""
+    return np.minimum(np.maximum(MERIT_PENALTY * multipliers, MERIT_PENALTY_FALL * merit_penalty), penalty)
 
 
-def first_price(sample: Sample, settings: Settings) -> Floats:
-    """The price of each constraint, (J,): its gradient then weighs `elastic` times as much as the objective's."""
+def first_penalty(sample: Sample, settings: Settings) -> Floats:
+    """The penalty of each constraint, (J,): its gradient then weighs `elastic` times as much as the objective's."""
     if not len(sample.constraint_rows):
         return np.zeros(0)
     steepest = sample.levels_of(np.abs(sample.constraint_gradients).max(axis=1))
@@ -211,14 +211,14 @@ def verdict(state: State, stuck: bool, settings: Settings) -> tuple[RunStatus, s
     if state.iteration >= settings.max_iterations:
         return RunStatus.MAX_ITERATIONS, (
             f"the limit of {settings.max_iterations} iterations was reached "
-            f"at a projected KKT residual of {state.kkt:.2g}{lately(state)}"
+            f"at a projected KKT residual of {state.kkt:.2g}{recent_change(state)}"
         )
     return RunStatus.RUNNING, ""
 
 
-def lately(state: State) -> str:
+def recent_change(state: State) -> str:
     """How much U has changed over the last iterations, as the end of a sentence; nothing where that is not known."""
-    count = min(LATELY, state.iteration)
+    count = min(RECENT, state.iteration)
     taken, objective = state.history.accepted, state.history.objective
     before = next((objective[k] for k in range(len(taken) - 1 - count, -1, -1) if taken[k]), float("nan"))
     if count == 0 or not isfinite(before) or before == 0.0:

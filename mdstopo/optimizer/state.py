@@ -132,9 +132,9 @@ class RowDetails:
     """What a sample says of its rows beside values and gradients; see `problem.Sample`."""
 
     constraint_groups: Ints
-    excess: Floats
+    offset: Floats
     across: Floats
-    constraint_excess: Floats
+    constraint_offset: Floats
     constraint_across: Floats
 
     @classmethod
@@ -160,9 +160,9 @@ class State:
     objective, `resets` how often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups
     (`Bundle.lowered`), `stagnation` how many iterates the largest violation has not fallen well below `violation_mark`,
     `dropped` whether others of several starts go on instead, `largest_gradient` the largest |dU/dalpha| of any iterate;
-    or else `convex` the relative weight of the quadratic term. Of each constraint: `price` (J,) of violations in the
-    subproblem, `charge` (J,) in the separable approximation's merit. Counters: `iteration`, `evaluations`, `small`
-    steps in a row, `failed` evaluations in a row, `seconds`.
+    or else `convex` the relative weight of the quadratic term. Of each constraint: `penalty` (J,) on violations in the
+    subproblem, `merit_penalty` (J,) on them in the separable approximation's merit. Counters: `iteration`,
+    `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
     The best so far: `best_alpha` (N,), `best_objective`, `best_violation`, and `best_plain`, its violation
     relative to the bounds alone. How it stands: `status`, and `reason` for it in words. `history`: a row an evaluation.
     """
@@ -184,8 +184,8 @@ class State:
     step: Step
     trust: float
     convex: float
-    price: Floats
-    charge: Floats
+    penalty: Floats
+    merit_penalty: Floats
     row_details: RowDetails
     bundle: Bundle
     multipliers: Floats
@@ -227,11 +227,19 @@ class State:
             self.constraint_rows,
             self.constraint_gradients,
             self.row_details.constraint_groups,
-            self.row_details.excess,
+            self.row_details.offset,
             self.row_details.across,
-            self.row_details.constraint_excess,
+            self.row_details.constraint_offset,
             self.row_details.constraint_across,
         )
+
+    def take(self, sample: Sample, violation: float) -> None:
+        """The trial, whose sample and violation (`safeguards.scaled_violation`) these are, becomes the iterate."""
+        self.alpha = self.trial
+        self.objective, self.violation = sample.objective, violation
+        self.rows, self.gradients = sample.rows, sample.gradients
+        self.constraint_rows, self.constraint_gradients = sample.constraint_rows, sample.constraint_gradients
+        self.row_details = RowDetails.of(sample)
 
     def copy(self) -> "State":
         """Another state with the same values; `dataclasses.replace` takes several times as long."""

@@ -12,14 +12,14 @@ from benchmarks.optimum.problems import Problem
 from mdstopo import evaluate, simulate
 
 
-def rows(peaks, slopes, x, lower=0.0, upper=1.0, c=(), held=(), A=(), b=(), equal=()):
+def rows(peaks, slopes, x, lower=0.0, upper=1.0, c=(), c_slopes=(), A=(), b=(), equal=()):
     """Rows of one objective at x."""
     x, n = np.asarray(x, dtype=float), len(x)
     peaks = np.asarray(peaks, dtype=float)
     A = np.array(A, dtype=float).reshape(len(b), n)
     return Rows(
         peaks - peaks.max(), np.array(slopes, dtype=float), np.zeros(len(peaks), dtype=int), np.array(c, dtype=float),
-        np.array(held, dtype=float).reshape(len(c), n), A @ x - np.array(b), A, np.array(equal, dtype=bool),
+        np.array(c_slopes, dtype=float).reshape(len(c), n), A @ x - np.array(b), A, np.array(equal, dtype=bool),
         x - lower, upper - x,
     )  # fmt: skip
 
@@ -34,7 +34,7 @@ def test_the_residual_vanishes_where_competing_peaks_balance():
 def test_the_residual_counts_constraints_volume_rows_and_bounds():
     # Least -x - 2 y under x + y = 1, x >= 0.2: at (0.2, 0.8) the multipliers of both rows are 1 and 2.
     at = [0.2, 0.8]
-    found = residual(rows([-1.8], [[-1, -2]], at, c=[0.0], held=[[-1, 0]], A=[[1, 1]], b=[1], equal=[True]))
+    found = residual(rows([-1.8], [[-1, -2]], at, c=[0.0], c_slopes=[[-1, 0]], A=[[1, 1]], b=[1], equal=[True]))
     assert found.scaled < 1e-8
     assert found.constraints == pytest.approx([1.0])
     assert found.linear == pytest.approx([2.0])
@@ -46,7 +46,7 @@ def test_the_residual_is_that_of_a_step_against_the_gradient():
     assert residual(rows([1.0], [[2.0, -0.5]], [0.5, 0.5])).scaled == pytest.approx(0.5, rel=0.1)
     assert residual(rows([1.0], [[2.0, -0.2]], [0.0, 0.5])).scaled == pytest.approx(0.1, rel=0.1)
     # an inactive constraint may not carry a multiplier for nothing
-    slack = residual(rows([1.0], [[1.0, 0.0]], [0.5, 0.5], c=[-0.2], held=[[-1.0, 0.0]]))
+    slack = residual(rows([1.0], [[1.0, 0.0]], [0.5, 0.5], c=[-0.2], c_slopes=[[-1.0, 0.0]]))
     assert 0.1 < slack.scaled < 0.5
 
 
@@ -142,17 +142,17 @@ def test_improvements_are_feasible_and_counted_over_all_starts():
 
 @pytest.mark.parametrize("name", ["belts two stops", "belts product", "machine"])
 def test_what_other_optimisers_get_has_the_gradients_of_its_rows(name):
-    from benchmarks.optimum.rivals import Smooth
+    from benchmarks.optimum.other_solvers import Smooth
 
     problem = next(each for each in problems.dynamic() if each.name == name)
     smooth = Smooth(problem.case(), budget=50)
     x = smooth.space.reduce(smooth.case.start)
     v = smooth.begin(x)
-    rows, slopes = smooth.held(v)
+    rows, slopes = smooth.inequalities(v)
     value, slope = smooth.objective(v)
     along = np.random.default_rng(1).standard_normal(len(v))
     h = 1e-6
-    ahead, behind = smooth.held(v + h * along)[0], smooth.held(v - h * along)[0]
+    ahead, behind = smooth.inequalities(v + h * along)[0], smooth.inequalities(v - h * along)[0]
     assert (ahead - behind) / (2.0 * h) == pytest.approx(slopes @ along, rel=2e-3, abs=2e-3)
     change = smooth.objective(v + h * along)[0] - smooth.objective(v - h * along)[0]
     assert change / (2.0 * h) == pytest.approx(slope @ along, rel=1e-4)
@@ -162,23 +162,23 @@ def test_what_other_optimisers_get_has_the_gradients_of_its_rows(name):
 
 
 def test_what_other_optimisers_visit_is_counted_and_ends_with_the_budget():
-    from benchmarks.optimum.rivals import Smooth, SpentError
+    from benchmarks.optimum.other_solvers import Smooth, SpentError
 
     problem = next(each for each in problems.dynamic() if each.name == "isolator")
     smooth = Smooth(problem.case(), budget=2)
     v = smooth.begin(np.array([0.3, 0.2]))
-    smooth.held(v)
-    smooth.held(v)
-    smooth.held(v + 0.1)
+    smooth.inequalities(v)
+    smooth.inequalities(v)
+    smooth.inequalities(v + 0.1)
     assert [count for count, _, _ in smooth.visited] == [1, 2]
     with pytest.raises(SpentError):
-        smooth.held(v + 0.2)
+        smooth.inequalities(v + 0.2)
 
 
 @pytest.mark.parametrize(("method", "module"), [("SLSQP", "nlopt"), ("IPOPT", "casadi")])
 def test_other_optimisers_find_the_isolator(method, module):
     pytest.importorskip(module)
-    from benchmarks.optimum.rivals import attempt
+    from benchmarks.optimum.other_solvers import attempt
 
     problem = next(each for each in problems.dynamic() if each.name == "isolator")
     case = problem.case()
@@ -191,18 +191,18 @@ def test_the_best_that_is_known_is_that_of_everybody(monkeypatch):
 
     problem = Problem("p", "dynamic", "{}")
     methods = {"A": {"improvements": [[3, 9.0], [7, 8.0]]}, "B": {"improvements": []}}
-    monkeypatch.setattr(race, "rivals_of", lambda _: {"methods": methods, "ours": 7.5})
+    monkeypatch.setattr(race, "other_solvers_of", lambda _: {"methods": methods, "ours": 7.5})
     assert race.best_known(problem) == 7.5
-    monkeypatch.setattr(race, "rivals_of", lambda _: {"methods": methods, "ours": None})
+    monkeypatch.setattr(race, "other_solvers_of", lambda _: {"methods": methods, "ours": None})
     assert race.best_known(problem) == 8.0
-    monkeypatch.setattr(race, "rivals_of", lambda _: None)
+    monkeypatch.setattr(race, "other_solvers_of", lambda _: None)
     assert race.best_known(problem) is None
 
 
 def test_an_application_is_judged_by_its_limits_and_the_best_of_its_starts(monkeypatch):
     from types import SimpleNamespace
 
-    from benchmarks.optimum import held
+    from benchmarks.optimum import acceptance
 
     values = iter([(1.0, 0.0), (1.01, 0.0), (0.5, 0.1)])
 
@@ -216,9 +216,9 @@ def test_an_application_is_judged_by_its_limits_and_the_best_of_its_starts(monke
             evaluations=10, status="converged",
         )  # fmt: skip
 
-    monkeypatch.setattr(held, "optimize", optimized)
-    (table,) = held.applications(("tiedown",))
+    monkeypatch.setattr(acceptance, "optimize", optimized)
+    (table,) = acceptance.applications(("tiedown",))
     assert [row[-1] for row in table.rows] == ["yes", "yes", "NO"]
     values = iter([(18.0, 0.0), (5.9, 0.0), (36.0, 0.0)])
-    (table,) = held.eight_starts()
+    (table,) = acceptance.eight_starts()
     assert [row[-1] for row in table.rows] == ["yes", "yes", "NO"]

@@ -7,10 +7,10 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general import rivals, rows_back
+from mdstopo.general import competing_members, row_gradients
 from tests.general.support import design_of, load
 from tests.general.test_across import SCENE, STRUCK, VARIABLES, case_of
-from tests.general.test_rivals import GRID
+from tests.general.test_competing_members import GRID
 
 ALL = Rows(window=1.0, most=8, cones=True)
 IMPLICIT = {"integrator": "generalized_alpha", "step": 0.004}
@@ -55,7 +55,7 @@ def test_rows_that_are_pulled_back_together_are_what_they_are_alone(name, solver
     design = np.concatenate([design_of(case), case.start[case.n_design :]])
     together = every_row(evaluator, design)
     assert sum(len(peaks) for peaks in together.values()) > 5
-    monkeypatch.setattr(rows_back, "TOGETHER", 1)
+    monkeypatch.setattr(row_gradients, "BLOCK", 1)
     alone = every_row(evaluator, design)
     assert differ(together, alone) <= 1e-12
     assert differ(together, every_row(evaluator, design, sensitivity="direct")) <= 1e-8
@@ -104,7 +104,7 @@ def test_one_pass_over_the_motion_or_two_find_the_same_rows(monkeypatch):
     evaluator = Evaluator(grid(15))
     asked = Rows(window=0.6, most=50)
     one = evaluator.evaluate(evaluator.case.start, rows=asked)
-    monkeypatch.setattr(rivals, "AT_ONCE", 0)
+    monkeypatch.setattr(competing_members, "AT_ONCE", 0)
     two = evaluator.evaluate(evaluator.case.start, rows=asked)
     assert len(one.peaks["F"]) > 12
     assert [peak[:2] for peak in one.peaks["F"]] == [peak[:2] for peak in two.peaks["F"]]
@@ -126,6 +126,6 @@ def test_leaving_out_peaks_that_are_too_low_to_be_told_changes_none_that_is(aske
     evaluator = Evaluator(grid(30))
     design = evaluator.case.start * np.random.default_rng(2).uniform(0.3, 1.3, len(evaluator.case.start))
     found = evaluator.evaluate(design, False, rows=asked).peaks["F"]
-    monkeypatch.setattr(rivals, "_least", lambda *_: -1e300)
+    monkeypatch.setattr(competing_members, "_least", lambda *_: -1e300)
     every = evaluator.evaluate(design, False, rows=asked).peaks["F"]
     assert [peak[:2] for peak in found] == [peak[:2] for peak in every]

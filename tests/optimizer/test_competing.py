@@ -40,7 +40,7 @@ class Forces:
     def evaluate(self, x, gradient=True):
         self.count += 1
         value, slope, across = self.rows(0, x)
-        more = {"excess": np.zeros(len(value)), "across": across} if self.cones else {}
+        more = {"offset": np.zeros(len(value)), "across": across} if self.cones else {}
         if self.limit is not None:
             size, own, own_across = self.rows(1, x)
             more |= {
@@ -49,7 +49,7 @@ class Forces:
                 "constraint_groups": np.zeros(len(size), dtype=np.int64),
             }
             if self.cones:
-                more |= {"constraint_excess": np.ones(len(size)), "constraint_across": own_across / self.limit}
+                more |= {"constraint_offset": np.ones(len(size)), "constraint_across": own_across / self.limit}
         return Sample(float(value[0]), value, slope, **more)
 
     def level(self, which, x):
@@ -167,7 +167,7 @@ def test_of_too_many_rows_those_go_that_have_not_been_used(monkeypatch):
     for k in range(1, 12):
         rows.vector = np.array([[float(k), 0.0]])
         many = many.joined(rows)
-    many.idle[3] = 9
+    many.age[3] = 9
     thinned = many.thinned()
     assert len(thinned) == 8
     assert 3.0 not in thinned.values()

@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.jit import vector_entry
 from mdstopo.native.threads import VARIABLE
-from mdstopo.optimizer import driver, wide
+from mdstopo.optimizer import driver, separable, wide
 from mdstopo.optimizer.driver import Gsao
 from mdstopo.optimizer.powers import largest, powers, primitives
 from mdstopo.optimizer.presets import settings
@@ -45,7 +45,7 @@ class Many:
 def states(problem, steps, monkeypatch=None, **options):
     if monkeypatch is not None:
         monkeypatch.setattr(wide, "MANY", 10**9)
-        for module in (driver, wide):
+        for module in (driver, separable, wide):
             monkeypatch.setattr(module, "WIDE", 10**9)
     optimizer = Gsao(problem, settings("default", options, max_iterations=100))
     found = [optimizer.start()]

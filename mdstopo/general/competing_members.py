@@ -1,7 +1,8 @@
 """Members that compete for the largest force of their group: every one that comes near it has peaks of its own.
 
 Following the largest member at each time would hide the others, and where they cross the maximum has a kink. Here each
-rival is followed by itself, through its own peaks; the highest of all of them is the maximum over members and time.
+one that competes is followed by itself, through its own peaks; the highest of all of them is the maximum over members
+and time.
 """
 
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
 
 #: members that are followed at most, unless more rows than these are asked for
-RIVALS = 12
+FOLLOWED = 12
 #: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
 #: pass, with those alone that come near the largest
 AT_ONCE = 2**21
@@ -49,7 +50,7 @@ def members_peaks(
     nobody = np.zeros(0, dtype=np.int64)
     top, seen_all = compare(driver, j, places, members if at_once else nobody, count)
     near = np.flatnonzero(top >= (1.0 - window) * top.max())
-    who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(RIVALS, most)]])
+    who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(FOLLOWED, most)]])
     if final:
         seen = [driver.see_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]

@@ -1,10 +1,10 @@
-"""Where the largest force of a group changes hands: which member leads when, to the last digit.
+"""Which member of a group leads, that is carries the largest force, when: crossings of forces to the last digit.
 
 In every step each member's force f*(t) is smooth. |f_a| = |f_b| where f_a - f_b or f_a + f_b vanishes: smooth functions
 both, whose roots are looked for between samples so near together that a cubic through values and rates tells all but
 the narrowest leads; where it does not tell, the motion itself is looked at. Only members come into question that may
 lead between two samples by a bound on their cubics. Forces that are the same at all samples of a step (laws of time
-alone, actuators at their limit, symmetry) have no changes of hands between them.
+alone, actuators at their limit, symmetry) do not cross between them.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from mdstopo.general.competing_members import compare, members_of
 from mdstopo.general.extremes import FRACTIONS
 from mdstopo.general.responses import MEMBER_FORCE, TIE
-from mdstopo.general.rivals import compare, members_of
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:

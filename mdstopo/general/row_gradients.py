@@ -11,14 +11,14 @@ from mdstopo.scene.model import FloatArray, IndexArray
 if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
 
-#: rows times members that are pulled back together at most, for the memory they take
-TOGETHER = 2**23
+#: rows times members of one reverse sweep at most, for the memory they take
+BLOCK = 2**23
 #: rows of which the arrays of a call are kept for the next one
 KEPT = 32
 
 
 class _Block(NamedTuple):
-    """Rows that are pulled back together: what `row_sweep.pull_rows` takes, by its names."""
+    """Rows of one reverse sweep: what `row_sweep.pull_rows` takes, by its names."""
 
     which: IndexArray
     rows: FloatArray
@@ -27,15 +27,16 @@ class _Block(NamedTuple):
     starts: FloatArray
 
 
-class RowsBack:
-    """Pulls the rows of one driver back through its last motion, into its `gradients`."""
+class RowGradients:
+    """The gradients of the rows of one driver, by reverse sweeps through its last motion of many rows at once."""
 
     def __init__(self, driver: "GeneralDriver") -> None:
         self._driver = driver
         self._blocks: dict[int, _Block] = {}
 
     def __call__(self, count: int, across: FloatArray | None) -> None:
-        """Of the motion of so many steps; what is across of norms, too, where there is an array for it."""
+        """Fill the driver's `gradients`, for a motion of so many steps; what is across of norms, too, where there is an
+        array for it."""
         driver = self._driver
         wanted = [
             (j, r, aside, share, part)
@@ -49,7 +50,7 @@ class RowsBack:
         for j, reduction in enumerate(driver.scene.reductions):
             if reduction not in INTEGRALS:
                 driver.gradients[j, : driver.found[j]] = 0.0
-        most = max(1, TOGETHER // len(driver.padded))
+        most = max(1, BLOCK // len(driver.padded))
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
             block = self._block(len(part))

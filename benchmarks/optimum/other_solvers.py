@@ -16,17 +16,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.optimum.kkt import competing, gradient_of
+from benchmarks.optimum.kkt import SIGNS, competing, gradient_of, volume_rows
 from benchmarks.optimum.measure import excess, value_of
 from mdstopo import Case, evaluate
-from mdstopo.case.model import ResponseRow, VolumeRow
-from mdstopo.optimizer.problem import LinearRows
+from mdstopo.case.model import ResponseRow
 from mdstopo.optimizer.projection import project
 
 Floats = NDArray[np.float64]
 
 #: rows of each objective and of each side of a constraint
-PEAKS, HELD = 12, 6
+PEAKS, LIMIT_PEAKS = 12, 6
 #: processor seconds of one attempt, most of which some solvers spend on their own subproblems
 SECONDS = 8.0
 #: evaluations of MMA's and CCSAQ's dual function for one step: their default, 100 000, takes seconds
@@ -61,14 +60,7 @@ class Smooth:
         self.n, self.k = self.space.size, len(case.objectives)
         self.signs = np.array([-1.0 if each.sense == "maximize" else 1.0 for each in case.objectives])
         self.units = np.ones(self.k)
-        volumes = [row for row in case.constraints if isinstance(row, VolumeRow)]
-        own = [self.space.row(row) for row in volumes]
-        turned = np.array([-1.0 if row.sense == "at_least" else 1.0 for row in volumes])
-        self.linear = LinearRows(
-            np.array([a for a, _ in own]).reshape(len(own), self.n) * turned[:, None],
-            np.array([b for _, b in own]) * turned,
-            np.array([row.sense == "equals" for row in volumes], dtype=np.bool_),
-        )
+        self.linear = volume_rows(case)
         self._x: Floats | None = None
         self._kept: tuple[Floats, Floats] = np.zeros(0), np.zeros((0, 0))
 
@@ -102,7 +94,9 @@ class Smooth:
         case = self.case
         design = self.space.expand(x)
         found = evaluate(case, design[: case.n_design], variables=self.space.named(design))
-        size = self.k * PEAKS + sum(HELD * _sides(row) for row in case.constraints if isinstance(row, ResponseRow))
+        size = self.k * PEAKS + sum(
+            LIMIT_PEAKS * len(SIGNS[row.sense]) for row in case.constraints if isinstance(row, ResponseRow)
+        )
         if not found.status.usable:
             self.visited.append((count, float("inf"), float("inf")))
             return np.full(size, FAR), np.zeros((size, self.n))
@@ -122,15 +116,15 @@ class Smooth:
         for i, row in enumerate(case.constraints):
             if isinstance(row, ResponseRow):
                 scale = abs(row.bound) or 1.0
-                for sign in {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}[row.sense]:
+                for sign in SIGNS[row.sense]:
                     peaks = competing(row, sign, found.constraint_peaks[i])
-                    for r in range(HELD):
+                    for r in range(LIMIT_PEAKS):
                         peak = peaks[min(r, len(peaks) - 1)]
                         rows.append(sign * (peak.value - row.bound) / scale)
                         slopes.append(sign * self.space.pull(gradient_of(peak)) / scale)
         return np.array(rows), np.array(slopes)
 
-    def held(self, v: Floats) -> tuple[Floats, Floats]:
+    def inequalities(self, v: Floats) -> tuple[Floats, Floats]:
         """All rows that may not be positive, the volume rows that are no equalities included, by v = (x, z)."""
         x, z = v[: self.n], v[self.n :]
         rows, slopes = self.at(x)
@@ -189,16 +183,12 @@ class Smooth:
         return rows
 
 
-def _sides(row: ResponseRow) -> int:
-    return 2 if row.sense == "equals" else 1
-
-
 def ipopt(problem: Smooth, first: Floats) -> None:
     """IPOPT with its limited-memory Hessian and CasADi's other defaults."""
     import casadi as ca
 
     size, tied = problem.n + problem.k, problem.tied()
-    values, _ = problem.held(first)
+    values, _ = problem.inequalities(first)
     problem.stopped = False
 
     class Slopes(ca.Callback):  # type: ignore[misc]
@@ -221,7 +211,7 @@ def ipopt(problem: Smooth, first: Floats) -> None:
             return ca.Sparsity.dense(len(values), size)
 
         def eval(self, args: list[object]) -> list[object]:
-            return [ca.DM(problem.held(np.array(args[0]).ravel())[1])]
+            return [ca.DM(problem.inequalities(np.array(args[0]).ravel())[1])]
 
     class Rows(ca.Callback):  # type: ignore[misc]
         """The rows by v."""
@@ -243,7 +233,7 @@ def ipopt(problem: Smooth, first: Floats) -> None:
             return ca.Sparsity.dense(len(values), 1)
 
         def eval(self, args: list[object]) -> list[object]:
-            return [ca.DM(problem.held(np.array(args[0]).ravel())[0])]
+            return [ca.DM(problem.inequalities(np.array(args[0]).ravel())[0])]
 
         def has_jacobian(self) -> bool:
             return True
@@ -313,7 +303,7 @@ def _nlopt(name: str) -> Callable[[Smooth, Floats], None]:
             return value
 
         def rows(result: Floats, v: Floats, slope: Floats) -> None:
-            values, own = problem.held(v)
+            values, own = problem.inequalities(v)
             result[:] = np.concatenate([values, tied @ v - level])
             if slope.size:
                 slope[:] = np.concatenate([own, tied])
@@ -323,7 +313,7 @@ def _nlopt(name: str) -> Callable[[Smooth, Floats], None]:
             if slope.size:
                 slope[:] = A
 
-        count = len(problem.held(first)[0]) + len(tied)
+        count = len(problem.inequalities(first)[0]) + len(tied)
         optimizer.set_min_objective(objective)
         optimizer.add_inequality_mconstraint(rows, np.full(count, 1e-8))
         if slsqp and len(b):

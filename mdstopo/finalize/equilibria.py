@@ -29,17 +29,17 @@ FAR, TURNED = 0.05, 0.1
 
 
 @dataclass(frozen=True)
-class Rest:
-    """fallen: why the final design does not rest at the equilibrium of the full one; moved: how far that has moved.
+class Comparison:
+    """lost: why the final design does not rest at the equilibrium of the full one; moved: how far that has moved.
 
     Both in words, and empty where there is nothing to tell.
     """
 
-    fallen: str = ""
+    lost: str = ""
     moved: str = ""
 
 
-def compare_rest(case: Case, design: FloatArray, end: FloatArray, reduced: Case, now: FloatArray) -> Rest:
+def compare_equilibria(case: Case, design: FloatArray, end: FloatArray, reduced: Case, now: FloatArray) -> Comparison:
     """Compare where a case settles with its design and where one with fewer members does, in every load case.
 
     design (N + P,), now (K + Q,): the designs of the case and of the reduced one; end (N + P,): the latter as one of
@@ -47,7 +47,7 @@ def compare_rest(case: Case, design: FloatArray, end: FloatArray, reduced: Case,
     designs has no equilibrium: that is told elsewhere.
     """
     if not case.solver.settle:
-        return Rest()
+        return Comparison()
     moved = ""
     whole, few = Evaluator(case), Evaluator(reduced)
     for load_case in case.load_cases:
@@ -59,10 +59,10 @@ def compare_rest(case: Case, design: FloatArray, end: FloatArray, reduced: Case,
         words = f"{where}the final design rests {far} away from where the full one does"
         tracked = _followed(whole.driver(load_case.name), case, design, end, begun.q)  # type: ignore[arg-type]
         if tracked is None or _Distance(case, tracked, ended.q).is_beyond(NEAR, TURN):
-            return Rest(f"{words}, at another equilibrium: the members kept do not hold it")
+            return Comparison(f"{words}, at another equilibrium: the members kept do not hold it")
         if far.is_beyond(FAR, TURNED):
             moved = moved or words
-    return Rest(moved=moved)
+    return Comparison(moved=moved)
 
 
 class _Distance:

@@ -30,7 +30,7 @@ def text_of(reduction="max", integrator="runge_kutta"):
 
 @pytest.mark.parametrize("reduction", ["max", "final"])
 def test_every_member_within_reach_of_the_largest_force_has_a_row_with_its_own_value(reduction):
-    """Against each member alone: a group of one has no rivals."""
+    """Against each member alone: in a group of one nobody competes."""
     case = read_case(text_of(reduction))
     found = mdstopo.evaluate(case, gradient=False)
     alone = []
@@ -53,7 +53,7 @@ def test_every_member_within_reach_of_the_largest_force_has_a_row_with_its_own_v
 
 
 @pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
-def test_the_rows_of_rivals_have_their_own_gradients(integrator):
+def test_the_rows_of_competing_members_have_their_own_gradients(integrator):
     case = read_case(text_of(integrator=integrator))
     evaluator = Evaluator(case)
     alpha = np.array([0.7, 0.6, 0.5, 0.6, 0.8, 0.7])
