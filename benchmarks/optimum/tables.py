@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from benchmarks.optimum.acceptance import applications, eight_starts
+from benchmarks.optimum.families import families
 from benchmarks.optimum.problems import Problem, named
 from benchmarks.optimum.race import BUDGET, NEAR, STARTS, best_known, other_solvers_of, ours, within
 from benchmarks.optimum.runs import KEPT, LEAST, REACHED, Run, run
@@ -15,7 +16,7 @@ ITERATIONS = (200, 50, 1000)
 #: evaluations within which a convex problem's optimum is to be reached
 WITHIN = 100
 #: what the tables are called on the command line
-PARTS = ("convex", "dynamic", "race", "applications", "bars")
+PARTS = ("convex", "dynamic", "race", "families", "applications", "bars")
 
 
 def everything(
@@ -33,6 +34,8 @@ def everything(
         yield from dynamic([each for each in chosen if each.kind == "dynamic"], iterations)
     if "race" in parts:
         yield from race([each for each in chosen if each.kind == "dynamic"], starts, budget)
+    if "families" in parts and not names:
+        yield from families()
     if "applications" in parts and not names:
         yield from applications()
     if "bars" in parts and not names:
