@@ -1,7 +1,7 @@
 """Several starts in quotas: all go a little way, those that find what another found are dropped, the best go on.
 
 Which go on depends on the states alone, and is written into them (`State.dropped`): a resumed run, and one on any
-number of processes, decides alike.
+number of processes, decides alike. One that is resumed with another number of starts decides anew (`carried_over`).
 """
 
 import math
@@ -43,18 +43,17 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     for index in late:
         yield [StartTask(index, families[index], QUOTAS[0], None if best is None else best.best_alpha)]
     for quota, following in zip(QUOTAS, (*QUOTAS[1:], None), strict=True):
-        drop(case, states, quota, keep)
+        drop(case.optimizer.tolerance, states, quota, keep)
         going = [i for i, state in enumerate(states) if state is not None and not state.dropped]
         yield [StartTask(i, families[i], following) for i in going]
 
 
-def drop(case: Case, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
-    """Mark the starts that do not go on after so many iterations.
+def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
+    """Mark the starts that do not go on after so many iterations. tolerance: of violations.
 
     The best third of the distinct ones goes on, and those that are still falling fast. Where one has gone on from here
     it is decided already: a resumed run must not decide again by what that one has found since.
     """
-    tolerance = case.optimizer.tolerance
     begun = [(index, state) for index, state in enumerate(states) if state is not None and not state.dropped]
     if any(state.iteration > quota for _, state in begun):
         return
@@ -70,6 +69,25 @@ def drop(case: Case, states: States, quota: int, keep: Callable[[int, State], No
             reason = f"dropped after {state.iteration} iterations: {why}"
             states[index] = marked = replace(state, dropped=True, status=RunStatus.MAX_ITERATIONS, reason=reason)
             keep(index, marked)
+
+
+def carried_over(case: Case, states: States, before: int) -> States:
+    """What a run of as many starts as there are `states` takes over from one of `before` starts.
+
+    The end is to be that of a run that had so many starts from the beginning. So a start is taken over where that run
+    would have it in the same state: it began alike, and nobody has decided about it as yet. One that has gone beyond the
+    first quota begins again, as it may be dropped there now; what it was there is no longer known.
+    """
+    if before == len(states):
+        return states
+    in_quotas = len(states) > 1 and stage_count(case) == 1
+    found: States = [None] * len(states)
+    for index, state in enumerate(states[:before]):
+        alike = family_of(index, before) is family_of(index, len(states))
+        if state is None or not alike or (in_quotas and state.iteration > QUOTAS[0]):
+            continue
+        found[index] = replace(state, dropped=False, status=RunStatus.RUNNING, reason="") if state.dropped else state
+    return found
 
 
 def near(state: State, best: State, tolerance: float) -> bool:

@@ -23,7 +23,7 @@ from mdstopo.session.combining import Combining, even, problem_of
 from mdstopo.session.engine import Engine, MakeEngine, make_engine
 from mdstopo.session.errors import WorkerError
 from mdstopo.session.outcome import Outcome, Progress
-from mdstopo.session.quotas import rounds
+from mdstopo.session.quotas import carried_over, rounds
 from mdstopo.session.ready import compile_apart, get_ready, motions
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
@@ -242,7 +242,15 @@ class _Run:
             )
         if before is not None:
             self.initial = np.asarray(before, dtype=np.float64)
-        self.states = restore(view, self.case.optimizer.starts)
+        starts, earlier = self.case.optimizer.starts, int(view.settings.get("starts", 1))
+        known = restore(view, starts)
+        self.states = carried_over(self.case, known, earlier)
+        again = [str(k + 1) for k in range(starts) if known[k] is not None and self.states[k] is None]
+        if again:
+            self.notify(
+                f"{view.path} had starts: {earlier}. With {starts} it is decided anew who goes on: "
+                f"{'starts' if len(again) > 1 else 'start'} {', '.join(again)} from the beginning"
+            )
         if any(state is not None for state in self.states) and "combine/utopia" in view.arrays:
             utopia, maxima = (
                 np.asarray(view.array(f"combine/{name}"), dtype=np.float64) for name in ("utopia", "maxima")

@@ -25,12 +25,10 @@ def at(state: State, iteration: int, objective: float, status: RunStatus = RunSt
 
 
 def decided(states: list[State | None]) -> list[bool]:
-    case = limited(hand_made_case(), 60)
-
     def keep(index: int, state: State) -> None:
         assert states[index] is state
 
-    drop(case, states, QUOTAS[0], keep)
+    drop(0.0, states, QUOTAS[0], keep)
     return [state is not None and state.dropped for state in states]
 
 

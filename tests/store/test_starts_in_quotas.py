@@ -15,8 +15,8 @@ from mdstopo.session.run import run_session
 STARTS = 6
 
 
-def go(path: Path, iterations: int = 50, **options: Any) -> Outcome:
-    case = limited(hand_made_case(), iterations, starts=STARTS)
+def go(path: Path, iterations: int = 50, starts: int = STARTS, **options: Any) -> Outcome:
+    case = limited(hand_made_case(), iterations, starts=starts)
     return run_session(case, path=path, engine=FakeEngineWithEvaluations, **options)
 
 
@@ -68,3 +68,38 @@ def test_equal_optima_are_told_once_best_first_with_all_their_evaluations(straig
     assert [each.starts for each in found] == [(1, 3), (0,)]
     assert found[0].evaluations == first.evaluations + 9
     assert found[0].objective < found[1].objective
+
+
+@pytest.mark.parametrize(("before", "asked"), [(1, None), (1, 9), (4, None), (9, None), (9, 60), (9, 170)])
+def test_a_run_resumed_with_another_number_of_starts_ends_as_one_that_had_so_many_from_the_beginning(
+    before: int, asked: int | None, straight: tuple[Outcome, Path], tmp_path: Path
+) -> None:
+    """Whatever it had reached before: all, or stopped before, between and beyond the quotas."""
+    path = tmp_path / "resumed.h5"
+    told: list[str] = []
+    go(path, starts=before, **({} if asked is None else {"stop_requested": stop_after(asked)}))
+    go(path, resume=True, notify=told.append)
+    assert_same_files(straight[1], path)
+    assert any("from the beginning" in line for line in told) == (asked is None or asked > 100)
+
+
+def test_a_run_resumed_with_one_start_takes_over_the_first_wherever_it_is(tmp_path: Path) -> None:
+    go(tmp_path / "one.h5", starts=1)
+    for starts in (3, 6):
+        go(tmp_path / "fewer.h5", starts=starts, overwrite=True)
+        told: list[str] = []
+        go(tmp_path / "fewer.h5", starts=1, resume=True, notify=told.append)
+        assert told == []
+        assert_same_files(tmp_path / "one.h5", tmp_path / "fewer.h5")
+
+
+def test_starts_that_a_run_with_more_of_them_would_have_alike_are_taken_over(tmp_path: Path) -> None:
+    case = limited(hand_made_case(), 60, starts=8)
+    old = go(tmp_path / "old.h5", 60, starts=4).states
+    found = quotas.carried_over(case, [*old, *[None] * 4], 4)
+    for index, (before, after) in enumerate(zip(old, found, strict=False)):
+        assert before is not None
+        kept = before.iteration <= quotas.QUOTAS[0] and index < 3  # the fourth of four was a neighbour of the best
+        assert (after is not None) == kept
+        assert after is None or (after.running and after.alpha.tobytes() == before.alpha.tobytes())
+    assert any(each is not None for each in found)
