@@ -43,6 +43,7 @@ class RunStatus(enum.StrEnum):
     MAX_ITERATIONS = "max_iterations"
     INTERRUPTED = "interrupted"
     FAILED = "failed"
+    VISITED = "visited"  #: of fronts: a design that was met on the way to others, and the end of nothing
 
 
 def together(ends: Sequence[RunStatus], noun: str) -> tuple[RunStatus, str]:

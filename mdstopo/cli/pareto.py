@@ -159,21 +159,23 @@ def _directions(case: "Case", weights: str | None, points: int | None) -> "NDArr
 
 
 def front_rows(names: list[str], part: "Mapping[str, Any]") -> list[list[str]]:
-    """A front, as `pareto/...` holds it, as a table."""
+    """A front as a table: the columns of `pareto/...`, with those of further points behind (`store.front`)."""
+    from mdstopo.status import RunStatus
+
     rows = [["point", *(f"weight {name}" for name in names), *names, "status", "evaluations", "KKT", ""]]
     for j, status in enumerate(part["status"]):
-        violation = float(part["violation"][j])
+        violation, was_visited = float(part["violation"][j]), status == RunStatus.VISITED
         remarks = ["dominated"] if part["dominated"][j] else []
         if violation > STATED:
             remarks.append(f"exceeds a constraint by {violation:.1e} of its bound")
         rows.append(
             [
                 str(j),
-                *(number(weight, 4) for weight in part["weights"][j]),
+                *("" if was_visited else number(weight, 4) for weight in part["weights"][j]),
                 *(number(value, 7) for value in part["objectives"][j]),
                 status.replace("_", " "),
-                str(int(part["evaluations"][j])),
-                number(float(part["kkt"][j]), 1),
+                "" if was_visited else str(int(part["evaluations"][j])),
+                "" if was_visited else number(float(part["kkt"][j]), 1),
                 ", ".join(remarks),
             ]
         )
@@ -200,10 +202,12 @@ def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[
 
 
 def _say(output: Output, outcome: "FrontOutcome") -> None:
+    from mdstopo.store.front import joined
+
     case = outcome.case
     output.say(f"{case.title or case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")
     names = [objective.name for objective in case.objectives]
-    part = outcome.part
+    part = joined(outcome.part, names)
     output.table(front_rows(names, part))
     good = outcome.quality
     numbers = {} if good is None else good.numbers()
@@ -238,6 +242,11 @@ def _document(outcome: "FrontOutcome", again: str) -> dict[str, Any]:
     for name in ("objectives", "dominated", "kkt", "violation"):
         content[name] = part[name]
     content["point_status"] = part["status"]
+    content["further"] = {
+        name: part[f"further/{name}"]
+        for name in ("objectives", "dominated", "violation", "point", "iterate")
+        if f"further/{name}" in part
+    }
     content["utopia"], content["maxima"] = part["utopia"][0], part["maxima"][0]
     if outcome.quality is not None:
         content |= outcome.quality.numbers()

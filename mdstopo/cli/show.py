@@ -146,15 +146,14 @@ def _say_starts(output: Output, view: "ResultView") -> None:
 
 def _say_front(output: Output, view: "ResultView") -> None:
     from mdstopo.cli.pareto import front_rows, quality_rows
+    from mdstopo.store.front import whole_front
 
-    part: dict[str, Any] = {**view.under("pareto"), "status": list(view.lines("pareto/status"))}
-    names, status = objective_names(view), part["status"]
-    output.table(front_rows(names, part))
-    output.table(quality_rows(names, view.settings, part))
-    reasons = view.lines("pareto/reason")
-    for j, word in enumerate(status):
+    front, names = whole_front(view), objective_names(view)
+    output.table(front_rows(names, front))
+    output.table(quality_rows(names, view.settings, front))
+    for j, word in enumerate(front["status"]):
         if word not in ("converged", "running"):
-            output.say(f"point {j}: {reasons[j]}")
+            output.say(f"point {j}: {front['reason'][j]}")
 
 
 def _say_sweep(output: Output, view: "ResultView") -> None:
@@ -238,6 +237,11 @@ def _document(view: "ResultView") -> dict[str, Any]:
         for name in ("weights", "objectives", "dominated", "evaluations", "kkt"):
             content[name] = view.array(f"pareto/{name}")
         content["point_status"] = list(view.lines("pareto/status"))
+        content["further"] = {
+            name: view.arrays[f"pareto/further/{name}"]
+            for name in ("objectives", "dominated", "point", "iterate")
+            if f"pareto/further/{name}" in view.arrays
+        }
         content |= {
             name: view.arrays[f"pareto/{name}"] for name in ("ideal", "nadir") if f"pareto/{name}" in view.arrays
         }

@@ -4,7 +4,7 @@ Every finished task is kept in stacked arrays, `pareto/tasks/...`, a row each: w
 that one that was stopped goes on without losing or repeating anything.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +24,7 @@ from mdstopo.store.reader import ResultView
 Floats = NDArray[np.float64]
 
 _NUMBERS = ("combined", "kkt", "violation", "seconds")
-_COUNTS = ("point", "evaluations")
+_COUNTS = ("point", "evaluations", "iterate")
 _WORDS = ("key", "reason", "host")
 
 
@@ -39,6 +39,7 @@ def tasks_part(found: Iterable[Found], case: Case, place: str = "pareto/tasks") 
         "status": [each.status.value for each in rows],
         "visits": np.array([len(each.visited) for each in rows], dtype=np.int64),
         "visited": np.concatenate([each.visited for each in rows]) if rows else np.zeros((0, m)),
+        "violations": np.concatenate([_violations(each) for each in rows]) if rows else np.zeros(0),
     }
     for name in _NUMBERS:
         part[name] = np.array([getattr(each, name) for each in rows], dtype=np.float64)
@@ -49,12 +50,19 @@ def tasks_part(found: Iterable[Found], case: Case, place: str = "pareto/tasks") 
     return {f"{place}/{name}": value for name, value in part.items()}
 
 
+def _violations(found: Found) -> Floats:
+    """Of every design that was visited; NaN where they are not known, as of the runs of a sweep."""
+    if len(found.violations) == len(found.visited):
+        return found.violations
+    return np.full(len(found.visited), np.nan)
+
+
 def read_tasks(view: ResultView, place: str = "pareto/tasks") -> dict[str, Found]:
     """The finished tasks of a file, by key. Raises DamagedError where they are not whole."""
     columns: Mapping[str, NDArray[np.generic]] = view.under(place)
     words = {name: view.lines(f"{place}/{name}") for name in (*_WORDS, "status")}
     found: dict[str, Found] = {}
-    if "visits" not in columns:
+    if "violations" not in columns:  # of a version before results were kept like this
         return found
     last, end = np.cumsum(columns["visits"]), np.cumsum(columns["sizes"])
     try:
@@ -72,6 +80,8 @@ def read_tasks(view: ResultView, place: str = "pareto/tasks") -> dict[str, Found
                 kkt=float(columns["kkt"][i]),
                 violation=float(columns["violation"][i]),
                 visited=np.array(columns["visited"][first : int(last[i])], dtype=np.float64),
+                violations=np.array(columns["violations"][first : int(last[i])], dtype=np.float64),
+                iterate=int(columns["iterate"][i]),
                 seconds=float(columns["seconds"][i]),
                 host=words["host"][i],
             )
@@ -133,7 +143,6 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
         "alpha": designs[:, : space.n_alpha],
         "status": status,
         "reason": reason,
-        "dominated": _dominated(signs * objectives, numbers["violation"], status),
         "evaluations": count,
         "utopia": np.tile(front.utopia, (w, 1)),
         "maxima": np.tile(front.maxima, (w, 1)),
@@ -142,8 +151,34 @@ def front_part(case: Case, directions: Floats, front: Front, tasks: Iterable[Fou
     }
     part |= {f"variables/{name}": values for name, values in space.named(designs).items()}
     part |= numbers
+    part |= _further_part(case, front.further)
+    beaten = _dominated(
+        signs * np.concatenate([objectives, *(each.objectives[None] for each in front.further)]),
+        np.concatenate([numbers["violation"], [each.violation for each in front.further]]),
+        [*status, *[RunStatus.VISITED.value] * len(front.further)],
+    )
+    part["dominated"] = beaten[:w]
+    if front.further:
+        part["further/dominated"] = beaten[w:]
     part |= {f"visited/{j}": np.concatenate(rows) for j, rows in sorted(visited.items())}
     return {f"pareto/{name}": value for name, value in part.items()}
+
+
+def _further_part(case: Case, further: Sequence[Found]) -> Datasets:
+    """Designs that were visited and belong to the front, a row each; nothing where there are none."""
+    if not further:
+        return {}
+    space = case.space
+    designs = np.array([space.expand(each.alpha) for each in further])
+    part: Datasets = {
+        "objectives": np.array([each.objectives for each in further]),
+        "alpha": designs[:, : space.n_alpha],
+        "violation": np.array([each.violation for each in further]),
+        "point": np.array([each.point for each in further], dtype=np.int64),
+        "iterate": np.array([each.iterate for each in further], dtype=np.int64),
+    }
+    part |= {f"variables/{name}": values for name, values in space.named(designs).items()}
+    return {f"further/{name}": value for name, value in part.items()}
 
 
 def _dominated(signed: Floats, violation: Floats, status: list[str]) -> NDArray[np.bool_]:
@@ -173,9 +208,11 @@ class Quality:
 
 
 def quality(case: Case, front: Front) -> Quality:
-    """Of the front's points that keep the constraints and are not dominated, of the same ones the first."""
+    """Of the front's points, further ones too, that keep the constraints and are not dominated, of the same ones the
+    first."""
     signs = np.array([sign_of(objective) for objective in case.objectives])
-    good = [each for each in front.points if each is not None and each.usable and each.violation <= TOLERATED]
+    every = [*front.points, *front.further]
+    good = [each for each in every if each is not None and each.usable and each.violation <= TOLERATED]
     points = signs * np.array([each.objectives for each in good]).reshape(len(good), len(signs))
     kept = points[~(dominated(points) | repeated(points))]
     if not len(kept):

@@ -1,12 +1,15 @@
 """What to solve, in rounds that are fixed in advance: the same tasks from the same results, wherever they are solved.
 
-1. Each objective alone, from the first design (and from random ones, where more starts are asked for); then each again
-   from where the others ended. The best are the ends; they give utopia and maxima (the pay-off table, Eq. 24).
+1. Each objective alone, from the first design (where more starts are asked for: from as many as a run would, in
+   quotas); then each again from where the others ended, and near its own best. The best are the ends; they give utopia
+   and maxima (the pay-off table, Eq. 24).
 2. The other points between solved ones, halving the gaps: each from the solved design that is best by its own U, and
-   from the neighbour on the other side.
+   from the neighbour on the other side; and from further starts, in quotas.
 3. Exchange: whoever's U is lower at another point's design starts again from that, until nobody gains.
 4. With what has been found utopia and maxima are brought up to date. Every point goes on from its own design, where
-   they changed, and from both neighbours'; and exchange again. The same again while they still move by much.
+   they changed, and from both neighbours'; and exchange again. Whoever's U is lower at a design that was only visited
+   starts again from that. The same again while utopia and maxima still move by much.
+5. What was visited and belongs to the front is added to it (`visited`).
 
 Designs that violate constraints come after all that do not, whatever their U, and are no ends.
 """
@@ -19,15 +22,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.front.measures import dominated
+from mdstopo.front.race import Result, Solved, Starts, race, rivals
 from mdstopo.front.tasks import Found, Task
+from mdstopo.front.visited import Place, Visited, belonging, even_spacing
 from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.status import RunStatus
 
 Floats = NDArray[np.float64]
-Rounds = Generator[list[Task], list[Found], "Front"]
-Part = Generator[list[Task], list[Found], None]
+Rounds = Generator[list[Task], list[Result], "Front"]
+Part = Generator[list[Task], list[Result], None]
 
 #: rounds of exchange at most; gain by which another's design is better, relative to U (to the violation)
 EXCHANGES, GAIN, LESS = 6, 1e-6, 1e-3
+#: gain by which a design that was only visited is better, relative to U: less than that, a solve that keeps its limits
+#: to the tolerance may have given away itself
+VISITED_GAIN = 1e-4
 #: rounds of refinement at most; change of utopia or maxima, relative to their distance, from which points are solved
 #: anew the first time, and in further rounds
 REFINEMENTS, MOVED, MOVED_AGAIN = 4, 1e-6, 1e-3
@@ -42,8 +51,8 @@ SPREADING = ("nbi", "nc")
 class Request:
     """A front: directions (W, m), weights or anchors; method; exponent p and whether to normalise (Eq. 24).
 
-    signs (m,): -1 for what is to be maximised. starts (S, N): the first design, then further ones; iterations: of each
-    solve. active: the objectives that take part, by place; all where empty.
+    signs (m,): -1 for what is to be maximised. starts: where solves begin; iterations: of each. active: the objectives
+    that take part, by place; all where empty.
     """
 
     directions: Floats
@@ -51,7 +60,7 @@ class Request:
     exponent: float
     normalize: bool
     signs: Floats
-    starts: Floats
+    starts: Starts
     iterations: int
     active: tuple[int, ...] = ()
 
@@ -60,13 +69,15 @@ class Request:
 class Front:
     """points: what was found for every direction, None where nothing was. ends: the best known of every objective.
 
-    utopia, maxima (m,): raw values, which the points of the last rounds were found with.
+    utopia, maxima (m,): raw values, which the points of the last rounds were found with. further: designs that were
+    visited on the way to a point (`Found.point`) and belong to the front.
     """
 
     points: tuple[Found | None, ...]
     ends: tuple[Found, ...]
     utopia: Floats
     maxima: Floats
+    further: tuple[Found, ...] = ()
 
 
 class NoEndError(Exception):
@@ -95,6 +106,9 @@ class Planner:
         #: by point, the best that was found for it under the present utopia and maxima, or in the last ones
         self.best: dict[int, Found] = {}
         self.solved: set[tuple[int, bytes]] = set()
+        self.visited = Visited(self.m)
+        #: what going the way of a solve once more has found
+        self.repeated: dict[Place, Found] = {}
 
     def rounds(self) -> Rounds:
         """Tasks to be solved together; send their results, in order; returns the front."""
@@ -107,10 +121,12 @@ class Planner:
                 break
             yield from self._refine(moved)
             yield from self._exchange()
+            yield from self._revisit()
+        further = yield from self._further()
         self._improve_ends()
         points = tuple(self.best.get(j) for j in range(self.count))
         signs = self.request.signs
-        return Front(points, tuple(self.ends), signs * self.lowest, signs * self.highest)
+        return Front(points, tuple(self.ends), signs * self.lowest, signs * self.highest, further)
 
     def ends_alone(self) -> Part:
         """The first rounds alone: each objective's optimum, and with it utopia and maxima."""
@@ -119,24 +135,21 @@ class Planner:
     # the rounds
 
     def _ends(self) -> Part:
-        alone = [self._alone(i) for i in range(self.m)]
-        found = yield self._new(
-            [
-                Task(-1 - i, alone[i], start, self.request.iterations)
-                for i in self.active
-                for start in self.request.starts
-            ]
-        )
-        self._learn(found)
-        self._choose_ends(found)
+        starts = self.request.starts
+        own = starts.count - 1 if starts.has_neighbour else starts.count
+        alone = {i: Task(-1 - i, self._alone(i), starts.first, self.request.iterations) for i in self.active}
+        contests = [rivals([starts.begin(alone[i], k, k) for k in range(own)]) for i in self.active]
+        solved = yield from self._solve([], contests)
+        self._choose_ends([found for _, found in solved])
         crossed = [
-            Task(-1 - i, alone[i], other.alpha, self.request.iterations)
+            replace(alone[i], start=other.alpha)
             for i in self.active
             for k, other in enumerate(self.ends)
             if k != i and k in self.active
         ]
-        found = yield self._new(crossed)
-        self._learn(found)
+        if starts.has_neighbour:
+            crossed += [starts.begin(alone[i], own, own, self.ends[i].alpha) for i in self.active]
+        yield from self._solve(self._new(crossed))
         self._moves(0.0)
 
     def _between(self) -> Part:
@@ -148,16 +161,21 @@ class Planner:
             due = self._due()
             if not due:
                 return
-            tasks = []
-            for j in due:
-                tasks += [self._task(j, start) for start in self._sides(j)]
-                tasks += [self._task(j, start) for start in self.request.starts[1:]]
-            found = yield self._new(tasks)
-            self._learn(found)
+            tasks = self._new([self._task(j, start) for j in due for start in self._sides(j)])
+            solved = yield from self._solve(tasks, [self._contest(j) for j in due])
             for j in due:
                 if j not in self.best:  # nothing worked; the first failure speaks for the point
-                    failed = [each for each in found if each.point == j]
+                    failed = [found for _, found in solved if found.point == j]
                     self.best[j] = failed[0] if failed else self.ends[0]
+
+    def _contest(self, j: int) -> list[Task]:
+        """The further starts of a point: other designs of the families than other points have, near other ends."""
+        starts = self.request.starts
+        if starts.count == 1:
+            return []
+        task = self._task(j, starts.first)
+        best = self.known[self._best_of(self._values(j, self.table), self.beyond)].alpha
+        return rivals([starts.begin(task, k, k + starts.count * (1 + j), best) for k in range(1, starts.count)])
 
     def _exchange(self) -> Part:
         for _ in range(EXCHANGES):
@@ -178,7 +196,7 @@ class Planner:
             tasks = self._new(tasks)
             if not tasks:
                 return
-            self._learn((yield tasks))
+            yield from self._solve(tasks)
 
     def _refine(self, moved: bool) -> Part:
         tasks = []
@@ -194,23 +212,77 @@ class Planner:
         tasks = self._new(tasks, again=moved)
         if not tasks:
             return
-        found = yield tasks
-        self._learn(found)
+        solved = yield from self._solve(tasks)
         for j in range(self.count):
             if j not in self.best:
-                self.best[j] = next(each for each in found if each.point == j)
+                self.best[j] = next(found for _, found in solved if found.point == j)
+
+    def _revisit(self) -> Part:
+        """Points whose U is lower at a design that was only visited start again from that, and exchange."""
+        way = self.visited.on_the_way()
+        table, wanted = self.visited.table[way], []
+        places = [place for place, on_the_way in zip(self.visited.places, way.tolist(), strict=True) if on_the_way]
+        if not places:
+            return
+        for j in range(self.count):
+            values = self._values(j, table)
+            k = int(np.argmin(values))
+            own = self.best[j]
+            value = float(self._values(j, self._signed(own)[None])[0]) if own.usable and not _beyond(own) else np.inf
+            if value > values[k] + VISITED_GAIN * abs(values[k]):
+                wanted.append(places[k])
+        new = [place for place in dict.fromkeys(wanted) if place not in self.repeated]
+        if new:
+            yield from self._repeat(new)
+            yield from self._exchange()
+
+    def _further(self) -> Generator[list[Task], list[Result], tuple[Found, ...]]:
+        """What was visited and belongs to the front."""
+        points = [self._signed(each) for each in self.best.values() if each.usable and not _beyond(each)]
+        front = np.array(points).reshape(-1, self.m)
+        rows = belonging(front, self.visited.table, even_spacing(self.count, self.m))
+        places = [self.visited.places[row] for row in rows]
+        solves = self.visited.solves
+        yield from self._repeat(
+            [place for place in places if solves[place[0]].iterate(place[1]) >= 0 and place not in self.repeated]
+        )
+        found = [self.repeated.get(place, solves[place[0]].found) for place in places]
+        good = [replace(each, status=RunStatus.VISITED) for each in found if each.usable and not _beyond(each)]
+        return tuple(sorted(good, key=lambda each: each.objectives.tolist()))
+
+    def _repeat(self, places: list[Place]) -> Part:
+        """The designs of places, by going the way to them once more."""
+        if not places:
+            return
+        tasks = []
+        for number, row in places:
+            solve = self.visited.solves[number]
+            tasks.append(replace(solve.task, iterate=solve.iterate(row)))
+        solved = yield from self._solve(tasks)
+        self.repeated |= {place: found for place, (_, found) in zip(places, solved, strict=True)}
+
+    def _solve(
+        self, tasks: list[Task], contests: list[list[Task]] | None = None
+    ) -> Generator[list[Task], list[Result], Solved]:
+        """Solve tasks, and those that compete with each other, and take the results in."""
+        solved = yield from race(tasks, contests or [], self.request.starts.tolerance)
+        self._learn(solved)
+        return solved
 
     # what is known
 
-    def _learn(self, found: list[Found]) -> None:
+    def _learn(self, solved: Solved) -> None:
         """Take results in: they are known to everybody, and the best of its point is that point's."""
-        new = [each for each in found if each.usable]
+        for task, found in solved:
+            if found.iterate < 0:
+                self.visited.add(task, found, self.request.signs, TOLERATED)
+        new = [found for _, found in solved if found.usable]
         if new:
             self.known += new
             self.table = np.concatenate([self.table, [self._signed(each) for each in new]])
             self.beyond = np.concatenate([self.beyond, [_beyond(each) for each in new]])
         for each in new:
-            if each.point < 0:
+            if each.point < 0 or each.iterate >= 0:
                 continue
             before = self.best.get(each.point)
             if before is None or not before.usable:

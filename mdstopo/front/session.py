@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,10 @@ from mdstopo.front.content import Quality, begun_part, front_part, quality, read
 from mdstopo.front.jobs import Setting, perform
 from mdstopo.front.plan import Front, NoEndError, Planner, Request
 from mdstopo.front.pool import Here, Lost, Pool, Processes
-from mdstopo.front.tasks import Found, StoppedError, Task, case_key, failed
+from mdstopo.front.race import Result, Starts
+from mdstopo.front.tasks import Found, StoppedError, Task, failed, front_key
 from mdstopo.native.threads import cores
-from mdstopo.optimizer.starts import random_feasible
+from mdstopo.optimizer.starts import design_of_family
 from mdstopo.optimizer.state import State
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.combining import even
@@ -176,7 +178,7 @@ class _FrontRun:
         compile_apart(self.case, self.notify)
         self.planner = Planner(self.request())
         self.open(path)
-        self.setting = Setting(self.case, case_key(self.case))
+        self.setting = Setting(self.case, front_key(self.case))
         self.workers, self.cluster, self.worth = workers, cluster, worth
         self.saver = Checkpointer(lambda: self.checkpoint(path)) if path is not None else None
         front, status, reason = None, RunStatus.INTERRUPTED, "stopped on request; what is finished is saved"
@@ -219,12 +221,11 @@ class _FrontRun:
             self.notify(words)
         if not np.array_equal(stated, first):
             self.notify(replaced(stated, first))
-        more = [random_feasible(problem, self.case.optimizer.seed, k) for k in range(1, self.ask.starts)]
-        combine = self.case.combine
+        combine, chosen = self.case.combine, self.case.optimizer
+        starts = Starts(first, self.ask.starts, partial(design_of_family, problem, chosen.seed), chosen.tolerance)
         return Request(
             self.ask.directions, self.method, combine.exponent, combine.normalize,
-            np.array([sign_of(objective) for objective in self.case.objectives]), np.array([first, *more]),
-            self.case.optimizer.max_iterations,
+            np.array([sign_of(objective) for objective in self.case.objectives]), starts, chosen.max_iterations,
         )  # fmt: skip
 
     def work(self) -> Front:
@@ -238,10 +239,16 @@ class _FrontRun:
                 front: Front = end.value
                 return front
 
-    def round(self, tasks: Sequence[Task]) -> list[Found]:
-        """Results of a round, in order: those that are known, and the others solved."""
+    def round(self, tasks: Sequence[Task]) -> list[Result]:
+        """Results of a round, in order: those that are known, and the others solved, or as far as they are to go.
+
+        What the plan has decided about a state that a task comes with is kept with it.
+        """
         keys = [task.key(self.setting.case_key) for task in tasks]
-        due = [i for i, key in enumerate(keys) if key not in self.solved]
+        for key, task in zip(keys, tasks, strict=True):
+            if task.begun is not None and key not in self.solved:
+                self.begun[key] = task.begun
+        due = [i for i, key in enumerate(keys) if key not in self.solved and not self.has_come(tasks[i], key)]
         if due:
             if self.pool is None:
                 self.pool = self.choose_pool(tasks[due[0]])
@@ -251,12 +258,19 @@ class _FrontRun:
             for place, result in self.pool.results(jobs, lambda place, state: self.hold(keys[due[place]], state)):
                 i = due[place]
                 running.pop(i)
-                self.keep(keys[i], self.lost(tasks[i], result) if isinstance(result, Lost) else result, running)
+                if isinstance(result, State):
+                    self.hold(keys[i], result)
+                    self.tell(running)
+                else:
+                    self.keep(keys[i], self.lost(tasks[i], result) if isinstance(result, Lost) else result, running)
             if running:
                 raise StoppedError
-        for key in keys:
-            self.taken[key] = self.solved[key]
-        return [self.solved[key] for key in keys]
+        self.taken |= {key: self.solved[key] for key in keys if key in self.solved}
+        return [self.solved[key] if key in self.solved else self.begun[key] for key in keys]
+
+    def has_come(self, task: Task, key: str) -> bool:
+        """Whether a task that is left at its quota has been brought there."""
+        return task.quota is not None and key in self.begun and task.is_through(self.begun[key])
 
     def choose_pool(self, task: Task) -> Pool:
         """Who does the work: a cluster, this process, or others where a look at the task says that it is worth it."""
@@ -266,9 +280,10 @@ class _FrontRun:
             return Cluster(self.setting, self.stop, self.cluster)
         wanted = cores() if self.workers is None else self.workers
         if wanted > 1:
-            look = perform(self.setting, replace(task, iterations=LOOK, begun=None), self.stop)
-            left = look.seconds / max(look.evaluations, 1) * EVALUATIONS * TASKS * len(self.ask.directions)
-            left *= 1.0 - min(len(self.solved) / (TASKS * len(self.ask.directions)), 1.0)
+            short = replace(task, iterations=LOOK, softened=False, iterate=-1, begun=None, quota=None)
+            look = perform(self.setting, short, self.stop)
+            left = look.seconds / max(look.evaluations, 1) * EVALUATIONS * self.expected
+            left *= 1.0 - min(len(self.solved) / self.expected, 1.0)
             if left > self.worth:
                 return Processes(self.setting, self.stop, wanted)
         return Here(self.setting, self.stop)
@@ -295,10 +310,9 @@ class _FrontRun:
         """Progress."""
         done = list(self.solved.values())
         mean = sum(each.seconds for each in done) / len(done) if done else float("nan")
-        expected = TASKS * len(self.ask.directions)
         best: dict[int, Found] = dict(self.planner.best)
         for each in done:
-            if each.point >= 0 and each.usable:
+            if each.point >= 0 and each.usable and each.iterate < 0:
                 best.setdefault(each.point, each)
         at_once = self.pool.at_once if self.pool is not None else 1
         self.on_progress(
@@ -309,9 +323,14 @@ class _FrontRun:
                 tuple(sorted({point for point in list(running.values())[: at_once or None] if point >= 0})),
                 len(done),
                 sum(each.evaluations for each in done),
-                max(expected - len(done), len(running)) * mean / max(at_once, 1),
+                max(self.expected - len(done), len(running)) * mean / max(at_once, 1),
             )
         )
+
+    @property
+    def expected(self) -> float:
+        """How many tasks there will be, about."""
+        return (TASKS + self.ask.starts - 1) * len(self.ask.directions)
 
     # the file
 

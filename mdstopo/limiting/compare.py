@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.limiting.bounds import Bound, bounds
 from mdstopo.store.errors import StoreError
+from mdstopo.store.front import whole_front
 
 if TYPE_CHECKING:
     from mdstopo.store.reader import ResultView
@@ -70,9 +71,10 @@ def _best(case: Case, view: ResultView) -> dict[str, float | None]:
     if "iterations/objectives" in view.arrays:
         values, good = view.array("iterations/objectives"), _kept(case, view)
     elif "pareto/objectives" in view.arrays:
-        values = view.array("pareto/objectives")
-        good = np.asarray(view.array("pareto/violation"), dtype=np.float64) <= TOLERATED
-        good &= np.array([word != "failed" for word in view.lines("pareto/status")], dtype=np.bool_)
+        front = whole_front(view)
+        values = front["objectives"]
+        good = np.asarray(front["violation"], dtype=np.float64) <= TOLERATED
+        good &= np.array([word != "failed" for word in front["status"]], dtype=np.bool_)
     else:
         raise StoreError(f"{view.path}: was made by `{view.kind}`; bounds are compared with a run or a front")
     table = np.asarray(values, dtype=np.float64)

@@ -1,4 +1,4 @@
-"""The front: its points, what is dominated, every design that was visited, the ends."""
+"""The front: its points, what is dominated, every design that was visited, and those of them on the front."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from mdstopo.case.units import unit_of_value
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import COLOURS, WIDTH
 from mdstopo.store.errors import StoreError
+from mdstopo.store.front import whole_front
 
 #: points that a front may have to be numbered
 MOST_NUMBERED = 15
@@ -18,8 +19,10 @@ def draw(module: Any, source: Source, visited: bool = True, marked: int | None =
     arrays = source.view.arrays
     if "pareto/objectives" not in arrays:
         raise StoreError(f"{source.view.path}: has no front; `mdstopo pareto` makes one")
-    points = np.asarray(arrays["pareto/objectives"], dtype=np.float64)
-    dominated = np.asarray(arrays["pareto/dominated"], dtype=bool)
+    asked = len(arrays["pareto/objectives"])
+    whole = whole_front(source.view)
+    points = np.asarray(whole["objectives"], dtype=np.float64)
+    dominated = np.asarray(whole["dominated"], dtype=bool)
     objectives = list(source.case.objectives)
     m = len(objectives)
     pairs = [(i, j) for i in range(m) for j in range(i + 1, m)]
@@ -36,6 +39,9 @@ def draw(module: Any, source: Source, visited: bool = True, marked: int | None =
             axis.plot(*points[dominated][:, [i, j]].T, "x", color=COLOURS[1], markersize=4, label="dominated")
         order = np.argsort(good[:, i])
         axis.plot(*good[order][:, [i, j]].T, "o-" if m == 2 else "o", color=COLOURS[0], linewidth=0.6, label="front")
+        further = asked + np.flatnonzero(~dominated[asked:])
+        if len(further):
+            axis.plot(*points[further][:, [i, j]].T, "s", color=COLOURS[2], markersize=4, label="visited, on the front")
         if len(points) <= MOST_NUMBERED:
             for number in np.flatnonzero(~dominated & np.isfinite(points).all(axis=1)).tolist():
                 place = tuple(points[number, [i, j]])

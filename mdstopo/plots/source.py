@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.store.errors import StoreError
+from mdstopo.store.errors import DamagedError, StoreError
+from mdstopo.store.front import design_of, points_of
 from mdstopo.store.reader import ResultView, read_result
 from mdstopo.store.stored_case import case_of
 
@@ -62,14 +63,19 @@ class Source:
             return self.view.alpha
         if "pareto/alpha" not in arrays:
             raise StoreError(f"{self.view.path}: holds no design")
-        designs = np.asarray(arrays["pareto/alpha"], dtype=np.float64)
-        point = len(designs) // 2 if self._point is None else self._point
-        if not 0 <= point < len(designs):
-            raise StoreError(f"{self.view.path}: there is no point {point}; the front has 0 to {len(designs) - 1}")
-        if not np.isfinite(designs[point]).all():
-            raise StoreError(f"{self.view.path}: point {point} has no design")
-        chosen: Floats = designs[point]
+        found = design_of(self.view, self._shown)
+        if found is None:
+            last = points_of(self.view) - 1
+            raise StoreError(f"{self.view.path}: there is no point {self._shown}; the front has 0 to {last}")
+        chosen: Floats = np.asarray(found[0], dtype=np.float64)
+        if not np.isfinite(chosen).all():
+            raise StoreError(f"{self.view.path}: point {self._shown} has no design")
         return chosen
+
+    @property
+    def _shown(self) -> int:
+        """The point of a front that is shown: the one in the middle where none was asked for."""
+        return len(self.view.array("pareto/alpha")) // 2 if self._point is None else self._point
 
     @cached_property
     def design(self) -> Floats:
@@ -77,11 +83,15 @@ class Source:
         alpha = self.alpha
         if not self.case.variables:
             return alpha
-        front = "design/alpha" not in self.view.arrays
-        point = len(self.view.array("pareto/alpha")) // 2 if self._point is None and front else self._point
-        prefix = "pareto" if front else "design"
-        values = [self.view.array(f"{prefix}/variables/{each.name}") for each in self.case.variables]
-        return np.concatenate([alpha, *(each[point] if front else each for each in values)])
+        if "design/alpha" in self.view.arrays:
+            values = self.view.under("design/variables")
+        else:
+            found = design_of(self.view, self._shown)
+            values = {} if found is None else found[1]
+        for each in self.case.variables:
+            if each.name not in values:
+                raise DamagedError(f"{self.view.path}: damaged: it has no values of {each.name}")
+        return np.concatenate([alpha, *(values[each.name] for each in self.case.variables)])
 
     @property
     def load_cases(self) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from mdstopo.limiting.compare import compared
 from mdstopo.plots.scenery import outline, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.watch import points_at, response_history
+from mdstopo.store.front import whole_front
 
 Floats = NDArray[np.float64]
 
@@ -57,12 +58,14 @@ def content(source: Source) -> dict[str, Any]:
             "combined": _rounded(iterations["combined"]),
         }
     if "pareto/objectives" in view.arrays:
+        front = whole_front(view)
         page["front"] = {
-            "objectives": _rounded(view.arrays["pareto/objectives"]),
-            "weights": _rounded(view.arrays["pareto/weights"]),
-            "dominated": view.arrays["pareto/dominated"].tolist(),
-            "status": list(view.lines("pareto/status")),
-            "kkt": _rounded(view.arrays["pareto/kkt"], 2),
+            "objectives": _rounded(front["objectives"]),
+            "weights": _rounded(front["weights"]),
+            "dominated": front["dominated"].tolist(),
+            "status": front["status"],
+            "reason": front["reason"],
+            "kkt": _rounded(front["kkt"], 2),
         }
     return page
 
@@ -103,8 +106,9 @@ def _designs(source: Source) -> list[dict[str, Any]]:
     arrays = source.view.arrays
     if "pareto/alpha" not in arrays:
         return [_design(source, source.engine, source.design)]
-    values = [arrays[f"pareto/variables/{each.name}"] for each in source.case.variables]
-    designs = np.concatenate([arrays["pareto/alpha"], *values], axis=1).astype(np.float64)
+    front = whole_front(source.view)
+    values = [front[f"variables/{each.name}"] for each in source.case.variables]
+    designs = np.concatenate([front["alpha"], *values], axis=1).astype(np.float64)
     usable = [k for k in range(len(designs)) if np.isfinite(designs[k]).all()]
     chosen = set(usable[:: max(1, math.ceil(len(usable) / SIMULATED))])
     return [_design(source, source.engine, designs[k], k in chosen) if k in usable else {} for k in range(len(designs))]

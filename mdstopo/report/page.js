@@ -159,7 +159,7 @@
       const usable = Boolean(data.designs[j].members);
       const mark = element(c.svg, "circle", { cx: c.px(p[0]), cy: c.py(p[1]), r: 5, class: "point", tabindex: 0, role: "button", "data-point": j,
         fill: data.front.dominated[j] ? "#fff" : "#0072B2", stroke: data.front.dominated[j] ? "#D55E00" : "#0072B2" });
-      element(mark, "title", {}, `point ${j}: ${a.name} ${number(p[0])}, ${b.name} ${number(p[1])}; weights ${data.front.weights[j].map((w) => number(w, 3)).join(", ")}; ${data.front.status[j]}`);
+      element(mark, "title", {}, `point ${j}: ${a.name} ${number(p[0])}, ${b.name} ${number(p[1])}; ${data.front.status[j] === "visited" ? `visited, ${data.front.reason[j]}` : `weights ${data.front.weights[j].map((w) => number(w, 3)).join(", ")}; ${data.front.status[j]}`}`);
       const choose = () => { if (usable) { state.design = j; state.frame = 0; refresh(); } };
       mark.addEventListener("click", choose);
       mark.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); choose(); } });

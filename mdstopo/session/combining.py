@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.design_problem import sign_of
 from mdstopo.front.plan import NoEndError, Planner, Request
-from mdstopo.front.tasks import Found, StoppedError, Task, case_key, solve
+from mdstopo.front.race import Result, Starts
+from mdstopo.front.tasks import Found, StoppedError, Task, front_key, solve
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
@@ -81,16 +82,16 @@ class Combining:
             return Scalarisation(combine.method, weights, signs * self.utopia, signs * self.maxima, combine.exponent)
         active = tuple(np.flatnonzero(weights > 0.0).tolist())
         request = Request(
-            np.zeros((0, len(weights))), combine.method, combine.exponent, True, signs, first[None],
+            np.zeros((0, len(weights))), combine.method, combine.exponent, True, signs, Starts(first),
             case.optimizer.max_iterations, active,
         )  # fmt: skip
         planner = Planner(request)
         rounds = planner.ends_alone()
-        key_of_case = case_key(case)
+        key_of_case = front_key(case)
         try:
             tasks = next(rounds)
             while True:
-                found = []
+                found: list[Result] = []
                 for task in tasks:
                     key = task.key(key_of_case)
                     if key not in self.solved:
@@ -121,6 +122,7 @@ class Combining:
             keep()
 
         found = solve(engine, self.case, replace(task, begun=self.begun.get(key)), key, stop, hold)
+        assert isinstance(found, Found)  # no part of a task was asked for
         self.begun.pop(key, None)
         return found
 

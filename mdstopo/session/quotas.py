@@ -75,8 +75,8 @@ def carried_over(case: Case, states: States, before: int) -> States:
     """What a run of as many starts as there are `states` takes over from one of `before` starts.
 
     The end is to be that of a run that had so many starts from the beginning. So a start is taken over where that run
-    would have it in the same state: it began alike, and nobody has decided about it as yet. One that has gone beyond the
-    first quota begins again, as it may be dropped there now; what it was there is no longer known.
+    would have it in the same state: it began alike, and nobody has decided about it as yet. One that has gone beyond
+    the first quota begins again, as it may be dropped there now; what it was there is no longer known.
     """
     if before == len(states):
         return states

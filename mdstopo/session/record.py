@@ -32,10 +32,6 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
     """
     columns = state.history.to_arrays()
     rows = len(state.history)
-    constraints = columns.get("info/constraints")
-    if constraints is None:
-        signs = [-1.0 if row.sense == "at_least" else 1.0 for row in case.constraints if isinstance(row, VolumeRow)]
-        constraints = columns["constraints"].reshape(rows, len(signs)) * np.array(signs)
     # Where even the first evaluation failed, the engine has reported nothing.
     unknown = np.full((rows, len(case.objectives)), np.nan)
     objectives = np.array(columns.get("info/objectives", unknown), dtype=np.float64).reshape(rows, -1)
@@ -45,7 +41,7 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
     return stages | {
         "objectives": objectives,
         "peak_time": columns.get("info/peak_time", unknown).reshape(rows, -1),
-        "constraints": constraints,
+        "constraints": constraint_values(case, columns),
         "combined": columns["objective"],
         "change": columns["change"],
         "evaluations": columns["evaluations"] + before,
@@ -53,6 +49,15 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
         "kkt": columns["kkt"],
         "accepted": columns["accepted"],
     }
+
+
+def constraint_values(case: Case, columns: Mapping[str, Array]) -> Floats:
+    """h - h0 of all constraints (K + 1, n_con), in the case's order, from the columns of an optimiser's history."""
+    constraints = columns.get("info/constraints")
+    if constraints is None:
+        signs = [-1.0 if row.sense == "at_least" else 1.0 for row in case.constraints if isinstance(row, VolumeRow)]
+        constraints = columns["constraints"].reshape(len(columns["objective"]), len(signs)) * np.array(signs)
+    return np.asarray(constraints, dtype=np.float64)
 
 
 def best_row(state: State) -> int:

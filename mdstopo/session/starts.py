@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.presets import Settings, settings
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.projection import InfeasibleRows, project
 from mdstopo.optimizer.starts import SOFT_STRENGTH, Family, design_of_family
@@ -107,11 +107,11 @@ def run_start(
         first = own if first is None else first
         before = 0
         if task.family is Family.SOFTENED and hasattr(problem, "softened"):
-            soft = _soften(case, problem, first, stop)
+            soft = soften(optimizer.settings, problem, first, stop)
             if soft is None:
                 return None
             first, before = soft.best_alpha, soft.evaluations
-        state = _counted(optimizer.start(first), before)
+        state = counted(optimizer.start(first), before)
         keep(task.index, state)
     elif not state.dropped:
         state = optimizer.reopen(state)
@@ -130,9 +130,9 @@ def run_start(
     return run(optimizer, latest, on_iteration=reached, stop_requested=paused)
 
 
-def _soften(case: Case, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
+def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
     """The end of a short run with a quarter of the strengths; None where it was stopped."""
-    optimizer = make_optimizer(case, problem.softened(SOFT_STRENGTH))  # type: ignore[attr-defined]
+    optimizer = Gsao(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
     state = optimizer.start(first)
     while state.running and state.iteration < SOFT_ITERATIONS:
         if stop():
@@ -141,7 +141,7 @@ def _soften(case: Case, problem: Problem, first: Floats | None, stop: Stop) -> S
     return state
 
 
-def _counted(state: State, before: int) -> State:
+def counted(state: State, before: int) -> State:
     """A first state, behind so many evaluations of another problem."""
     if before:
         state.evaluations += before

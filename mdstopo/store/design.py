@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.store.errors import StoreError
+from mdstopo.store.front import design_of, points_of
 from mdstopo.store.reader import ResultView, read_result
 
 _NOT_NEEDED = ("trajectories", "sensitivities", "optimizer", "members", "pareto/tasks", "pareto/visited")
@@ -52,16 +53,19 @@ def with_values(
     point: of a front; None takes the best design of a run. parts: as of `read_design`. Raises StoreError where the file
     has only some of them, or others.
     """
-    prefix = "design" if point is None else "pareto"
-    own = {name: view.arrays.get(f"{prefix}/variables/{name}") for name in parts}
+    if point is None:
+        values = view.under("design/variables")
+    else:
+        found = design_of(view, point)
+        values = {} if found is None else found[1]
+    own = {name: values.get(name) for name in parts}
     if all(values is None for values in own.values()):
         return alpha
     pieces = [alpha]
     for name, part in parts.items():
-        values = own[name]
-        if values is None:
+        if own[name] is None:
             raise StoreError(f"{view.path}: it holds no values of the design variable {name}")
-        chosen = np.asarray(values if point is None else values[point], dtype=np.float64)
+        chosen = np.asarray(own[name], dtype=np.float64)
         if chosen.shape != (part.stop - part.start,):
             raise StoreError(
                 f"{view.path}: it holds {chosen.size} values of the design variable {name}; the case has "
@@ -133,7 +137,7 @@ def _read_text(path: Path) -> NDArray[np.float64]:
 def _read_h5(view: ResultView) -> NDArray[np.float64]:
     path = view.path
     if view.kind == "pareto":
-        last = len(view.array("pareto/alpha")) - 1
+        last = points_of(view) - 1
         raise StoreError(f"{path}: a front has several designs; write {path}:K with K from 0 to {last}")
     if "design/alpha" not in view.arrays:
         raise StoreError(f"{path}: this result of `{view.kind}` holds no design")
@@ -142,9 +146,9 @@ def _read_h5(view: ResultView) -> NDArray[np.float64]:
 
 def _read_front(view: ResultView, point: int) -> NDArray[np.float64]:
     path = view.path
-    designs = view.arrays.get("pareto/alpha")
-    if designs is None:
+    if "pareto/alpha" not in view.arrays:
         raise StoreError(f"{path}: a result of `{view.kind}` has no points")
-    if point >= len(designs):
-        raise StoreError(f"{path}: there is no point {point}; the front has 0 to {len(designs) - 1}")
-    return np.asarray(designs[point], dtype=np.float64)
+    found = design_of(view, point)
+    if found is None:
+        raise StoreError(f"{path}: there is no point {point}; the front has 0 to {points_of(view) - 1}")
+    return np.asarray(found[0], dtype=np.float64)

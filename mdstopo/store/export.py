@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case
+from mdstopo.store.front import whole_front
 from mdstopo.store.reader import ResultView
 
 Table = tuple[list[str], list[Sequence[Any]]]
@@ -24,9 +25,9 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
     iterations = view.under("iterations")
     if "combined" in iterations:
         found["iterations"] = _columns("iteration", iterations, {"objectives": names, "peak_time": names}, "combined")
-    front = {key: value for key, value in view.under("pareto").items() if "/" not in key}
-    if "objectives" in front:
-        texts = {key: view.lines(f"pareto/{key}") for key in ("status", "reason")}
+    if "pareto/objectives" in view.arrays:
+        front = {key: value for key, value in whole_front(view).items() if "/" not in key}
+        texts = {key: front.pop(key) for key in ("status", "reason")}
         front = {key: value for key, value in front.items() if key not in ("alpha", "ends", "ends_alpha")}
         front |= {key: np.array(value) for key, value in texts.items() if value}
         per_name = dict.fromkeys(("weights", "objectives", "utopia", "maxima"), names)
@@ -58,7 +59,7 @@ def _members(view: ResultView) -> Table:
     if "design/alpha" in view.arrays:
         extra["alpha"] = view.alpha
     if "pareto/alpha" in view.arrays:
-        extra |= {f"alpha_point_{k}": row for k, row in enumerate(view.arrays["pareto/alpha"])}
+        extra |= {f"alpha_point_{k}": row for k, row in enumerate(whole_front(view)["alpha"])}
     for path, array in view.under("sensitivities").items():
         if "history/" not in path and "variables" not in path.split("/")[:-1]:
             extra["dG/dalpha " + path.replace("/", " ")] = array

@@ -54,8 +54,10 @@ def labels(case: Case, datasets: Mapping[str, Value]) -> Labels:
         _trajectory(case, f"trajectories/{load_case.name}", datasets, found)
     _rows(case, "iterations", "iteration", "combined", datasets, found)
     _rows(case, "pareto", "point", "weights", datasets, found)
+    _rows(case, "pareto/further", "number", "objectives", datasets, found)
     units = ", ".join(dict.fromkeys(unit_of_value(objective) for objective in case.objectives))
-    for path in ("iterations/objectives", "pareto/objectives", "pareto/utopia", "pareto/maxima"):
+    raw = ("iterations/objectives", "pareto/objectives", "pareto/further/objectives", "pareto/utopia", "pareto/maxima")
+    for path in raw:
         if path in datasets:
             found.units[path] = units
     for path in ("iterations/peak_time", "iterations/seconds", "pareto/seconds"):

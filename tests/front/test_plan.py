@@ -8,6 +8,7 @@ import pytest
 from mdstopo.front.directions import lattice, weights_of_first
 from mdstopo.front.measures import neighbour_gaps
 from mdstopo.front.plan import NoEndError, Planner, Request
+from mdstopo.front.race import Starts
 from mdstopo.front.tasks import Found
 from mdstopo.status import RunStatus
 
@@ -45,7 +46,7 @@ def carried_out(request, solve):
 
 def request(directions, method, signs=None, start=(0.5,), **changes):
     m = directions.shape[1]
-    starts = np.array([start], dtype=np.float64)
+    starts = Starts(np.array(start, dtype=np.float64))
     values = {"exponent": 2.0, "normalize": True, "iterations": 10} | changes
     return Request(directions, method, signs=np.ones(m) if signs is None else signs, starts=starts, **values)
 
