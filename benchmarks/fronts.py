@@ -62,6 +62,7 @@ def fronts() -> Iterator[Table]:
             f"to {tuple(IDEAL.tolist())} and {tuple(NADIR.tolist())}, reference point {REFERENCE}); of the stiff "
             "variant (ten times the stiffness, volume at most 102) to that of nbi with 41 points and 4 starts, scaled "
             "to its ideal and the nadir of nbi with 21. "
+            "Designs that were visited and belong to the front count. "
             f"NSGA-II of pymoo has {POPULATION} designs, is moved onto the volume row, and computes no gradients. "
             "One process, from a cold start.",
         ),
@@ -154,4 +155,5 @@ def _even(count: int) -> Floats:
 
 def _points(outcome: FrontOutcome) -> Floats:
     assert outcome.front is not None, outcome.reason
-    return np.array([point.objectives for point in outcome.front.points if point is not None])
+    points = [point.objectives for point in outcome.front.points if point is not None]
+    return np.array([*points, *(each.objectives for each in outcome.front.further)])

@@ -240,7 +240,8 @@ class Planner:
         """What was visited and belongs to the front."""
         points = [self._signed(each) for each in self.best.values() if each.usable and not _beyond(each)]
         front = np.array(points).reshape(-1, self.m)
-        rows = belonging(front, self.visited.table, even_spacing(self.count, self.m))
+        spacing = even_spacing(self.count, self.m)
+        rows = belonging(front, self.visited.table, self.lowest, self.highest, spacing)
         places = [self.visited.places[row] for row in rows]
         solves = self.visited.solves
         yield from self._repeat(

@@ -70,30 +70,30 @@ def even_spacing(count: int, m: int) -> float:
     return math.sqrt(2.0) / parts
 
 
-def belonging(points: Floats, table: Floats, spacing: float) -> list[int]:
+def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, spacing: float) -> list[int]:
     """The rows of `table` (V, m) that belong to a front of `points` (W, m), in the order in which they are taken.
 
     First those that dominate a point, the best of them first (the least sum of scaled objectives), each in the place of
     all that it dominates. Then those that fill gaps: not dominated, and farther than `GAP` spacings from every point,
-    the farthest first, each a point from then on. Objectives are scaled to the best and the worst of the front.
+    the farthest first, each a point from then on. Objectives are scaled so that lowest and highest (m,), utopia and
+    maxima, are 0 and 1.
     """
     front = points[~dominated(points)]
     if not len(front):
         return []
-    ideal, nadir = front.min(axis=0), front.max(axis=0)
     left = [k for k in range(len(table)) if not _is_reached(table[k], front)]
     left = [left[k] for k in np.flatnonzero(~dominated(table[left])).tolist()]
     taken: list[int] = []
-    order = np.argsort(scaled(table[left], ideal, nadir).sum(axis=1), kind="stable").tolist()
+    order = np.argsort(scaled(table[left], lowest, highest).sum(axis=1), kind="stable").tolist()
     for k in (left[each] for each in order):
         beaten = dominated(np.concatenate([table[k][None], front]))[1:]
         if beaten.any():
             taken.append(k)
             front = np.concatenate([front[~beaten], table[k][None]])
     left = [k for k in left if k not in taken]
-    own = scaled(table[left], ideal, nadir)
+    own = scaled(table[left], lowest, highest)
     distance = np.full(len(left), np.inf)
-    for point in scaled(front, ideal, nadir):
+    for point in scaled(front, lowest, highest):
         distance = np.minimum(distance, np.linalg.norm(own - point, axis=1))
     while len(left) and distance.max() > GAP * spacing:
         k = int(np.argmax(distance))

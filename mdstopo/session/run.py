@@ -248,8 +248,8 @@ class _Run:
         again = [str(k + 1) for k in range(starts) if known[k] is not None and self.states[k] is None]
         if again:
             self.notify(
-                f"{view.path} had starts: {earlier}. With {starts} it is decided anew who goes on: "
-                f"{'starts' if len(again) > 1 else 'start'} {', '.join(again)} from the beginning"
+                f"{view.path} had {earlier} as the number of starts: with {starts} it is decided anew who goes on, "
+                f"from the beginning for {', '.join(again)}"
             )
         if any(state is not None for state in self.states) and "combine/utopia" in view.arrays:
             utopia, maxima = (

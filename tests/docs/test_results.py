@@ -74,11 +74,11 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "run windy.yaml",
         "run boat.yaml --alpha results/boat.simulate.h5 --out results/again.h5",
         "gradient boat.yaml --history --differences --members 2",
-        "pareto boat.yaml --points 2 --starts 1",
+        "pareto boat.yaml --points 3 --starts 1",
         "run varied.yaml",
         "run staged.yaml",
         "gradient varied.yaml --history --differences",
-        "pareto varied.yaml --points 2 --starts 1",
+        "pareto varied.yaml --points 4 --starts 1",
         "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
         "sweep set boat.yaml members.belts.law.stiffness=4000,5000 optimizer.max_iterations=1",
     ):

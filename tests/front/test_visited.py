@@ -10,14 +10,22 @@ import pytest
 
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
+from mdstopo.front import visited
 from mdstopo.front.directions import weights_of_first
 from mdstopo.front.measures import dominated, scaled
 from mdstopo.front.session import Ask, run_front
-from mdstopo.front.visited import GAP, belonging, even_spacing
+from mdstopo.front.visited import GAP, even_spacing
 from mdstopo.status import RunStatus
 from mdstopo.store.reader import read_result
 from tests.front.support import CASE
 from tests.front.test_plan import GRID, carried_out, convex, request, solver
+
+
+def belonging(points, table, spacing, width=1.0):
+    """That of a front from 0 to the width in every objective."""
+    nothing = np.zeros(table.shape[1])
+    return visited.belonging(points, table, nothing, nothing + width, spacing)
+
 
 LINE = np.array([[0.0, 1.0], [0.5, 0.5], [1.0, 0.0]])
 
@@ -58,7 +66,7 @@ def test_a_cloud_of_designs_does_not_flood_the_front() -> None:
 def test_points_of_other_scales_and_of_more_objectives_are_alike() -> None:
     scale = np.array([1e6, 1e-3])
     table = np.array([[0.25, 0.74], [0.6, 0.6]])
-    assert belonging(LINE * scale, table * scale, 0.3) == belonging(LINE, table, 0.3) == [0]
+    assert belonging(LINE * scale, table * scale, 0.3, scale) == belonging(LINE, table, 0.3) == [0]
     corners = np.eye(3)
     assert belonging(corners, np.array([[0.3, 0.3, 0.3], [0.2, 0.6, 0.2], [2.0, 1.0, 1.0]]), 0.5) == [0, 1]
 
@@ -96,17 +104,17 @@ def on_the_way(designs, solve=None, at=(0,)):
 
 
 def test_a_gap_between_weights_is_filled_by_what_was_visited() -> None:
-    """Two weights give two points far apart; a third solve has been between them."""
-    weights = weights_of_first([0.1, 0.9])
+    """Weights give points far apart; a solve has been between them."""
+    weights = weights_of_first([0.1, 0.15, 0.9])
     front, _ = carried_out(request(weights, "weighted_sum"), on_the_way([(0.8,), (0.5,), (0.88,)]))
     assert [each.alpha[0] for each in front.further] == [0.5]
     assert front.further[0].status == "visited"
     assert (front.further[0].point, front.further[0].iterate) == (0, 1)
-    assert [each.alpha[0] for each in front.points] == pytest.approx([0.9, 0.1], abs=1e-3)
+    assert [each.alpha[0] for each in front.points] == pytest.approx([0.9, 0.85, 0.1], abs=1e-3)
 
 
 def test_what_breaks_a_limit_fills_no_gap() -> None:
-    weights = weights_of_first([0.1, 0.9])
+    weights = weights_of_first([0.1, 0.15, 0.9])
     front, _ = carried_out(request(weights, "weighted_sum"), on_the_way([(0.5, 0.0)]))  # by on_the_way's marks
     assert front.further == ()
 
@@ -153,8 +161,7 @@ def test_no_visited_design_beats_the_front_or_lies_alone_in_a_gap_of_it(method: 
     beaten = dominated(front)
     flags = [view.arrays.get(f"pareto/{name}", np.zeros(0)) for name in ("dominated", "further/dominated")]
     assert np.array_equal(np.concatenate(flags), beaten)
-    points = view.array("pareto/objectives")
-    ideal, nadir = points.min(axis=0), points.max(axis=0)  # of five points that do not dominate each other
+    ideal, nadir = view.array("pareto/utopia")[0], view.array("pareto/maxima")[0]
     seen = everything_visited(view)
     assert not dominated(np.concatenate([front[~beaten], seen]))[: len(front[~beaten])].any()
     for values in seen[~dominated(seen)]:
