@@ -1,10 +1,9 @@
 """What to solve, in rounds that are fixed in advance: the same tasks from the same results, wherever they are solved.
 
-1. Each objective alone, from the first design (where more starts are asked for: from as many as a run would, in
-   quotas); then each again from where the others ended, and near its own best. The best are the ends; they give utopia
-   and maxima (the pay-off table, Eq. 24).
+1. Each objective alone, from the first design; then each again from where the others ended. The best are the ends; they
+   give utopia and maxima (the pay-off table, Eq. 24).
 2. The other points between solved ones, halving the gaps: each from the solved design that is best by its own U, and
-   from the neighbour on the other side; and from further starts, in quotas.
+   from the neighbour on the other side. Where more starts are asked for, they compete beside these, here and in 1.
 3. Exchange: whoever's U is lower at another point's design starts again from that, until nobody gains.
 4. With what has been found utopia and maxima are brought up to date. Every point goes on from its own design, where
    they changed, and from both neighbours'; and exchange again. Whoever's U is lower at a design that was only visited
@@ -138,8 +137,8 @@ class Planner:
         starts = self.request.starts
         own = starts.count - 1 if starts.has_neighbour else starts.count
         alone = {i: Task(-1 - i, self._alone(i), starts.first, self.request.iterations) for i in self.active}
-        contests = [rivals([starts.begin(alone[i], k, k) for k in range(own)]) for i in self.active]
-        solved = yield from self._solve([], contests)
+        contests = [rivals([starts.begin(alone[i], k, k) for k in range(1, own)]) for i in self.active]
+        solved = yield from self._solve(self._new(list(alone.values())), contests)
         self._choose_ends([found for _, found in solved])
         crossed = [
             replace(alone[i], start=other.alpha)
