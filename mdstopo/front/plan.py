@@ -135,9 +135,9 @@ class Planner:
 
     def _ends(self) -> Part:
         starts = self.request.starts
-        own = starts.count - 1 if starts.has_neighbour else starts.count
+        early = starts.early
         alone = {i: Task(-1 - i, self._alone(i), starts.first, self.request.iterations) for i in self.active}
-        contests = [rivals([starts.begin(alone[i], k, k) for k in range(1, own)]) for i in self.active]
+        contests = [rivals([starts.begin(alone[i], k, k) for k in range(1, early)]) for i in self.active]
         solved = yield from self._solve(self._new(list(alone.values())), contests)
         self._choose_ends([found for _, found in solved])
         crossed = [
@@ -146,8 +146,8 @@ class Planner:
             for k, other in enumerate(self.ends)
             if k != i and k in self.active
         ]
-        if starts.has_neighbour:
-            crossed += [starts.begin(alone[i], own, own, self.ends[i].alpha) for i in self.active]
+        late = range(early, starts.count)
+        crossed += [starts.begin(alone[i], k, k, self.ends[i].alpha) for i in self.active for k in late]
         yield from self._solve(self._new(crossed))
         self._moves(0.0)
 

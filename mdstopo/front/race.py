@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.front.tasks import Found, Task
-from mdstopo.optimizer.starts import Family, family_of
+from mdstopo.optimizer.starts import Family, begins_at_best, family_of
 from mdstopo.optimizer.state import State
 from mdstopo.session.callbacks import ignore_state
 from mdstopo.session.quotas import QUOTAS, drop
@@ -38,9 +38,9 @@ class Starts:
     tolerance: float = 0.0
 
     @property
-    def has_neighbour(self) -> bool:
-        """Whether the last start begins near the best design."""
-        return family_of(self.count - 1, self.count) is Family.NEIGHBOUR
+    def early(self) -> int:
+        """How many starts there are before those that begin at the best design of the others."""
+        return sum(not begins_at_best(family_of(index, self.count)) for index in range(self.count))
 
     def begin(self, task: Task, index: int, number: int, best: Floats | None = None) -> Task:
         """The task from start `index`, with the design of that number of its family."""

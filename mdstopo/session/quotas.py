@@ -39,7 +39,8 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     late = [index for index in range(count) if begins_at_best(families[index])]
     early = [index for index in range(count) if index not in late]
     yield [StartTask(index, families[index], QUOTAS[0]) for index in early]
-    best = states[best_run(states, case.optimizer.tolerance)]
+    # of the others alone: a resumed run may have begun some of these, and must begin the rest as it would have
+    best = states[best_run([states[index] for index in early], case.optimizer.tolerance)]
     for index in late:
         yield [StartTask(index, families[index], QUOTAS[0], None if best is None else best.best_alpha)]
     for quota, following in zip(QUOTAS, (*QUOTAS[1:], None), strict=True):

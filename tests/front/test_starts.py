@@ -16,7 +16,7 @@ from mdstopo.front.tasks import Task, failed
 from mdstopo.optimizer.driver import Gsao
 from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.scalarisation import Scalarisation
-from mdstopo.optimizer.starts import Family
+from mdstopo.optimizer.starts import Family, begins_at_best, family_of
 from mdstopo.optimizer.state import State
 from mdstopo.status import RunStatus
 from mdstopo.store.reader import read_result
@@ -129,7 +129,7 @@ def test_ends_and_gaps_begin_from_the_families_of_a_run() -> None:
         drawn.append((number, family, float("nan") if best is None else float(best[0])))
         return None if family in (Family.STATED, Family.SOFTENED) else np.array([0.1 * (len(drawn) % 9)])
 
-    starts = Starts(np.array([0.5]), 5, draw)
+    starts = Starts(np.array([0.5]), 6, draw)
     weights = weights_of_first([0.0, 0.5, 1.0])
     request = Request(weights, "weighted_sum", 2.0, True, np.ones(2), starts, 10)
     solve = solver(convex, np.linspace(0.0, 1.0, 401)[:, None])
@@ -140,11 +140,13 @@ def test_ends_and_gaps_begin_from_the_families_of_a_run() -> None:
         return solve(task)
 
     front, _ = carried_out(request, noted)
-    turns = [Family.SOFTENED, Family.RANDOM, Family.SPARSE]
-    assert [family for _, family, _ in drawn] == [*turns, *turns, *[Family.NEIGHBOUR] * 2, *turns, Family.NEIGHBOUR]
-    ends = [(number, best) for number, family, best in drawn if family is Family.NEIGHBOUR]
-    assert ends[:2] == [(4, 0.0), (4, 1.0)]  # near the best of each objective
-    assert [number for number, _, _ in drawn[8:]] == [11, 12, 13, 14]  # other designs than at other points
+    families = [family_of(index, 6) for index in range(6)]
+    early, late = families[1:4], families[4:]
+    assert [begins_at_best(family) for family in families] == [False] * 4 + [True] * 2
+    assert [family for _, family, _ in drawn] == [*early, *early, *late, *late, *early, *late]
+    # at the best of each objective, when that is known; at a point between at the best there, other designs than there
+    assert [(number, best) for number, _, best in drawn[6:10]] == [(4, 0.0), (5, 0.0), (4, 1.0), (5, 1.0)]
+    assert [number for number, _, _ in drawn[10:]] == [13, 14, 15, 16, 17]
     softened = [task.point for task in asked if task.softened and task.quota == QUOTAS[0]]
     assert softened == [-1, -2, 1]
     first = [task.point for task in asked[:2] if task.quota is None and task.start[0] == 0.5]
@@ -176,7 +178,7 @@ def test_starts_are_dropped_at_quotas_and_the_best_go_on(whole: Path) -> None:
     assert "pareto/tasks/begun/0/key" not in view.texts
 
 
-@pytest.mark.parametrize("asked", [3, 20, 35, 50, 65, 80, 95, 117])
+@pytest.mark.parametrize("asked", [3, 15, 28, 41, 54, 67, 80, 92])
 def test_a_front_with_several_starts_ends_the_same_wherever_it_was_stopped(asked: int, whole: Path) -> None:
     case, ask, path = read_case(CASE), Ask(spread(3), starts=STARTS), Path("parts.h5")
     assert run_front(case, ask, path=path, workers=1, stop_requested=after(asked)).status == "interrupted"

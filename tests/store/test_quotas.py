@@ -7,7 +7,7 @@ import pytest
 from fakes import FakeEngineWithEvaluations, hand_made_case, limited
 
 from mdstopo.optimizer.state import State
-from mdstopo.session.quotas import QUOTAS, drop
+from mdstopo.session.quotas import QUOTAS, drop, rounds
 from mdstopo.session.starts import make_optimizer
 from mdstopo.status import RunStatus
 
@@ -44,3 +44,14 @@ def test_what_one_start_finds_afterwards_does_not_change_who_goes_on(first: Stat
     ended = at(first, QUOTAS[0] + 9, 0.01, RunStatus.CONVERGED)
     states: list[State | None] = [ended, at(first, QUOTAS[0], 0.11), None]
     assert decided(states) == [False, False, False]
+
+
+def test_starts_that_begin_at_the_best_do_so_at_that_of_the_others_also_when_resumed(first: State) -> None:
+    """Six starts, the last two from the best: one of these had begun when the run was stopped, and found better."""
+    case = limited(hand_made_case(), 60)
+    early: list[State | None] = [at(first, QUOTAS[0], value) for value in (0.3, 0.1, 0.2, 0.4)]
+    for late in (None, at(first, QUOTAS[0], 0.01)):
+        going = rounds(case, [*early, late, None], lambda index, state: None)
+        tasks = [next(going)[0] for _ in range(3)][1:]
+        assert [task.index for task in tasks] == [4, 5]
+        assert all(task.best is not None and task.best[0] == 0.1 for task in tasks)

@@ -99,7 +99,7 @@ def test_starts_that_a_run_with_more_of_them_would_have_alike_are_taken_over(tmp
     found = quotas.carried_over(case, [*old, *[None] * 4], 4)
     for index, (before, after) in enumerate(zip(old, found, strict=False)):
         assert before is not None
-        kept = before.iteration <= quotas.QUOTAS[0] and index < 3  # the fourth of four was a neighbour of the best
+        kept = before.iteration <= quotas.QUOTAS[0] and index < 3  # the fourth of four began at the best of the others
         assert (after is not None) == kept
         assert after is None or (after.running and after.alpha.tobytes() == before.alpha.tobytes())
     assert any(each is not None for each in found)
