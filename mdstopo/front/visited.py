@@ -19,8 +19,9 @@ Floats = NDArray[np.float64]
 #: a design: the number of its solve, and which of its rows
 Place = tuple[int, int]
 
-#: distance to the nearest point of the front from which a visited design fills a gap, in spacings of an even front
-GAP = 0.5
+#: distance from every point of the front from which a visited design fills a gap, in spacings of an even front; share of
+#: its distance by which it has to be better than each of them in something, lest it lie on the upper side of the gap
+GAP, SLIVER = 0.5, 0.1
 
 
 @dataclass(frozen=True)
@@ -74,9 +75,9 @@ def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, sp
     """The rows of `table` (V, m) that belong to a front of `points` (W, m), in the order in which they are taken.
 
     First those that dominate a point, the best of them first (the least sum of scaled objectives), each in the place of
-    all that it dominates. Then those that fill gaps: not dominated, and farther than `GAP` spacings from every point,
-    the farthest first, each a point from then on. Objectives are scaled so that lowest and highest (m,), utopia and
-    maxima, are 0 and 1.
+    all that it dominates. Then those that fill gaps: not dominated, and farther than `GAP` spacings from every point
+    (`_apart`), the farthest first, each a point from then on. Objectives are scaled so that lowest and highest (m,),
+    utopia and maxima, are 0 and 1.
     """
     front = points[~dominated(points)]
     if not len(front):
@@ -92,14 +93,24 @@ def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, sp
             front = np.concatenate([front[~beaten], table[k][None]])
     left = [k for k in left if k not in taken]
     own = scaled(table[left], lowest, highest)
-    distance = np.full(len(left), np.inf)
+    apart = np.full(len(left), np.inf)
     for point in scaled(front, lowest, highest):
-        distance = np.minimum(distance, np.linalg.norm(own - point, axis=1))
-    while len(left) and distance.max() > GAP * spacing:
-        k = int(np.argmax(distance))
+        apart = np.minimum(apart, _apart(own, point))
+    while len(left) and apart.max() > GAP * spacing:
+        k = int(np.argmax(apart))
         taken.append(left[k])
-        distance = np.minimum(distance, np.linalg.norm(own - own[k], axis=1))
+        apart = np.minimum(apart, _apart(own, own[k]))
     return taken
+
+
+def _apart(designs: Floats, point: Floats) -> Floats:
+    """The distance (K,) of designs (K, m) from a point, 0 where the point dominates them but for a sliver.
+
+    By how much the point would have to be better in every objective to be as good is the additive epsilon indicator
+    (E. Zitzler et al., Performance assessment of multiobjective optimizers, 2003).
+    """
+    distance = np.linalg.norm(designs - point, axis=1)
+    return np.asarray(np.where((point - designs).max(axis=1) >= SLIVER * distance, distance, 0.0))
 
 
 def _is_reached(values: Floats, front: Floats) -> bool:
