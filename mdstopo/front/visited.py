@@ -19,8 +19,8 @@ Floats = NDArray[np.float64]
 #: a design: the number of its solve, and which of its rows
 Place = tuple[int, int]
 
-#: distance from every point of the front from which a visited design fills a gap, in spacings of an even front; share of
-#: its distance by which it has to be better than each of them in something, lest it lie on the upper side of the gap
+#: distance from every point of the front from which a visited design fills a gap, in spacings of an even front; share
+#: of its distance by which it has to be better than each of them in something, lest it lie on the gap's upper side
 GAP, SLIVER = 0.5, 0.1
 
 
