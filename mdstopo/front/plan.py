@@ -13,7 +13,7 @@
 Designs that violate constraints come after all that do not, whatever their U, and are no ends.
 """
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -21,15 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.front.measures import dominated
-from mdstopo.front.race import Result, Solved, Starts, race, rivals
-from mdstopo.front.tasks import Found, Task
+from mdstopo.front.race import Solved, race, rivals
+from mdstopo.front.tasks import Found, Result, Task
 from mdstopo.front.visited import Place, Visited, belonging, even_spacing
 from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.optimizer.starts import Family, begins_at_best, family_of
 from mdstopo.status import RunStatus
 
 Floats = NDArray[np.float64]
 Rounds = Generator[list[Task], list[Result], "Front"]
 Part = Generator[list[Task], list[Result], None]
+#: a design of a family: number, family, the best design so far; None for the first design
+Draw = Callable[[int, Family, Floats | None], Floats | None]
 
 #: rounds of exchange at most; gain by which another's design is better, relative to U (to the violation)
 EXCHANGES, GAIN, LESS = 6, 1e-6, 1e-3
@@ -44,6 +47,31 @@ TOLERATED = 1e-6
 #: methods that weigh, and those that spread points evenly
 WEIGHING = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product")
 SPREADING = ("nbi", "nc")
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where solves begin. first (N,): the case's design; count: of each solve, draw: makes the designs of the others.
+
+    tolerance: of violations, where starts are compared.
+    """
+
+    first: Floats
+    count: int = 1
+    draw: Draw | None = None
+    tolerance: float = 0.0
+
+    @property
+    def early(self) -> int:
+        """How many starts there are before those that begin at the best design of the others."""
+        return sum(not begins_at_best(family_of(index, self.count)) for index in range(self.count))
+
+    def begin(self, task: Task, index: int, number: int, best: Floats | None = None) -> Task:
+        """The task from start `index`, with the design of that number of its family."""
+        family = family_of(index, self.count)
+        own = self.draw(number, family, best) if self.draw is not None else None
+        start = self.first if own is None else own
+        return replace(task, start=start, softened=family is Family.SOFTENED)
 
 
 @dataclass(frozen=True)

@@ -6,48 +6,17 @@ with what was decided about them, so a front that was stopped goes on with the s
 """
 
 import hashlib
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Generator, Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from mdstopo.front.tasks import Found, Task
-from mdstopo.optimizer.starts import Family, begins_at_best, family_of
+from mdstopo.front.tasks import Found, Result, Task
 from mdstopo.optimizer.state import State
 from mdstopo.session.callbacks import ignore_state
 from mdstopo.session.quotas import QUOTAS, drop
 
-Floats = NDArray[np.float64]
-Result = Found | State
 Solved = list[tuple[Task, Found]]
-#: a design of a family: number, family, the best design so far; None for the first design
-Draw = Callable[[int, Family, Floats | None], Floats | None]
-
-
-@dataclass(frozen=True)
-class Starts:
-    """Where solves begin. first (N,): the case's design; count: of each solve, draw: makes the designs of the others.
-
-    tolerance: of violations, where starts are compared.
-    """
-
-    first: Floats
-    count: int = 1
-    draw: Draw | None = None
-    tolerance: float = 0.0
-
-    @property
-    def early(self) -> int:
-        """How many starts there are before those that begin at the best design of the others."""
-        return sum(not begins_at_best(family_of(index, self.count)) for index in range(self.count))
-
-    def begin(self, task: Task, index: int, number: int, best: Floats | None = None) -> Task:
-        """The task from start `index`, with the design of that number of its family."""
-        family = family_of(index, self.count)
-        own = self.draw(number, family, best) if self.draw is not None else None
-        start = self.first if own is None else own
-        return replace(task, start=start, softened=family is Family.SOFTENED)
 
 
 def rivals(tasks: Sequence[Task]) -> list[Task]:

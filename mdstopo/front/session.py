@@ -15,10 +15,9 @@ from mdstopo.case.model import Case
 from mdstopo.design_problem import sign_of
 from mdstopo.front.content import Quality, begun_part, front_part, quality, read_begun, read_tasks, tasks_part
 from mdstopo.front.jobs import Setting, perform
-from mdstopo.front.plan import Front, NoEndError, Planner, Request
+from mdstopo.front.plan import Front, NoEndError, Planner, Request, Starts
 from mdstopo.front.pool import Here, Lost, Pool, Processes
-from mdstopo.front.race import Result, Starts
-from mdstopo.front.tasks import Found, StoppedError, Task, failed, front_key
+from mdstopo.front.tasks import Found, Result, StoppedError, Task, failed, front_key
 from mdstopo.native.threads import cores
 from mdstopo.optimizer.starts import design_of_family
 from mdstopo.optimizer.state import State

@@ -102,6 +102,10 @@ class Found:
         return bool(np.isfinite(self.objectives).all())
 
 
+#: of a task: what it has found, or of a part of it the state that it ends with
+Result = Found | State
+
+
 def case_key(case: Case) -> str:
     """The hash of a case and of what else decides: the version, the tolerance, the settings of the optimiser."""
     return hashlib.blake2b(f"{__version__}\n{describe(case)}".encode(), digest_size=16).hexdigest()
@@ -132,7 +136,7 @@ def solve(
     key: str,
     stop: Callable[[], bool] | None = None,
     keep: Callable[[State], None] | None = None,
-) -> Found | State:
+) -> Result:
     """Run the task to its end, or a part of it. Never raises because of a design: a failure is a status.
 
     keep: is given every state, from which the task could go on. Returns the state with which a part ends. Raises

@@ -8,9 +8,8 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.design_problem import sign_of
-from mdstopo.front.plan import NoEndError, Planner, Request
-from mdstopo.front.race import Result, Starts
-from mdstopo.front.tasks import Found, StoppedError, Task, front_key, solve
+from mdstopo.front.plan import NoEndError, Planner, Request, Starts
+from mdstopo.front.tasks import Found, Result, StoppedError, Task, front_key, solve
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State

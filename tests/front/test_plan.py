@@ -7,8 +7,7 @@ import pytest
 
 from mdstopo.front.directions import lattice, weights_of_first
 from mdstopo.front.measures import neighbour_gaps
-from mdstopo.front.plan import NoEndError, Planner, Request
-from mdstopo.front.race import Starts
+from mdstopo.front.plan import NoEndError, Planner, Request, Starts
 from mdstopo.front.tasks import Found
 from mdstopo.status import RunStatus
 

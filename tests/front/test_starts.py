@@ -9,8 +9,8 @@ import pytest
 from mdstopo.case.reader import read_case
 from mdstopo.front import race as races
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.plan import Planner, Request
-from mdstopo.front.race import Starts, race, rivals
+from mdstopo.front.plan import Planner, Request, Starts
+from mdstopo.front.race import race, rivals
 from mdstopo.front.session import Ask, run_front
 from mdstopo.front.tasks import Task, failed
 from mdstopo.optimizer.driver import Gsao
