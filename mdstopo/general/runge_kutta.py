@@ -8,6 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.contact import friction_error
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale
@@ -251,6 +252,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model, np.bool_(True))
+    rubbing = model.contact_pair.shape[0] > 0
     if switching:
         singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
@@ -361,6 +363,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             error = _error(table[2], s, h, a, weight)
             if crosses(h, way):
                 error = error_along(model, desk, table[2], s, h, a, weight, error, sigma_end)
+            if rubbing:
+                copy_vector(q0, left[0])
+                copy_vector(v0, left[1])
+                grip = friction_error(model, strength, table[2], s, h, left, ends, a, noise, tolerance)
+                if grip > error or not np.isfinite(grip):
+                    error = grip
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
