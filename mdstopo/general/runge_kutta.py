@@ -308,6 +308,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     track.index[0, 0] = 0
     count = np.int64(0)
     stages = np.int64(0)
+    longest = 0.0
     crowd_time = t
     crowd = 0
     for segment in range(times.shape[0] - 1):
@@ -360,7 +361,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             relative_pose(pair, ends[0], ends[1], rel)
             motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
-            error = _error(table[2], s, h, a, weight)
+            error = _error(table[2], s, h, longest, a, weight)
             if crosses(h, way):
                 error = error_along(model, desk, table[2], s, h, a, weight, error, sigma_end)
             if rubbing:
@@ -476,6 +477,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 where[1] = meeting(model, segment, t, strength, before, rel)
             happened = events
             t = end if lands else t + h
+            longest = max(longest, h)
             for d in range(n):
                 q0[d] = ends[0, d]
                 v0[d] = ends[1, d]
