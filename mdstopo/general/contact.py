@@ -16,19 +16,10 @@ from mdstopo.general.members import rate_of_row
 from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import (
     CLOSED,
-    MU,
-    SLIP,
-    C,
-    K,
     contact_force,
     contact_margin_slopes,
     contact_next,
 )
-
-#: a step this long, relative to the time in which friction brakes by `slip`, has no error but that of rounding
-SETTLED = 0.1
-#: what rounding leaves of a velocity, relative to its parts
-ROUNDING = 1e-15
 
 
 @kernel
@@ -154,58 +145,3 @@ def contact_switch(model, strength, q, v, a, j, slopes):  # type: ignore[no-unty
     bend = 2.0 * abs(by_height * second)
     beyond = speed * speed / bend if by_rise == 0.0 and bend > 0.0 else np.inf
     return contact_next(c, along, height, rise, second, mode), beyond
-
-
-@kernel
-def friction_error(model, strength, vectors, s, h, start, ends, a, noise, tolerance):  # type: ignore[no-untyped-def]
-    """Estimated error of a step's sliding velocities relative to `slip`, the largest of all contacts that drag.
-
-    Friction follows the velocity within slip m / (mu N), in which nothing moves far: the error of displacements does
-    not see whether a contact creeps as it should. What counts is the error of T / (mu N) = tanh(slide / slip), of which
-    1 / (slip (1 + (slide / slip)^2)) is the slope and more, taken where the step is slowest.
-
-    vectors, s, a (s, n): of the method and the step of length h; start, ends (2, n): its states; noise (n_pair,): of
-    relative positions, m; tolerance: of a step. NaN where one appears.
-    """
-    first = model.member.shape[1]
-    rows = np.empty((2, 6))
-    rates = np.empty((2, 6))
-    worst = 0.0
-    for j in range(model.contact_pair.shape[0]):
-        c = model.contact[j]
-        if int(strength[1, first + j]) != CLOSED or c[MU] == 0.0:
-            continue
-        p = model.contact_pair[j]
-        _, height = contact_rows(model, j, start[0], start[1], rows, rates)
-        slide = rate_of_row(model, p, rows[0], start[1])
-        normal = -c[K] * height - c[C] * rate_of_row(model, p, rows[1], start[1])
-        contact_rows(model, j, ends[0], ends[1], rows, rates)
-        after = rate_of_row(model, p, rows[0], ends[1])
-        slow = min(abs(slide), abs(after)) if slide * after > 0.0 else 0.0
-        fine = 0.0
-        coarse = 0.0
-        parts = 0.0
-        rising = 0.0
-        mobility = 0.0
-        for r in range(6):
-            d = 3 * model.pair[p, r // 3] + r % 3
-            if model.free[d] != 0:
-                mobility += rows[0, r] * rows[0, r] / model.mass[d]
-            parts += abs(rows[0, r] * ends[1, d])
-            rising += abs(rows[1, r] * ends[1, d])
-            for i in range(s):
-                fine += rows[0, r] * vectors[4, i] * a[i, d]
-                coarse += rows[0, r] * vectors[6, i] * a[i, d]
-        brake = c[MU] * mobility * h
-        if not brake * abs(normal) > SETTLED * c[SLIP]:
-            continue
-        rounded = ROUNDING * parts + brake * (c[K] * noise[p] + c[C] * ROUNDING * rising)
-        scale = max(c[SLIP] + slow * slow / c[SLIP], rounded / tolerance)
-        fine = h * abs(fine) / scale
-        coarse = h * abs(coarse) / scale
-        if not np.isfinite(fine):
-            return np.nan
-        if fine > 0.0:
-            fine = fine * fine / np.sqrt(fine * fine + 0.01 * coarse * coarse)
-        worst = max(worst, fine)
-    return worst

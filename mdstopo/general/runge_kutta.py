@@ -8,7 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.contact import friction_error
+from mdstopo.general.braking import BRAKED, brake_rate, friction_error
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale
@@ -253,6 +253,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model, np.bool_(True))
     rubbing = model.contact_pair.shape[0] > 0
+    brake = 0.0  # the rate at which contacts brake, and the one that does most
+    braking = -1
     if switching:
         singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
@@ -304,6 +306,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             model, strength, times[1], q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q[0], v[0], a[0],
             work,
         )  # fmt: skip
+    if rubbing and not fixed_step > 0.0:
+        brake, braking = brake_rate(model, strength, q0, v0, BRAKED / wanted, desk)
     keep_state(track, 0, t, q0, v0, push[0], push[1])
     track.index[0, 0] = 0
     count = np.int64(0)
@@ -330,6 +334,10 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     track.salt[e] = 0.0  # the time is given
                     track.kept[e, 2] = 0.0
         while t < end:
+            where[0] = -1
+            if wanted * brake > BRAKED:
+                wanted = BRAKED / brake
+                where[0] = braking
             if count >= limits[0]:
                 return STEP_LIMIT, count, events, t
             pieces = np.ceil((end - t) / wanted - 1e-9)
@@ -503,5 +511,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 if crowd > CHATTER:
                     where[0] = who
                     return CHATTERING, count, events, t
+            if rubbing and not fixed_step > 0.0:
+                brake, braking = brake_rate(model, strength, q0, v0, BRAKED / wanted, desk)
             track.index[count, 3] = events
     return OK, count, events, t
