@@ -1,8 +1,8 @@
 """Friction in explicit steps: what velocities are off by, and how long a step that brakes may be.
 
-Where a contact slides no faster than about its `slip`, friction brakes it within slip m / (mu N): a time in which nothing
-moves far. Errors of displacements do not see whether such a contact creeps as it should, and an explicit method is at
-the limit of its stability there.
+Where a contact slides no faster than about its `slip`, friction brakes it within slip m / (mu N): a time in which
+nothing moves far. Errors of displacements do not see whether such a contact creeps as it should, and an explicit
+method is at the limit of its stability there.
 """
 
 import numpy as np
@@ -23,14 +23,14 @@ BRAKED = 5.0
 
 
 @kernel
-def friction_error(model, strength, vectors, s, h, start, ends, a, noise, tolerance):  # type: ignore[no-untyped-def]
+def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken, tolerance):  # type: ignore[no-untyped-def]
     """Estimated error of a step's sliding velocities relative to `slip`, the largest of all contacts that drag.
 
     What counts is the error of T / (mu N) = tanh(slide / slip), of which 1 / (slip (1 + (slide / slip)^2)) is the slope
     and more, taken where the step is slowest.
 
     vectors, s, a (s, n): of the method and the step of length h; start, ends (2, n): its states; noise (n_pair,): of
-    relative positions, m; tolerance: of a step. NaN where one appears.
+    relative positions, m; shaken: of the members' forces, N; tolerance: of a step. NaN where one appears.
     """
     first = model.member.shape[1]
     rows = np.empty((2, 6))
@@ -64,7 +64,7 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, tolera
         brake = c[MU] * mobility * h
         if not brake * abs(normal) > SETTLED * c[SLIP]:
             continue
-        rounded = ROUNDING * parts + brake * (c[K] * noise[p] + c[C] * ROUNDING * rising)
+        rounded = ROUNDING * parts + brake * (c[K] * noise[p] + c[C] * ROUNDING * rising) + mobility * h * shaken
         scale = max(c[SLIP] + slow * slow / c[SLIP], rounded / tolerance)
         fine = h * abs(fine) / scale
         coarse = h * abs(coarse) / scale

@@ -275,9 +275,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
+    shaken = 0.0
     for p in range(n_pair):
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
         stiffness = desk.sums[p, 7] + desk.sums[p, 11]
+        shaken += abs(stiffness) * noise[p]
         if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
             motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)  # a pair that starts strained
     # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0
@@ -375,7 +377,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if rubbing:
                 copy_vector(q0, left[0])
                 copy_vector(v0, left[1])
-                grip = friction_error(model, strength, table[2], s, h, left, ends, a, noise, tolerance)
+                grip = friction_error(model, strength, table[2], s, h, left, ends, a, noise, shaken, tolerance)
                 if grip > error or not np.isfinite(grip):
                     error = grip
             finite = True

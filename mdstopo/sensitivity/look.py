@@ -4,10 +4,12 @@
 method; its tag.
 """
 
+import math
+
 import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
-from mdstopo.integrators.steps import FORCES, SPRINGS, carve, deflection, solved_to, step_at
+from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, carve, deflection, solved_to, step_at
 from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
@@ -15,8 +17,13 @@ from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative
 from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
+from mdstopo.scene.model import DESIGN, L0, PAIR, PX, PY, QX, QY, START, STOP
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
+
+#: share of the largest stored energy that rounding of lengths may make up, where the tolerance is not larger; and the
+#: roundings from which on an elongation is one: below that a member may as well be as long as at the start
+VISIBLE, ELONGATED = 1e-5, 100.0
 
 
 @entry
@@ -45,7 +52,7 @@ def look(  # type: ignore[no-untyped-def]
     """Every objective of the load case, from the steps that `simulate` left in room.
 
     In: reductions (n_obj,); room: padded (R, M_padded). Out: rows (n_obj, R, 4) time, value, step, fraction; found
-    (n_obj,); gradients (n_obj, R, N); meeting (2,), see `find_meeting`.
+    (n_obj,); gradients (n_obj, R, N); meeting (3,), see `find_meeting` and `find_unresolved`.
     """
     model = unpack(ints, floats)
     motion, own, left = carrying(model, strength, np.bool_(False))
@@ -56,6 +63,7 @@ def look(  # type: ignore[no-untyped-def]
     for i in range(pose.shape[0]):
         relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], pose[i])
     find_meeting(model, strength, steps, count, pose, meeting)
+    find_unresolved(model, strength, steps, count, pose, max(VISIBLE, settings[0]), meeting)
     accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
@@ -70,7 +78,7 @@ def look(  # type: ignore[no-untyped-def]
 
 @part
 def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[no-untyped-def]
-    """meeting (2,): padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
+    """meeting[:2]: padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
@@ -120,6 +128,73 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
                     meeting[1] = i
                     return
         copy_rows(rel, before)
+
+
+@part
+def find_unresolved(model, strength, steps, count, pose, visible, meeting):  # type: ignore[no-untyped-def]
+    """meeting[2]: the member by which rounding leaves the largest stored energy no digits to speak of, or -1.
+
+    A length is known to u X where coordinates have the size X, u = 2.2e-16; an energy k Delta^2/2 then to k Delta u X.
+    By Cauchy and Schwarz the sum of these is at most u X sqrt(2 sum(k) E), which needs no pass over the members and
+    nearly always is small enough.
+
+    pose (S, n_pair, POSE): of the stages; visible: share of the energy that is too much.
+    """
+    meeting[2] = -1
+    best = 0
+    for i in range(steps.index[count, 0]):
+        if steps.scalar[i, ENERGY] > steps.scalar[best, ENERGY]:
+            best = i
+    energy = steps.scalar[best, ENERGY]
+    if not energy > 0.0:
+        return
+    size = 0.0
+    for p in range(model.reach.shape[0]):
+        size = max(size, model.reach[p])
+    for d in range(0, model.q0.shape[0], 3):
+        size = max(size, abs(steps.stage[best, 0, d]), abs(steps.stage[best, 0, d + 1]))
+    rounding = 2.2e-16 * size
+    stiffness = 0.0
+    for b in range(model.block.shape[0]):
+        if model.block[b, DESIGN] >= 0:
+            stiffness += _sum(strength[0, model.block[b, START] : model.block[b, STOP]])
+    if rounding * math.sqrt(2.0 * stiffness / energy) <= visible:
+        return
+    m = model.member
+    lost = 0.0
+    most = 0.0
+    elongated = False
+    for b in range(model.block.shape[0]):
+        if model.block[b, DESIGN] < 0:
+            continue
+        r = pose[best, model.block[b, PAIR]]
+        for i in range(model.block[b, START], model.block[b, STOP]):
+            x = r[0] + r[2] * m[QX, i] - r[3] * m[QY, i] - m[PX, i]
+            y = r[1] + r[3] * m[QX, i] + r[2] * m[QY, i] - m[PY, i]
+            elongation = abs(math.sqrt(x * x + y * y) - m[L0, i])
+            force = strength[0, i] * elongation
+            lost += force * rounding
+            elongated = elongated or (force > 0.0 and elongation > ELONGATED * rounding)
+            if force > most:
+                most = force
+                meeting[2] = i
+    if not (elongated and lost > visible * energy):  # where nothing is elongated, nothing is stored
+        meeting[2] = -1
+
+
+@part
+def _sum(k):  # type: ignore[no-untyped-def]
+    """Sum of k, whose length is a multiple of four, in four parts that do not wait for one another."""
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
+    for i in range(0, k.shape[0], 4):
+        a += k[i]
+        b += k[i + 1]
+        c += k[i + 2]
+        d += k[i + 3]
+    return (a + b) + (c + d)
 
 
 @part
