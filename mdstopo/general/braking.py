@@ -20,6 +20,9 @@ ROUNDING = 1e-15
 #: twentieth of what is braked. An error may stay below every tolerance where it grows, as long as rounding holds it at
 #: nothing; derivatives grow all the same
 BRAKED = 5.0
+#: steps in a row that are held short by that, after which a motion is given up that would need more than HOPELESS times
+#: the steps that it may take
+HELD, HOPELESS = 1000, 10.0
 
 
 @kernel

@@ -8,7 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.braking import BRAKED, brake_rate, friction_error
+from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale
@@ -255,6 +255,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     rubbing = model.contact_pair.shape[0] > 0
     brake = 0.0  # the rate at which contacts brake, and the one that does most
     braking = -1
+    held = 0  # steps in a row that are no longer because of that
     if switching:
         singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
@@ -337,9 +338,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     track.kept[e, 2] = 0.0
         while t < end:
             where[0] = -1
-            if wanted * brake > BRAKED:
+            held = held + 1 if wanted * brake > BRAKED else 0
+            if held > 0:
                 wanted = BRAKED / brake
                 where[0] = braking
+                if held > HELD and (last_time - t) > HOPELESS * wanted * limits[0]:
+                    return STEP_LIMIT, count, events, t
             if count >= limits[0]:
                 return STEP_LIMIT, count, events, t
             pieces = np.ceil((end - t) / wanted - 1e-9)
