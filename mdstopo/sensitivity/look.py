@@ -9,18 +9,20 @@ import math
 import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
-from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, carve, deflection, solved_to, step_at
+from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, deflection, solved_to, step_at
 from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
-from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
+from mdstopo.mechanics.laws.spring import meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
 from mdstopo.scene.model import DESIGN, L0, PAIR, PX, PY, QX, QY, START, STOP
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
+#: change of the speed with which the ends of a member pass, in tolerances, that may not be left out
+UNSEEN = 100.0
 #: share of the largest stored energy that rounding of lengths may make up, where the tolerance is not larger; and the
 #: roundings from which on an elongation is one: below that a member may as well be as long as at the start
 VISIBLE, ELONGATED = 1e-5, 100.0
@@ -62,7 +64,7 @@ def look(  # type: ignore[no-untyped-def]
     pose = np.empty((steps.index[count, 0], model.pair.shape[0], POSE))
     for i in range(pose.shape[0]):
         relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], pose[i])
-    find_meeting(model, strength, steps, count, pose, meeting)
+    find_meeting(model, strength, steps, count, pose, settings, meeting)
     find_unresolved(model, strength, steps, count, pose, max(VISIBLE, settings[0]), meeting)
     accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
@@ -77,13 +79,16 @@ def look(  # type: ignore[no-untyped-def]
 
 
 @part
-def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[no-untyped-def]
+def find_meeting(model, strength, steps, count, pose, settings, meeting):  # type: ignore[no-untyped-def]
     """meeting[:2]: padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
     one stretch between stages. pose (S, n_pair, POSE): of the stages. `model` is the whole one, whose padding repeats
     its members: other padding would have a length of its own.
+
+    Between the last node of a collocation window and the first of the next no force is looked at. A member that turns
+    round there unseen, and by whose force that matters to UNSEEN tolerances (`settings`), counts as one that meets.
     """
     meeting[0] = -1
     pair = model.pair
@@ -94,14 +99,23 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
     before = np.empty((n_pair, POSE))
     rel = np.empty((n_pair, POSE))
     spare = np.empty(n_pair)
+    step = 0
+    time = model.times[0]
     for p in range(n_pair):
         spare[p] = model.shortest[p]
     relative_pose(pair, model.q0, model.v0, before)
     for i in range(steps.index[0, 0], stages + 1):
+        was = time
+        between = False
         if i == stages:
             relative_pose(pair, steps.state[count, 0], steps.state[count, 1], rel)
+            time = steps.t[count]
         else:
             copy_rows(pose[i], rel)
+            time = steps.scalar[i, TIME]
+            while step < count and steps.index[step, 0] < i:
+                step += 1
+            between = steps.index[step, 0] == i and time > was and not settings[2] > 0.0
         for p in range(n_pair):
             moved = deflection(rel, before, model.reach, p)
             spare[p] -= moved
@@ -123,6 +137,12 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
                     m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
                     strength[2, lo:hi], before[p], rel[p],
                 )  # fmt: skip
+                if j < 0 and between:
+                    ease = (time - was) ** 2 * (model.inv_mass[3 * pair[p, 0]] + model.inv_mass[3 * pair[p, 1]])
+                    j = passing_in(
+                        m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
+                        strength[2, lo:hi], before[p], rel[p], 0.5 * UNSEEN * settings[0] / ease,
+                    )  # fmt: skip
                 if j >= 0:
                     meeting[0] = lo + j
                     meeting[1] = i
@@ -141,10 +161,10 @@ def find_unresolved(model, strength, steps, count, pose, visible, meeting):  # t
     pose (S, n_pair, POSE): of the stages; visible: share of the energy that is too much.
     """
     meeting[2] = -1
-    best = 0
-    for i in range(steps.index[count, 0]):
-        if steps.scalar[i, ENERGY] > steps.scalar[best, ENERGY]:
-            best = i
+    best = steps.index[0, 0]
+    for step in range(1, count):  # the first stage of each: of explicit steps the only one that lies on the motion
+        if steps.scalar[steps.index[step, 0], ENERGY] > steps.scalar[best, ENERGY]:
+            best = steps.index[step, 0]
     energy = steps.scalar[best, ENERGY]
     if not energy > 0.0:
         return
