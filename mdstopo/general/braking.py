@@ -8,7 +8,8 @@ method is at the limit of its stability there.
 import numpy as np
 
 from mdstopo.general.balance import solve_unknowns
-from mdstopo.general.contact import contact_rows, rate_of_row
+from mdstopo.general.contact import contact_rows
+from mdstopo.general.members import rate_of_row
 from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import CLOSED, MU, SLIP, C, K, contact_force
 
