@@ -153,7 +153,7 @@ class Evaluator:
                 break
             result = driver.evaluate(design, exact, rows)
             status, culprit = result.status, ""
-            if not status.ok or result.meeting >= 0:
+            if not status.ok or result.meeting >= 0 or result.unresolved >= 0:
                 status, culprit = self._verdict(name, design, result)
             gradients, across = (result.gradients, result.across) if exact else (None, None)
             if status.ok and gradient and not exact:
@@ -347,8 +347,10 @@ class Evaluator:
 
     def _verdict(self, name: str, design: FloatArray, result: Looked) -> tuple[Status, str]:
         """Why the motion of a load case cannot be trusted, and who is to blame."""
-        if result.status.ok:
+        if result.status.ok and result.meeting >= 0:
             return Status.ZERO_LENGTH, self._member(name, result.meeting)
+        if result.status.ok:
+            return Status.UNRESOLVED, self._member(name, result.unresolved)
         status, steps = self.driver(name).simulate(design)
         return self._explain(name, design, status, float(steps.t[-1]), steps.state[-1])
 

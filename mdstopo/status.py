@@ -15,6 +15,7 @@ class Status(enum.Enum):
     OK = "done"
     NON_FINITE = "a value that is not finite appeared"
     ZERO_LENGTH = "the ends of a member that carries a force meet, so that it has no direction"
+    UNRESOLVED = "a member stretches by so little that rounding leaves its energy hardly a digit"
     STEP_LIMIT = "the integrator needed more steps than it may take"
     STEP_TOO_SMALL = "the step became too small to move time on"
     NEWTON_FAILED = "Newton's iteration of the implicit integrator did not converge"

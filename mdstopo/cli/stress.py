@@ -51,7 +51,7 @@ def command(names: tuple[str, ...], long: bool, folder: Path | None, markdown: b
         output.say(markdown_of(outcomes))
     else:
         for each in failed:
-            output.say(f"{each.scene.name}: {_expectation(each.scene)}, but {told(each)}{_known(each)}")
+            output.say(f"{each.scene.name}: {_expectation(each.scene)}, but {told(each)}")
         output.say(f"{len(outcomes) - len(failed)} of {len(outcomes)} scenes end as they have to")
     output.document(_document(outcomes))
     return 1 if failed else 0
@@ -108,10 +108,6 @@ def _expectation(scene: "Scene") -> str:
     if scene.culprit:
         return f"is to be refused with {', '.join(map(repr, scene.culprit))}"
     return f"is to be right within {number(scene.bound, 2)}"
-
-
-def _known(outcome: "Outcome") -> str:
-    return f" (known: {outcome.scene.fault})" if outcome.scene.fault else ""
 
 
 def told(outcome: "Outcome") -> str:

@@ -396,6 +396,9 @@ class GeneralDriver:
             return f"{self._singular(int(self.where[0]))}, {when}{steps}"
         if code == CHATTERING:
             return f"{self.member(int(self.where[0]))}, {when}"
+        if code == STEP_LIMIT and self.where[0] >= 0:
+            who = self.member(int(self.where[0]))
+            return f"{when}; {who} brakes too fast for explicit steps: a larger slip or a smaller damping needs fewer"
         n, count = len(self.scene.model.mass), self._steps_until(time)
         speed = np.abs(self.states()[1][count, 1, : self.scene.n]).reshape(-1, 3).max(axis=1)
         wild = np.flatnonzero(~np.isfinite(speed))

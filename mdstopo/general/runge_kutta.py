@@ -8,6 +8,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale
@@ -251,6 +252,10 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model, np.bool_(True))
+    rubbing = model.contact_pair.shape[0] > 0
+    brake = 0.0  # the rate at which contacts brake, and the one that does most
+    braking = -1
+    held = 0  # steps in a row that are no longer because of that
     if switching:
         singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
@@ -271,9 +276,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
+    shaken = 0.0
     for p in range(n_pair):
         noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
         stiffness = desk.sums[p, 7] + desk.sums[p, 11]
+        shaken += abs(stiffness) * noise[p]
         if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
             motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)  # a pair that starts strained
     # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0
@@ -302,10 +309,13 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             model, strength, times[1], q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q[0], v[0], a[0],
             work,
         )  # fmt: skip
+    if rubbing and not fixed_step > 0.0:
+        brake, braking = brake_rate(model, strength, q0, v0, BRAKED / wanted, desk)
     keep_state(track, 0, t, q0, v0, push[0], push[1])
     track.index[0, 0] = 0
     count = np.int64(0)
     stages = np.int64(0)
+    longest = 0.0
     crowd_time = t
     crowd = 0
     for segment in range(times.shape[0] - 1):
@@ -327,6 +337,13 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     track.salt[e] = 0.0  # the time is given
                     track.kept[e, 2] = 0.0
         while t < end:
+            where[0] = -1
+            held = held + 1 if wanted * brake > BRAKED else 0
+            if held > 0:
+                wanted = BRAKED / brake
+                where[0] = braking
+                if held > HELD and (last_time - t) > HOPELESS * wanted * limits[0]:
+                    return STEP_LIMIT, count, events, t
             if count >= limits[0]:
                 return STEP_LIMIT, count, events, t
             pieces = np.ceil((end - t) / wanted - 1e-9)
@@ -358,9 +375,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             relative_pose(pair, ends[0], ends[1], rel)
             motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
-            error = _error(table[2], s, h, a, weight)
+            error = _error(table[2], s, h, longest, a, weight)
             if crosses(h, way):
                 error = error_along(model, desk, table[2], s, h, a, weight, error, sigma_end)
+            if rubbing:
+                copy_vector(q0, left[0])
+                copy_vector(v0, left[1])
+                grip = friction_error(model, strength, table[2], s, h, left, ends, a, noise, shaken, tolerance)
+                if grip > error or not np.isfinite(grip):
+                    error = grip
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
@@ -468,6 +491,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 where[1] = meeting(model, segment, t, strength, before, rel)
             happened = events
             t = end if lands else t + h
+            longest = max(longest, h)
             for d in range(n):
                 q0[d] = ends[0, d]
                 v0[d] = ends[1, d]
@@ -493,5 +517,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 if crowd > CHATTER:
                     where[0] = who
                     return CHATTERING, count, events, t
+            if rubbing and not fixed_step > 0.0:
+                brake, braking = brake_rate(model, strength, q0, v0, BRAKED / wanted, desk)
             track.index[count, 3] = events
     return OK, count, events, t

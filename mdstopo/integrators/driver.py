@@ -47,6 +47,7 @@ class Looked(NamedTuple):
     rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
     meeting: padded index of a member whose ends meet, or -1. grazing: of one that leaves no derivative, or -1. across:
     as gradients, of `evaluation.Peak.across`, where it was asked for; rows of responses without one are zero.
+    unresolved: of a member whose stored energy has no digits, or -1.
     """
 
     status: Status
@@ -57,6 +58,7 @@ class Looked(NamedTuple):
     meeting: int
     grazing: int = -1
     across: FloatArray | None = None
+    unresolved: int = -1
 
 
 class Driver:
@@ -94,7 +96,7 @@ class Driver:
         self.shapes: tuple[Shape, ...] = tuple("plain" for _ in reductions)
         self.strength = aligned((ROOMY, padded))
         self.found = np.zeros(count, dtype=np.int64)
-        self.meeting = np.zeros(2, dtype=np.int64)
+        self.meeting = np.full(3, -1, dtype=np.int64)
         self._width = padded
         self._make_rows(ROWS)
         self._make_room(method.steps, method.stages)
@@ -151,7 +153,8 @@ class Driver:
         code, count, time = self.run(alpha, gradient)
         if code == OK:
             self._look_at(count, gradient)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, self.meeting.item(0))
+        meeting, unresolved = self.meeting.item(0), self.meeting.item(2)
+        return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, unresolved=unresolved)
 
     def met(self, count: int) -> int:
         """A member (padded) whose ends meet under force within the steps of the last run, or -1."""

@@ -46,6 +46,7 @@ from mdstopo.integrators.steps import (
     keep_stage,
     keep_state,
     largest_turn,
+    lasting,
     motion_weights,
     solved_to,
 )
@@ -200,6 +201,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     steps.index[0, 0] = 1
     count = 0
     stages = 1
+    longest = 0.0
 
     for segment in range(times.shape[0] - 1):
         end = times[segment + 1]
@@ -286,7 +288,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 for d in range(n):
                     tail = max(abs(coef[s - 1, d]), 0.1 * abs(coef[s - 2, d])) * 1.5 * h * h / (4.0 * s * s)
                     estimate = max(estimate, weight[d] * tail)
-                estimate *= caution(coef, weight, s)
+                estimate *= caution(coef, weight, s) * lasting(h, longest)
                 if estimate <= tolerance or fixed_step > 0.0:
                     # the last clause: rounding is all that is left
                     if not rough and (e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11)):
@@ -350,6 +352,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
             if not finite:
                 return NON_FINITE, count, t
             t = end if lands else t + h
+            longest = max(longest, h)
             steps.index[count, 1] = level
             steps.index[count, 2] = segment
             stages += s

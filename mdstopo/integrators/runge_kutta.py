@@ -28,6 +28,7 @@ from mdstopo.integrators.steps import (
     keep_stage,
     keep_state,
     largest_turn,
+    lasting,
     motion_weights,
 )
 from mdstopo.jit import entry, kernel
@@ -118,8 +119,9 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _error(vectors, s, h, a, weight):  # type: ignore[no-untyped-def]
-    """Estimated error of a step relative to the motion; NaN where one appears."""
+def _error(vectors, s, h, longest, a, weight):  # type: ignore[no-untyped-def]
+    """Estimated error of a step relative to the motion; NaN where one appears. longest: step so far (`lasting`)."""
+    later = lasting(h, longest)
     worst = 0.0
     coarse = 0.0
     for d in range(weight.shape[0]):
@@ -132,8 +134,8 @@ def _error(vectors, s, h, a, weight):  # type: ignore[no-untyped-def]
             ev += vectors[4, j] * a[j, d]
             fq += vectors[5, j] * a[j, d]
             fv += vectors[6, j] * a[j, d]
-        value = h * h * weight[d] * max(abs(eq), abs(ev))
-        other = h * h * weight[d] * max(abs(fq), abs(fv))
+        value = h * h * weight[d] * max(abs(eq), later * abs(ev))
+        other = h * h * weight[d] * max(abs(fq), later * abs(fv))
         if not np.isfinite(value):
             return np.nan
         worst = max(worst, value)
@@ -212,6 +214,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     steps.index[0, 0] = 0
     count = 0
     stages = 0
+    longest = 0.0
     for segment in range(times.shape[0] - 1):
         end = times[segment + 1]
         while t < end:
@@ -238,7 +241,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             for p in range(n_pair):
                 scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
             motion_weights(pair, rel[0], reach, scale, weight)
-            error = _error(table[2], s, h, a, weight)
+            error = _error(table[2], s, h, longest, a, weight)
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
@@ -259,6 +262,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel[0], rel0, reach, p))
             t = end if lands else t + h
+            longest = max(longest, h)
             for d in range(n):
                 q0[d] = ends[0, d]
                 v0[d] = ends[1, d]

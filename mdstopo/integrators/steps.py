@@ -84,6 +84,11 @@ FIELDS = ("t", "state", "index", "scalar", "stage", "pull", "K", "C", "turn")
 #: members that hardly move their bodies (a flywheel, a driven rotor); what is looked at does, and turns with them.
 TURN = 1.0
 
+#: share of the longest step so far in which an error of the velocity counts at least with what it moves. A step may
+#: be far shorter than the time in which the bodies move: where a member passes near zero length its force turns round
+#: at once. An error of the velocity left there goes on moving them.
+LASTING = 0.1
+
 #: columns of `index`, `scalar`, `stage`
 FIRST, LEVEL, SEGMENT = range(3)
 TIME, ENERGY, ENERGY_RATE = range(3)
@@ -201,6 +206,12 @@ def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
         b = 3 * pair[p, 1] + 2
         largest = max(largest, abs(after[b] - before[b] - after[a] + before[a]))
     return largest
+
+
+@part
+def lasting(h, longest):  # type: ignore[no-untyped-def]
+    """How many times as far as in a step of length h an error of its velocity leads; longest: step so far."""
+    return max(1.0, LASTING * longest / h)
 
 
 @part

@@ -4,19 +4,28 @@
 method; its tag.
 """
 
+import math
+
 import numpy as np
 
 from mdstopo.integrators.contract import point_of, steps_of
-from mdstopo.integrators.steps import FORCES, SPRINGS, carve, deflection, solved_to, step_at
+from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, deflection, solved_to, step_at
 from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
-from mdstopo.mechanics.laws.spring import meeting_in, shortest_in
+from mdstopo.mechanics.laws.spring import meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
+from mdstopo.scene.model import DESIGN, L0, PAIR, PX, PY, QX, QY, START, STOP
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
+
+#: change of the speed with which the ends of a member pass, in tolerances, that may not be left out
+UNSEEN = 100.0
+#: share of the largest stored energy that rounding of lengths may make up, where the tolerance is not larger; and the
+#: roundings from which on an elongation is one: below that a member may as well be as long as at the start
+VISIBLE, ELONGATED = 1e-5, 100.0
 
 
 @entry
@@ -45,7 +54,7 @@ def look(  # type: ignore[no-untyped-def]
     """Every objective of the load case, from the steps that `simulate` left in room.
 
     In: reductions (n_obj,); room: padded (R, M_padded). Out: rows (n_obj, R, 4) time, value, step, fraction; found
-    (n_obj,); gradients (n_obj, R, N); meeting (2,), see `find_meeting`.
+    (n_obj,); gradients (n_obj, R, N); meeting (3,), see `find_meeting` and `find_unresolved`.
     """
     model = unpack(ints, floats)
     motion, own, left = carrying(model, strength, np.bool_(False))
@@ -55,7 +64,8 @@ def look(  # type: ignore[no-untyped-def]
     pose = np.empty((steps.index[count, 0], model.pair.shape[0], POSE))
     for i in range(pose.shape[0]):
         relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], pose[i])
-    find_meeting(model, strength, steps, count, pose, meeting)
+    find_meeting(model, strength, steps, count, pose, settings, meeting)
+    find_unresolved(model, strength, steps, count, pose, max(VISIBLE, settings[0]), meeting)
     accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
@@ -69,13 +79,16 @@ def look(  # type: ignore[no-untyped-def]
 
 
 @part
-def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[no-untyped-def]
-    """meeting (2,): padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
+def find_meeting(model, strength, steps, count, pose, settings, meeting):  # type: ignore[no-untyped-def]
+    """meeting[:2]: padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
     one stretch between stages. pose (S, n_pair, POSE): of the stages. `model` is the whole one, whose padding repeats
     its members: other padding would have a length of its own.
+
+    Between the last node of a collocation window and the first of the next no force is looked at. A member that turns
+    round there unseen, and by whose force that matters to UNSEEN tolerances (`settings`), counts as one that meets.
     """
     meeting[0] = -1
     pair = model.pair
@@ -86,14 +99,23 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
     before = np.empty((n_pair, POSE))
     rel = np.empty((n_pair, POSE))
     spare = np.empty(n_pair)
+    step = 0
+    time = model.times[0]
     for p in range(n_pair):
         spare[p] = model.shortest[p]
     relative_pose(pair, model.q0, model.v0, before)
     for i in range(steps.index[0, 0], stages + 1):
+        was = time
+        between = False
         if i == stages:
             relative_pose(pair, steps.state[count, 0], steps.state[count, 1], rel)
+            time = steps.t[count]
         else:
             copy_rows(pose[i], rel)
+            time = steps.scalar[i, TIME]
+            while step < count and steps.index[step, 0] < i:
+                step += 1
+            between = steps.index[step, 0] == i and time > was and not settings[2] > 0.0
         for p in range(n_pair):
             moved = deflection(rel, before, model.reach, p)
             spare[p] -= moved
@@ -115,11 +137,84 @@ def find_meeting(model, strength, steps, count, pose, meeting):  # type: ignore[
                     m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
                     strength[2, lo:hi], before[p], rel[p],
                 )  # fmt: skip
+                if j < 0 and between:
+                    ease = (time - was) ** 2 * (model.inv_mass[3 * pair[p, 0]] + model.inv_mass[3 * pair[p, 1]])
+                    j = passing_in(
+                        m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
+                        strength[2, lo:hi], before[p], rel[p], 0.5 * UNSEEN * settings[0] / ease,
+                    )  # fmt: skip
                 if j >= 0:
                     meeting[0] = lo + j
                     meeting[1] = i
                     return
         copy_rows(rel, before)
+
+
+@part
+def find_unresolved(model, strength, steps, count, pose, visible, meeting):  # type: ignore[no-untyped-def]
+    """meeting[2]: the member by which rounding leaves the largest stored energy no digits to speak of, or -1.
+
+    A length is known to u X where coordinates have the size X, u = 2.2e-16; an energy k Delta^2/2 then to k Delta u X.
+    By Cauchy and Schwarz the sum of these is at most u X sqrt(2 sum(k) E), which needs no pass over the members and
+    nearly always is small enough.
+
+    pose (S, n_pair, POSE): of the stages; visible: share of the energy that is too much.
+    """
+    meeting[2] = -1
+    best = steps.index[0, 0]
+    for step in range(1, count):  # the first stage of each: of explicit steps the only one that lies on the motion
+        if steps.scalar[steps.index[step, 0], ENERGY] > steps.scalar[best, ENERGY]:
+            best = steps.index[step, 0]
+    energy = steps.scalar[best, ENERGY]
+    if not energy > 0.0:
+        return
+    size = 0.0
+    for p in range(model.reach.shape[0]):
+        size = max(size, model.reach[p])
+    for d in range(0, model.q0.shape[0], 3):
+        size = max(size, abs(steps.stage[best, 0, d]), abs(steps.stage[best, 0, d + 1]))
+    rounding = 2.2e-16 * size
+    stiffness = 0.0
+    for b in range(model.block.shape[0]):
+        if model.block[b, DESIGN] >= 0:
+            stiffness += _sum(strength[0, model.block[b, START] : model.block[b, STOP]])
+    if rounding * math.sqrt(2.0 * stiffness / energy) <= visible:
+        return
+    m = model.member
+    lost = 0.0
+    most = 0.0
+    elongated = False
+    for b in range(model.block.shape[0]):
+        if model.block[b, DESIGN] < 0:
+            continue
+        r = pose[best, model.block[b, PAIR]]
+        for i in range(model.block[b, START], model.block[b, STOP]):
+            x = r[0] + r[2] * m[QX, i] - r[3] * m[QY, i] - m[PX, i]
+            y = r[1] + r[3] * m[QX, i] + r[2] * m[QY, i] - m[PY, i]
+            elongation = abs(math.sqrt(x * x + y * y) - m[L0, i])
+            force = strength[0, i] * elongation
+            lost += force * rounding
+            elongated = elongated or (force > 0.0 and elongation > ELONGATED * rounding)
+            if force > most:
+                most = force
+                meeting[2] = i
+    if not (elongated and lost > visible * energy):  # where nothing is elongated, nothing is stored
+        meeting[2] = -1
+
+
+@part
+def _sum(k):  # type: ignore[no-untyped-def]
+    """Sum of k, whose length is a multiple of four, in four parts that do not wait for one another."""
+    a = 0.0
+    b = 0.0
+    c = 0.0
+    d = 0.0
+    for i in range(0, k.shape[0], 4):
+        a += k[i]
+        b += k[i + 1]
+        c += k[i + 2]
+        d += k[i + 3]
+    return (a + b) + (c + d)
 
 
 @part

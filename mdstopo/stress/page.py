@@ -27,8 +27,6 @@ def _row(each: Outcome) -> str:
     ended = each.outcome if each.ok else f"**{each.outcome}**"
     if each.message:
         ended += f": {_short(each.message)}"
-    if not each.ok and scene.fault:
-        ended += f": {scene.fault}"
     if each.note:
         ended += f"; {each.note}"
     error = "" if each.error is None else f"{each.error:.1e}"

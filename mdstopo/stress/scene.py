@@ -21,8 +21,8 @@ class Scene:
 
     data: the case. measure: the error of what the engine computes of it, relative to the independent value, and what
     else is to be reported; it raises Refused where there is a refusal. A scene has to be right within `bound`, or,
-    where `culprit` names words, to be refused in a message that has them all. fault: why it is known not to end as it
-    has to. limit: seconds until it counts as one that hangs. long: only on demand.
+    where `culprit` names words, to be refused in a message that has them all. limit: seconds until it counts as one
+    that hangs. long: only on demand.
     """
 
     name: str
@@ -31,7 +31,6 @@ class Scene:
     measure: "Callable[[Case], float | tuple[float, str]]"
     bound: float = 0.0
     culprit: tuple[str, ...] = ()
-    fault: str = ""
     limit: float = LIMIT
     long: bool = False
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from mdstopo import evaluate, simulate
 from mdstopo.status import Status
@@ -66,6 +67,54 @@ def test_a_near_miss_is_integrated_accurately(integrator, offset):
     assert evaluate(case).status.ok
     expected = Plain(case, case.initial).solve(np.array([0.0, 0.2, 0.4, 0.6]))
     assert motion.at([0.0, 0.2, 0.4, 0.6]).q == pytest.approx(expected[:, :3], abs=2e-6)
+
+
+def passed(offset, end=0.6):
+    """x, y of the body that passes at `offset` (without the weak member): steps as short as the distance asks for."""
+    free, t, y = np.hypot(1.0, offset), 0.0, np.array([1.0, offset, -4.0, 0.0])
+
+    def rates(_, y):
+        length = np.hypot(y[0], y[1])
+        pull = -5.0 * (length - free) / length
+        return [y[2], y[3], pull * y[0], pull * y[1]]
+
+    while t < end - 1e-12:
+        h = min(end - t, 0.02 * np.hypot(y[0], y[1]))
+        y = solve_ivp(rates, (t, t + h), y, "DOP853", rtol=1e-13, atol=1e-18, first_step=0.99 * h).y[:, -1]
+        t += h
+    return y[:2]
+
+
+@BOTH
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+@pytest.mark.parametrize("offset", [1e-4, 1e-6, 1e-8])
+def test_a_pass_far_nearer_than_a_step_is_long_keeps_the_tolerance(integrator, tolerance, offset):
+    """The force turns round within a part of a step; what its velocity is off by there leads on for long."""
+    motion = simulate(read(passing(offset), integrator=integrator, tolerance=tolerance))
+    if integrator == "gauss" and offset == 1e-8:  # between two windows, where no force is looked at
+        assert motion.status is Status.ZERO_LENGTH
+        assert "member 0 of group through" in motion.message
+        return
+    assert motion.status.ok
+    assert motion.q[-1, :2] == pytest.approx(passed(offset), abs=10.0 * tolerance * np.abs(motion.q[:, 0] - 1.0).max())
+
+
+def test_passes_near_zero_length_are_right_or_refused_whatever_window_they_fall_into():
+    """Wherever windows end; a third at most is refused."""
+    rng, refused = np.random.default_rng(0), 0
+    for _ in range(24):
+        offset, tolerance = 10.0 ** rng.uniform(-8.0, -3.0), 10.0 ** rng.uniform(-9.0, -4.0)
+        scene = passing(offset, speed=-rng.uniform(2.5, 6.0))
+        motion = simulate(read(scene, integrator="gauss", tolerance=tolerance))
+        exact = simulate(read(scene, integrator="runge_kutta", tolerance=1e-12))
+        assert exact.status.ok
+        if motion.status.ok:
+            bound = 20.0 * tolerance * np.abs(exact.q[:, 0] - 1.0).max()
+            assert motion.q[-1, :2] == pytest.approx(exact.q[-1, :2], abs=bound)
+        else:
+            assert motion.status is Status.ZERO_LENGTH
+            refused += 1
+    assert refused <= 8
 
 
 @BOTH

@@ -81,6 +81,90 @@ def test_below_the_angle_of_friction_a_block_creeps_at_a_known_speed():
     assert along(motion, [3.0])[1][0] == pytest.approx(creep, rel=1e-8)
 
 
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8, 1e-12])
+@pytest.mark.parametrize("slip", [1e-3, 1e-5, 1e-7])
+def test_a_block_that_comes_to_rest_creeps_as_its_slip_says_however_small_that_is(slip, tolerance):
+    """Where it has come to rest, it creeps at slip artanh(tan(angle) / mu), to the tolerance."""
+    stop = 0.1 / (G * (0.6 * np.cos(ANGLE) - np.sin(ANGLE)))
+    text = slope(end=stop + 500.0 * slip, friction=0.6, speed=0.1, length=1.0).replace("slip: 0.05", f"slip: {slip!r}")
+    motion = simulate_text(text, tolerance=tolerance)
+    assert motion.status.ok
+    at_rest = motion.t[motion.t > stop + 40.0 * slip]
+    creep = slip * np.arctanh(np.tan(ANGLE) / 0.6)
+    assert len(at_rest) > 50
+    np.testing.assert_allclose(along(motion, at_rest)[1], creep, rtol=max(10.0 * tolerance, 2e-9))
+
+
+TIED = """
+members:
+  tie: {{from: {{body: ground, at: [{x}, {y}]}}, to: {{body: block, frame: body, at: [0, 0]}},
+    law: {{type: spring, stiffness: {stiffness}}}}}
+design: {{initial: 0.8}}
+objectives:
+  speed: {{response: {{velocity: {{body: block, component: x}}}}, over_time: final}}
+  way: {{response: {{displacement: {{body: block, component: x}}}}, over_time: final}}
+combine: {{method: weighted_sum, weights: {{speed: 1, way: 1}}}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("slip", "tolerance"), [*((1e-4, 10.0**-k) for k in (4, 6, 8, 10, 12)), (1e-3, 1e-8), (1e-5, 1e-8)]
+)
+def test_values_and_gradients_of_a_creeping_block_are_those_of_its_one_equation(slip, tolerance):
+    """Tied by a spring along the slope: m s'' = m g sin - mu N tanh(s' / slip) - alpha k s, with its slope by alpha."""
+    stop = 0.1 / (G * (0.6 * np.cos(ANGLE) - np.sin(ANGLE)))
+    end, stiffness = 1.05 * stop + 2000.0 * slip, 9.8 / (0.05 * stop)
+    down, normal = np.array([np.cos(ANGLE), -np.sin(ANGLE)]), np.array([np.sin(ANGLE), np.cos(ANGLE)])
+    x, y = (0.1 - 10.0 * G * np.cos(ANGLE) / (2.0 * K)) * normal - down
+    text = slope(end=end, friction=0.6, speed=0.1, length=2.0).replace("slip: 0.05", f"slip: {slip!r}")
+    found = mdstopo.evaluate(
+        read_case(
+            text + TIED.format(x=x, y=y, stiffness=stiffness),
+            overrides={"solver.tolerance": str(tolerance), "solver.integrator": "runge_kutta"},
+        )
+    )
+    assert found.status.ok
+    drag, pull = 0.6 * G * np.cos(ANGLE), stiffness / 10.0
+
+    def rate(_, z):  # s, s' / slip, and their slopes by alpha
+        s, w, s_a, w_a = z
+        share = np.tanh(w)
+        forward = G * np.sin(ANGLE) - drag * share - 0.8 * pull * s
+        slope_of_it = -drag * (1.0 - share**2) * w_a - pull * s - 0.8 * pull * s_a
+        return [slip * w, forward / slip, slip * w_a, slope_of_it / slip]
+
+    small = [1e-16, 1e-12, 1e-16, 1e-12]
+    s, w, s_a, w_a = solve_ivp(rate, (0.0, end), [0.0, 0.1 / slip, 0.0, 0.0], "Radau", rtol=2e-12, atol=small).y[:, -1]
+    bound = max(10.0 * tolerance, 3e-7 * 1e-4 / slip)  # rounding of where the feet are
+    assert found.objectives["way"] == pytest.approx(np.cos(ANGLE) * s, rel=max(10.0 * tolerance, 1e-9))
+    assert found.gradients["way"][0] == pytest.approx(np.cos(ANGLE) * s_a, rel=max(10.0 * tolerance, 1e-9))
+    assert found.objectives["speed"] == pytest.approx(np.cos(ANGLE) * slip * w, rel=bound)
+    assert found.gradients["speed"][0] == pytest.approx(np.cos(ANGLE) * slip * w_a, rel=bound)
+
+
+def test_a_slip_that_needs_far_too_many_steps_is_refused_by_its_contact():
+    motion = simulate_text(slope(friction=0.6, end=20.0).replace("slip: 0.05", "slip: 1.0e-9"), tolerance=1e-6)
+    assert motion.status is Status.STEP_LIMIT
+    assert "point 0 of contact 0, of block on ground" in motion.message
+    assert "slip" in motion.message
+    assert motion.work["steps"] < 5000
+
+
+def test_a_light_foot_that_a_joint_holds_brakes_with_what_it_carries():
+    """Steps are limited by the mass that friction brakes: that of the machine, not of its shoe."""
+    text = slope(friction=0.6, end=0.05).replace("slip: 0.05", "slip: 1.0e-4")
+    body = text[text.index("  block:") : text.index("motions")]
+    shoe = body.replace("block", "shoe").replace("mass: 10, inertia: 1", "mass: 0.001, inertia: 0.001")
+    heel = text[text.index("  block:") : text.index("angle: -0.4")].split("position: ")[1].rstrip(", ")
+    shod = text.replace(body, body + shoe).replace("points: {feet: {body: block", "points: {feet: {body: shoe")
+    shod = shod.replace("motions:", f"joints: [{{type: fixed, bodies: [block, shoe], at: {heel}}}]\nmotions:")
+    plain, jointed = (simulate_text(each, tolerance=1e-8) for each in (text, shod))
+    assert plain.status.ok
+    assert jointed.status.ok
+    assert plain.work["steps"] > 150
+    assert jointed.work["steps"] < 2.0 * plain.work["steps"]
+
+
 @pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
 def test_a_block_that_falls_on_a_slope_without_loss_keeps_its_energy(integrator):
     step = {"step": 0.0002} if integrator == "generalized_alpha" else {}

@@ -13,12 +13,13 @@ from scipy.integrate import solve_ivp
 
 import mdstopo
 from mdstopo.case.reader import read_case
+from tests.general.support import slopes
 
 GRAVITY = 9.81
 
 
-def windows(count, end, tolerance):
-    """The benchmark: links and bars of 1 m and 1 kg, upright, the bars at 1 m/s."""
+def windows(count, end, tolerance, more=None):
+    """The benchmark: links and bars of 1 m and 1 kg, upright, the bars at 1 m/s. more: entries of the case."""
     bodies, joints = {}, []
     for i in range(count + 1):
         link = {"mass": 1.0, "inertia": 1 / 12, "position": [i, 0.5], "velocity": [0.5, 0.0], "angular_velocity": -1.0}
@@ -29,7 +30,9 @@ def windows(count, end, tolerance):
         joints.append({"type": "revolute", "bodies": [f"link{i}", f"bar{i}"], "at": [i, 1]})
         joints.append({"type": "revolute", "bodies": [f"bar{i}", f"link{i + 1}"], "at": [i + 1, 1]})
     case = {"format": 1, "gravity": [0, -GRAVITY], "time": {"end": end}, "bodies": bodies, "joints": joints}
-    return read_case(json.dumps({**case, "solver": {"integrator": "runge_kutta", "tolerance": tolerance}}))
+    return read_case(
+        json.dumps({**case, **(more or {}), "solver": {"integrator": "runge_kutta", "tolerance": tolerance}})
+    )
 
 
 def turned(count, times):
@@ -83,3 +86,66 @@ solver: {assemble: true}
     assert not motion.status.ok
     assert "joint" in motion.message
     assert motion.t[-1] == pytest.approx(np.arccos(0.25), abs=2e-3)
+
+
+def tied(end, tolerance):
+    """One window, with two springs from ground to its bar and its first link, whose scales are designed."""
+    at = {"a": [0.5, 1.0], "b": [0.0, 0.5]}
+    members = {
+        "over": {"from": {"body": "ground", "at": [2.5, 2.0]}, "to": {"body": "bar0", "at": at["a"]}},
+        "aside": {"from": {"body": "ground", "at": [-1.0, 0.2]}, "to": {"body": "link0", "at": at["b"]}},
+    }
+    laws = {"over": {"type": "spring", "stiffness": 2.0}, "aside": {"type": "spring", "stiffness": 3.0, "damping": 0.1}}
+    names = {"x": {"displacement": {"body": "bar0", "component": "x"}}, "turn": {"velocity": {"body": "link1"}}}
+    more = {
+        "members": {name: {**each, "law": laws[name]} for name, each in members.items()},
+        "design": {"initial": 0.7},
+        "objectives": {name: {"response": each, "over_time": "final"} for name, each in names.items()},
+        "combine": {"method": "weighted_sum", "weights": dict.fromkeys(names, 1.0)},
+    }
+    return windows(1, end, tolerance, more)
+
+
+def swung(alpha, end):
+    """x of the bar's middle at the end, as a displacement: Lagrange's equation of the one angle phi from upright."""
+    inertia, weight = 2.0 / 3.0 + 1.0, 2.0 * GRAVITY
+    pulls = (2.0 * alpha[0], 0.0, 2.5, 2.0, 0.5, 1.0), (3.0 * alpha[1], 0.1 * alpha[1], -1.0, 0.2, 0.0, 0.5)
+
+    def rates(_, y):
+        moment = weight * np.sin(y[0])
+        for k, c, x, z, own, arm in pulls:  # the point is at (own + arm sin, arm cos)
+            r = np.array([own + arm * np.sin(y[0]) - x, arm * np.cos(y[0]) - z])
+            slope = r @ [arm * np.cos(y[0]), -arm * np.sin(y[0])] / np.hypot(*r)
+            moment -= (k * (np.hypot(*r) - np.hypot(own - x, arm - z)) + c * slope * y[1]) * slope
+        return [y[1], moment / inertia]
+
+    phi = solve_ivp(rates, (0.0, end), [0.0, 1.0], method="DOP853", rtol=1e-13, atol=1e-14).y[0]
+    assert np.sum(np.diff(np.sign(np.cos(phi))) != 0.0) >= 1
+    return np.sin(phi[-1])
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8, 1e-10])
+def test_gradients_go_through_singular_poses(tolerance):
+    """Lying flat on its way, once and more often; against differences of the equation of the one angle."""
+    bound = 10.0 * tolerance + 1e-8  # beside a pose rounding is divided by the distance to it
+    for end in (1.6, 4.0):
+        alpha, h = np.array([0.7, 0.9]), 1e-4
+        found = mdstopo.evaluate(tied(end, tolerance), alpha)
+        assert found.status.ok, found.message
+        assert found.objectives["x"] == pytest.approx(swung(alpha, end), abs=bound)
+        expected = np.zeros(2)
+        for i, step in enumerate(h * np.eye(2)):
+            one, two = ((swung(alpha + m * step, end) - swung(alpha - m * step, end)) / (2 * m * h) for m in (1, 2))
+            expected[i] = (4.0 * one - two) / 3.0
+        np.testing.assert_allclose(found.gradients["x"], expected, rtol=0, atol=bound * abs(expected).max())
+
+
+def test_across_singular_poses_the_adjoint_is_the_derivative_of_what_is_computed():
+    case, alpha, h = tied(2.5, 1e-11), np.array([0.7, 0.9]), 1e-4
+    found = mdstopo.evaluate(case, alpha)
+    direct = mdstopo.evaluate(case, alpha, method="direct")
+    for i, step in enumerate(np.eye(2)):
+        for name, slope in slopes(case, alpha, step, h).items():
+            gradient = found.gradients[name]
+            assert abs(slope - gradient[i]) <= 1e-6 * np.abs(gradient).max()
+            assert abs(direct.gradients[name][i] - gradient[i]) <= 1e-9 * np.abs(gradient).max()

@@ -5,6 +5,8 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.status import Status
+from tests.engine.scenes import read
+from tests.engine.test_zero_length import passed, passing
 
 FALL = """
 format: 1
@@ -25,6 +27,17 @@ def test_a_member_that_passes_zero_length_under_force_is_named(integrator):
     found = mdstopo.evaluate(case)
     assert found.status is Status.ZERO_LENGTH
     assert "member 0 of group tie" in found.message
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9])
+@pytest.mark.parametrize("offset", [1e-4, 1e-6, 1e-8])
+def test_a_pass_far_nearer_than_a_step_is_long_keeps_the_tolerance(tolerance, offset):
+    """A cubic spring without its cubic part: the body of `tests.engine.test_zero_length`."""
+    scene = passing(offset, law={"type": "cubic", "cubic": 0.0})
+    scene["objectives"]["G"]["response"] = {"displacement": {"body": "ball"}}
+    motion = mdstopo.simulate(read(scene, integrator="runge_kutta", tolerance=tolerance))
+    assert motion.status.ok
+    assert motion.q[-1, :2] == pytest.approx(passed(offset), abs=10.0 * tolerance * abs(motion.q[:, 0] - 1.0).max())
 
 
 def test_a_slack_rope_may_pass_zero_length():

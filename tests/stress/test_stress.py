@@ -17,8 +17,6 @@ def _parameters() -> Iterator[object]:
         if scene.long:
             continue
         marks = [pytest.mark.slow] if name.startswith(SLOW) else []
-        if scene.fault:
-            marks.append(pytest.mark.xfail(strict=True, reason=scene.fault))
         yield pytest.param(scene, id=name, marks=marks)
 
 

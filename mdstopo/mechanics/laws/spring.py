@@ -371,3 +371,23 @@ def meeting_in(px, py, qx, qy, l0, k, preload, before, after):  # type: ignore[n
         if u2 > 0.0 and 0.0 <= along <= u2 and across * across <= 1e-18 * u2 * u2:
             return i
     return -1
+
+
+@kernel
+def passing_in(px, py, qx, qy, l0, k, preload, before, after, least):  # type: ignore[no-untyped-def]
+    """First member whose ends pass between two relative poses, much nearer than they move, under a force; else -1.
+
+    least: of the force at no length, N for each metre that the ends move.
+    """
+    for i in range(px.shape[0]):
+        rx = before[0] + before[2] * qx[i] - before[3] * qy[i] - px[i]
+        ry = before[1] + before[3] * qx[i] + before[2] * qy[i] - py[i]
+        ux = after[0] + after[2] * qx[i] - after[3] * qy[i] - px[i] - rx
+        uy = after[1] + after[3] * qx[i] + after[2] * qy[i] - py[i] - ry
+        u2 = ux * ux + uy * uy
+        along = -(rx * ux + ry * uy)
+        across = rx * uy - ry * ux
+        passes = u2 > 0.0 and 0.0 <= along <= u2 and across * across <= 0.01 * u2 * u2
+        if passes and abs(k[i] * l0[i] - preload[i]) > least * math.sqrt(u2):
+            return i
+    return -1

@@ -1,0 +1,145 @@
+"""Friction in explicit steps: what velocities are off by, and how long a step that brakes may be.
+
+Where a contact slides no faster than about its `slip`, friction brakes it within slip m / (mu N): a time in which
+nothing moves far. Errors of displacements do not see whether such a contact creeps as it should, and an explicit
+method is at the limit of its stability there.
+"""
+
+import numpy as np
+
+from mdstopo.general.balance import solve_unknowns
+from mdstopo.general.contact import contact_rows
+from mdstopo.general.members import rate_of_row
+from mdstopo.jit import kernel
+from mdstopo.mechanics.contact import CLOSED, MU, SLIP, C, K, contact_force
+
+#: a step this long, relative to the time in which friction brakes by `slip`, has no error but that of rounding
+SETTLED = 0.1
+#: what rounding leaves of a velocity, relative to its parts
+ROUNDING = 1e-15
+#: a step times the rate at which contacts brake, at most: a method of order 8 is stable up to 6.4, and at 5 it leaves a
+#: twentieth of what is braked. An error may stay below every tolerance where it grows, as long as rounding holds it at
+#: nothing; derivatives grow all the same
+BRAKED = 5.0
+#: steps in a row that are held short by that, after which a motion is given up that would need more than HOPELESS times
+#: the steps that it may take
+HELD, HOPELESS = 1000, 10.0
+
+
+@kernel
+def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken, tolerance):  # type: ignore[no-untyped-def]
+    """Estimated error of a step's sliding velocities relative to `slip`, the largest of all contacts that drag.
+
+    What counts is the error of T / (mu N) = tanh(slide / slip), of which 1 / (slip (1 + (slide / slip)^2)) is the slope
+    and more, taken where the step is slowest.
+
+    vectors, s, a (s, n): of the method and the step of length h; start, ends (2, n): its states; noise (n_pair,): of
+    relative positions, m; shaken: of the members' forces, N; tolerance: of a step. NaN where one appears.
+    """
+    first = model.member.shape[1]
+    rows = np.empty((2, 6))
+    rates = np.empty((2, 6))
+    worst = 0.0
+    for j in range(model.contact_pair.shape[0]):
+        c = model.contact[j]
+        if int(strength[1, first + j]) != CLOSED or c[MU] == 0.0:
+            continue
+        p = model.contact_pair[j]
+        _, height = contact_rows(model, j, start[0], start[1], rows, rates)
+        slide = rate_of_row(model, p, rows[0], start[1])
+        normal = -c[K] * height - c[C] * rate_of_row(model, p, rows[1], start[1])
+        contact_rows(model, j, ends[0], ends[1], rows, rates)
+        after = rate_of_row(model, p, rows[0], ends[1])
+        slow = min(abs(slide), abs(after)) if slide * after > 0.0 else 0.0
+        fine = 0.0
+        coarse = 0.0
+        parts = 0.0
+        rising = 0.0
+        mobility = 0.0
+        for r in range(6):
+            d = 3 * model.pair[p, r // 3] + r % 3
+            if model.free[d] != 0:
+                mobility += rows[0, r] * rows[0, r] / model.mass[d]
+            parts += abs(rows[0, r] * ends[1, d])
+            rising += abs(rows[1, r] * ends[1, d])
+            for i in range(s):
+                fine += rows[0, r] * vectors[4, i] * a[i, d]
+                coarse += rows[0, r] * vectors[6, i] * a[i, d]
+        brake = c[MU] * mobility * h
+        if not brake * abs(normal) > SETTLED * c[SLIP]:
+            continue
+        rounded = ROUNDING * parts + brake * (c[K] * noise[p] + c[C] * ROUNDING * rising) + mobility * h * shaken
+        scale = max(c[SLIP] + slow * slow / c[SLIP], rounded / tolerance)
+        fine = h * abs(fine) / scale
+        coarse = h * abs(coarse) / scale
+        if not np.isfinite(fine):
+            return np.nan
+        if fine > 0.0:
+            fine = fine * fine / np.sqrt(fine * fine + 0.01 * coarse * coarse)
+        worst = max(worst, fine)
+    return worst
+
+
+@kernel
+def brake_rate(model, strength, q, v, enough, desk):  # type: ignore[no-untyped-def]
+    """The fastest rate, 1/s, at which closed contacts brake velocities at a state, at most; and which brakes most.
+
+    Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, damping c; with rows B and the mobility
+    G = B M^-1 B^T, in which joints hold what they hold, the rates are the eigenvalues of G D. Their sum is the trace;
+    where that is more than `enough`, it is the largest row of |G| D, with the joints as factorised on the desk.
+    """
+    n = q.shape[0]
+    first = model.member.shape[1]
+    count = model.contact_pair.shape[0]
+    rows = np.empty((2, 6))
+    rates = np.empty((2, 6))
+    kept = np.empty((2 * count, 6))
+    slope = np.zeros(2 * count)
+    total = 0.0
+    largest = 0.0
+    who = -1
+    for j in range(count):
+        c = model.contact[j]
+        if int(strength[1, first + j]) != CLOSED or (c[MU] == 0.0 and c[C] == 0.0):
+            continue
+        p = model.contact_pair[j]
+        _, height = contact_rows(model, j, q, v, rows, rates)
+        slide = rate_of_row(model, p, rows[0], v)
+        _, _, by_rise, _, _, _, by_slide = contact_force(c, height, rate_of_row(model, p, rows[1], v), slide, CLOSED)
+        slope[2 * j] = abs(by_slide)
+        slope[2 * j + 1] = abs(by_rise)
+        for i in range(2):
+            mobility = 0.0
+            for r in range(6):
+                kept[2 * j + i, r] = rows[i, r]
+                d = 3 * model.pair[p, r // 3] + r % 3
+                if model.free[d] != 0:
+                    mobility += rows[i, r] * rows[i, r] / model.mass[d]
+            total += slope[2 * j + i] * mobility
+            if slope[2 * j + i] * mobility > largest:
+                largest = slope[2 * j + i] * mobility
+                who = first + j
+    if not total > enough:
+        return total, who
+    found = 0.0
+    push = np.empty(n)
+    held = np.empty(model.size[0])
+    for i in range(2 * count):
+        if slope[i] == 0.0:
+            continue
+        push[:] = 0.0
+        p = model.contact_pair[i // 2]
+        for r in range(6):
+            push[3 * model.pair[p, r // 3] + r % 3] = kept[i, r]
+        if held.shape[0] > 0:
+            held[:] = 0.0
+            solve_unknowns(model, desk, push, held)
+        else:
+            for d in range(n):
+                push[d] = push[d] / model.mass[d] if model.free[d] != 0 else 0.0
+        row = 0.0
+        for k in range(2 * count):
+            if slope[k] != 0.0:
+                row += abs(rate_of_row(model, model.contact_pair[k // 2], kept[k], push)) * slope[k]
+        found = max(found, row)
+    return min(found, total), who
