@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 
 #: reductions that are integrals over time: of g (1), of its square (2)
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
+#: of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 #: how often an evaluation looks for landings
 ROUNDS = 3
 #: how far both sums over a step may differ, relative to the tolerance and the whole integral
-SHARE = 0.1
+SHARE = 1e-3
 #: halvings of one step at most
 HALVINGS = 24
 #: steps nearer together than this share of the simulated time are one
@@ -43,14 +45,15 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
     looked = [
         (j, name)
         for j, name in enumerate(driver.scene.reductions)
-        if name in INTEGRALS and kinked.py_func(model, j)  # type: ignore[attr-defined]
+        if name in INTEGRALS
     ]
     if not looked:
         return found
     t = driver.states()[0][: count + 1].copy()
     if not driver.landings:
         for j, _ in looked:
-            found += kinks(driver, j, t)
+            if kinked.py_func(model, j):  # type: ignore[attr-defined]
+                found += kinks(driver, j, t)
     if driver.method.name != "runge_kutta" or driver.settings[2] > 0.0:
         return found
     ends = np.unique(np.concatenate([t, found, driver.landings]))
@@ -75,8 +78,7 @@ def halves(t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolera
     t (m + 1,): ends of steps, all of them among `ends`; rule (2, s): nodes and weights on (0, 1). Good is what differs
     from the Gauss-Legendre sum by the tolerance times the whole integral at most.
     """
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    places = np.concatenate([rule[0], 0.5 * (nodes + 1.0)])
+    places = np.concatenate([rule[0], 0.5 * (NODES + 1.0)])
     low, width = ends[:-1], np.diff(ends)
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
@@ -87,7 +89,7 @@ def halves(t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolera
         at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
         value = look(at.reshape(-1, 2)).reshape(fraction.shape)
         sums = width * np.einsum("ij,j->i", value[:, : rule.shape[1]], rule[1])
-        better = 0.5 * width * np.einsum("ij,j->i", value[:, rule.shape[1] :], weights)
+        better = 0.5 * width * np.einsum("ij,j->i", value[:, rule.shape[1] :], WEIGHTS)
         if np.isnan(whole):
             whole = float(np.abs(better).sum())
         bad = (np.abs(sums - better) > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))

@@ -124,10 +124,10 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
     before, behind = pieces.see(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
     row[VALUE] = (before if row[FRACTION] == pieces.leads[b - 1].high else behind)[0]
     (falls, first), (rises, second) = before[1:].tolist(), behind[1:].tolist()
-    if not falls < 0.0 < rises:
+    if not falls <= 0.0 <= rises or falls == rises:
         return
     if first == second:
-        if row[VALUE] <= LANDED * highest:
+        if falls < 0.0 < rises and row[VALUE] <= LANDED * highest:
             row[VALUE], row[OTHER] = 0.0, ZERO
     elif not stated:
         row[WHO], row[OTHER], row[SHARE] = first, second, -falls / (rises - falls)

@@ -359,7 +359,8 @@ def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-un
 def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
     """g_j and dg_j/dt at a state of step k; a, lam, the desk and the slopes are those of it afterwards.
 
-    j < 0: no response is asked for; without `rates` the rate may be meaningless, and costs nothing.
+    j < 0: no response is asked for; without `rates` the rate may be meaningless, and costs nothing, and where g is one
+    of positions or velocities alone there is no balance: a, lam and the desk are those of another state.
     Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, dg/dt = g_q v +
     g_v a; else it is differenced along the method's own motion. near: scratch (4, n).
     """
@@ -372,6 +373,8 @@ def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, la
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         return np.nan, np.nan
     kind = model.response[j, 0]
+    if not rates and kind in (POINT, ANGLE) and model.response[j, 4] < 2:
+        return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar), rate
     simple = not rates or kind == ENERGY or (kind in (POINT, ANGLE) and model.response[j, 4] < derivatives(tag))
     if not simple:
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
