@@ -33,7 +33,9 @@ TOLERANCE, FINE = 1e-8, 1e-12
 #: steps of differences, relative to the design
 STEPS = (4e-3, 1e-3, 2.5e-4)
 #: what the second model is good to: smaller errors cannot be told
-RESOLVED = 1e-10
+RESOLVED = 1e-11
+#: the smallest size that a response counts with: what joints hold at zero is zero to rounding
+SMALLEST = 1e-6
 
 
 @dataclass
@@ -58,88 +60,118 @@ def hunt(minutes: float = 10.0, first: int = 0) -> Iterator[Table]:
     yield worst(found)
 
 
-def values_of(document: dict[str, Any], alpha: Any, tolerance: float) -> dict[str, float]:
-    """Objectives at a tolerance; a ValueError where the scene cannot be computed."""
-    case = read_case(json.dumps(document), overrides={"solver.tolerance": tolerance})
-    result = mdstopo.evaluate(case, alpha, gradient=False)
-    if not result.status.ok:
-        raise ValueError(result.status.name)
-    return dict(result.objectives)
+@dataclass
+class Scene:
+    """A scene's document and case, its design x (N + P,): alpha, then the values of variables; what was found there."""
+
+    seed: int
+    document: dict[str, Any]
+    case: Any
+    x: Any
+    result: Any = None
+    sizes: dict[str, float] = field(default_factory=dict)
+
+    def parts(self, x: Any) -> tuple[Any, dict[str, Any]]:
+        """alpha (N,) of a design, and the values of its variables by name."""
+        n = self.case.n_design
+        return x[:n], {name: x[part] for name, part in self.case.space.parts.items()} if self.case.variables else {}
+
+    def values_at(self, x: Any, tolerance: float) -> dict[str, float]:
+        """Objectives of a design at a tolerance; a ValueError where it cannot be computed."""
+        case = read_case(json.dumps(self.document), overrides={"solver.tolerance": tolerance})
+        alpha, values = self.parts(x)
+        result = mdstopo.evaluate(case, alpha, variables=values, gradient=False)
+        if not result.status.ok:
+            raise ValueError(result.status.name)
+        return dict(result.objectives)
+
+    def slopes(self, name: str, direction: Any) -> Any:
+        """What each part of a direction (N + P,) does to an objective by its gradient."""
+        found = np.zeros(len(self.x))
+        found[: self.case.n_design] = self.result.gradients[name]
+        for key, part in (self.case.space.parts if self.case.variables else {}).items():
+            found[part] = self.result.variable_gradients[name][key]
+        return found * direction
+
+
+def drawn(seed: int, document: dict[str, Any]) -> Scene:
+    """A scene's document with a random design; a CaseError where it is refused."""
+    case = read_case(json.dumps(document))
+    rng = np.random.default_rng(seed)
+    x = np.array(case.whole(rng.uniform(0.4, 1.0, case.n_design)))
+    x[case.n_design :] *= rng.uniform(0.8, 1.2, len(x) - case.n_design)
+    return Scene(seed, document, case, x)
 
 
 def look(seed: int, found: Found) -> None:
     """Everything about one scene."""
-    document = scene(seed)
     try:
-        case = read_case(json.dumps(document))
-        rng = np.random.default_rng(seed)
-        alpha = rng.uniform(0.4, 1.0, case.n_design)
-        result = mdstopo.evaluate(case, alpha, error_estimate=True)
+        own = drawn(seed, scene(seed))
+        alpha, values = own.parts(own.x)
+        own.result = result = mdstopo.evaluate(own.case, alpha, variables=values, error_estimate=True)
     except mdstopo.CaseError as refused:
         found.statuses[f"refused: {refused.mistakes[0].message}"] += 1
         return
     found.statuses[result.status.name] += 1
     if not result.status.ok:
         return
-    model = Model(document, alpha)
+    model = Model(own.document, alpha, values)
     model.solve()
-    sizes = {}
-    for name, keys in document["objectives"].items():
+    for name, keys in own.document["objectives"].items():
         value, size = model.objective(keys["response"], keys["over_time"])
-        sizes[name] = size = max(size, abs(value), 1e-9)
+        own.sizes[name] = size = max(size, abs(value), SMALLEST)
         label = f"{keys['over_time']} of {keys['response']}"
         error = abs(result.objectives[name] - value) / size
         found.values.append((error / TOLERANCE, seed, label))
         if error > RESOLVED and name in result.errors:
             found.estimates.append((result.errors[name].value / (error * size), seed, label))
-    _gradients(seed, document, alpha, result, sizes, found, rng)
-    _changes(seed, document, alpha, result, sizes, found)
+    _gradients(own, found)
+    _changes(own, found)
 
 
-def _gradients(
-    seed: int, document: dict[str, Any], alpha: Any, result: Any, sizes: dict[str, float], found: Found, rng: Any
-) -> None:
-    direction = rng.normal(size=len(alpha)) * alpha
+def _gradients(own: Scene, found: Found) -> None:
+    direction = np.random.default_rng([own.seed, 2]).normal(size=len(own.x)) * own.x
     slopes: list[dict[str, float]] = []
     try:
         for h in STEPS:
             total: dict[str, float] = {}
             for m, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
                 for sign in (1.0, -1.0):
-                    for name, value in values_of(document, alpha + sign * m * h * direction, FINE).items():
+                    for name, value in own.values_at(own.x + sign * m * h * direction, FINE).items():
                         total[name] = total.get(name, 0.0) + sign * weight * value / h
             slopes.append(total)
     except ValueError:  # a design nearby cannot be computed, or touches something only just
-        found.undecided += len(result.objectives)
+        found.undecided += len(own.result.objectives)
         return
-    for name, gradient in result.gradients.items():
+    for name in own.result.gradients:
         candidates = [(abs(a[name] - b[name]), b[name]) for a, b in pairwise(slopes)]
         doubt, slope = min(candidates)
-        scale = max(float(np.abs(gradient * direction).max()), 1e-3 * sizes[name])
-        error = abs(float(gradient @ direction) - slope)
+        along = own.slopes(name, direction)
+        scale = max(float(np.abs(along).max()), 1e-3 * own.sizes[name])
+        error = abs(float(along.sum()) - slope)
         if doubt > TOLERANCE * scale and doubt > 0.1 * error:
             found.undecided += 1
             continue
-        keys = document["objectives"][name]
-        found.gradients.append((error / scale / TOLERANCE, seed, f"{keys['over_time']} of {keys['response']}"))
+        keys = own.document["objectives"][name]
+        label = f"{keys['over_time']} of {keys['response']}"
+        found.gradients.append((error / scale / TOLERANCE, own.seed, label))
 
 
-def _changes(
-    seed: int, document: dict[str, Any], alpha: Any, result: Any, sizes: dict[str, float], found: Found
-) -> None:
+def _changes(own: Scene, found: Found) -> None:
     """The same scene written in another way, a different one for each seed."""
-    label, change = list(CHANGES.items())[seed % len(CHANGES)]
-    other = scene(seed, change)
-    again = mdstopo.evaluate(read_case(json.dumps(other)), alpha, gradient=False)
+    label, change = list(CHANGES.items())[own.seed % len(CHANGES)]
+    other = drawn(own.seed, scene(own.seed, change))  # the same design: variables have the unit of the forces
+    alpha, values = other.parts(other.x)
+    again = mdstopo.evaluate(other.case, alpha, variables=values, gradient=False)
     if not again.status.ok:
-        found.changes.append((np.inf, seed, f"{label}: {again.status.name}"))
+        found.changes.append((np.inf, own.seed, f"{label}: {again.status.name}"))
         return
-    for name, keys in document["objectives"].items():
+    for name, keys in own.document["objectives"].items():
         response = keys["response"]
         forceful = response == "energy" or bool({"member_force", "joint_force"} & set(response))
         factor = change.force if forceful else 1.0
-        error = abs(again.objectives[name] / factor - result.objectives[name]) / sizes[name]
-        found.changes.append((error / TOLERANCE, seed, f"{label}: {keys['over_time']} of {response}"))
+        error = abs(again.objectives[name] / factor - own.result.objectives[name]) / own.sizes[name]
+        found.changes.append((error / TOLERANCE, own.seed, f"{label}: {keys['over_time']} of {response}"))
 
 
 def bars(found: Found, scenes: int) -> Table:

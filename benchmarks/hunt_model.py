@@ -1,26 +1,33 @@
 """A second model of planar scenes, from the case document alone: plain NumPy and SciPy's DOP853.
 
 Written from the format's description and nothing of the package: positions in global axes, one joint or member after
-the other, accelerations and multipliers from one dense system of equations, motion at tolerances of 1e-12. Joints are
-imposed on accelerations; what they drift by in so short a motion is of the order of that tolerance. Bodies begin
+the other, accelerations and multipliers from one dense system of equations, motion at tolerances of 1e-13. Joints are
+imposed on accelerations; what they drift by in so short a motion is of the order of that tolerance. What switches
+(`hunt_laws`) stays in its mode until its margin is used up; there a new piece of the motion begins. Bodies begin
 unturned. It knows what `hunt_scenes` draws; anything else is a KeyError.
 """
 
-from collections.abc import Callable
+from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import minimize_scalar
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+from benchmarks.hunt_laws import ACTS, Contact, Law
+from benchmarks.hunt_reductions import Look, highest, integral, kinks, length
 
 Vector = np.ndarray[Any, np.dtype[np.float64]]
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
-#: tolerances of the motion; panels of integrals at first, and how well they are to agree with their halves
-RTOL, ATOL, PANELS, AGREE, DEPTH = 1e-12, 1e-14, 24, 1e-11, 22
-#: places of a motion at which extremes are looked for before they are refined
-LOOKS = 500
+#: tolerances of the motion, longest steps in the whole of it, places of a step at which margins are looked at
+RTOL, ATOL, STEPS, CHECKS = 1e-13, 1e-15, 60, 9
+#: a margin that is no more than this below zero is used up only if it goes on falling
+NOUGHT = 1e-12
+#: places of a motion at which extremes and kinks are looked for before they are refined
+LOOKS = 400
+#: switches in one motion after which it is given up
+MOST = 2000
 
 
 class Point:
@@ -53,72 +60,36 @@ def stretch(p: Point, q: Point, x: Vector, v: Vector) -> tuple[float, float, Vec
     return length, along, e @ (jb - ja), float((rate @ rate - along**2) / length + e @ (bb - ba))
 
 
-class Law:
-    """Force and stored energy of one law at elongation x, rate r and time t; an inerter's force is in the mass."""
+class Piece(NamedTuple):
+    """A piece of the motion in which nothing switches: its times, steps of it, modes and growths of all that switch."""
 
-    def __init__(self, keys: dict[str, Any]) -> None:
-        self.kind, self.keys = keys["type"], keys
-        if self.kind == "curve":
-            x, f = np.array(keys["curve"]).T
-            self.ends, self.inside = (x[0], x[-1]), PchipInterpolator(x, f)
-            self.slope, self.whole = self.inside.derivative(), self.inside.antiderivative()
+    low: float
+    high: float
+    steps: list[Any]
+    modes: list[tuple[int, float]]
 
-    def force(self, x: float, r: float, t: float) -> float:
-        """N, tension positive."""
-        k = self.keys
-        match self.kind:
-            case "spring":
-                return float(k["stiffness"] * x + k.get("damping", 0.0) * r + k.get("preload", 0.0))
-            case "gap":
-                side = 1.0 if k.get("side", "tension") == "tension" else -1.0
-                y = side * x - k["gap"]
-                if y < 0.0:
-                    return 0.0
-                pull = k["stiffness"] * y + k.get("damping", 0.0) * side * r
-                return float(side * (max(pull, 0.0) if k.get("clip", False) else pull))
-            case "cubic":
-                return float(k["stiffness"] * x + k["cubic"] * x**3)
-            case "curve":
-                end = min(max(x, self.ends[0]), self.ends[1])
-                return float(self.inside(end) + (x - end) * self.slope(end))
-            case "pulse":
-                return float(k["peak"] * np.exp(-k["rate"] * (t - k["time"]) ** 2))
-            case "table":
-                return float(np.interp(t, *np.array(k["table"]).T))
-            case "actuator":
-                demand = k["proportional"] * (x - k["target"]) + k["derivative"] * r
-                return float(min(max(demand, -k.get("limit", np.inf)), k.get("limit", np.inf)))
-            case "inerter":
-                return 0.0
-        raise KeyError(self.kind)
+    def __call__(self, t: float) -> Vector:
+        """The state."""
+        for step in self.steps:
+            if t <= step.t:
+                return np.asarray(step(t))
+        return np.asarray(self.steps[-1](t))
 
-    def energy(self, x: float) -> float:
-        """J."""
-        k = self.keys
-        match self.kind:
-            case "spring":
-                return float(0.5 * k["stiffness"] * x * x)
-            case "gap":
-                y = max((x if k.get("side", "tension") == "tension" else -x) - k["gap"], 0.0)
-                return float(0.5 * k["stiffness"] * y * y)
-            case "cubic":
-                return float(0.5 * k["stiffness"] * x**2 + 0.25 * k["cubic"] * x**4)
-            case "curve":
-                end = min(max(x, self.ends[0]), self.ends[1])
-                s = x - end
-                return float(self.whole(end) - self.whole(0.0) + s * (self.inside(end) + 0.5 * s * self.slope(end)))
-        return 0.0
 
-    @property
-    def inertance(self) -> float:
-        """kg."""
-        return float(self.keys["inertance"]) if self.kind == "inerter" else 0.0
+class Member(NamedTuple):
+    """scale: alpha to its power; free: the length at which it is not stretched; its laws and ends."""
+
+    scale: float
+    free: float
+    laws: list[Law]
+    a: Point
+    b: Point
 
 
 class Model:
-    """A scene with a design alpha (N,): `solve`, then `objectives`."""
+    """A scene with a design alpha (N,) and values of its variables: `solve`, then `objective`."""
 
-    def __init__(self, document: dict[str, Any], alpha: Vector) -> None:
+    def __init__(self, document: dict[str, Any], alpha: Vector, values: dict[str, Vector] | None = None) -> None:
         self.document = document
         bodies = document["bodies"]
         self.names = list(bodies)
@@ -128,23 +99,46 @@ class Model:
         self.v0 = np.array([c for b in bodies.values() for c in (*b["velocity"], b["angular_velocity"])])
         self.end = float(document["time"]["end"])
         self.weight = self.mass * np.tile([*document["gravity"], 0.0], len(bodies))
-        self.members: dict[str, list[tuple[float, float, list[Law], Point, Point]]] = {}
-        first = 0
-        for name, group in document["members"].items():
-            laws = [Law(keys) for keys in (group["law"] if isinstance(group["law"], list) else [group["law"]])]
-            p, q = (document["points"][group[key]] for key in ("from", "to"))
-            self.members[name] = own = []
-            for i, (a, b) in enumerate(zip(p["grid"]["list"], q["grid"]["list"], strict=True)):
-                scale = float(alpha[first + i]) ** document["design"]["power"]
-                ends = self.point(p["body"], a), self.point(q["body"], b)
-                own.append((scale, float(np.hypot(*np.subtract(b, a))), laws, *ends))
-            first += len(own)
+        self.members = self._members(alpha, values or {})
+        self.contacts = list(self._contacts())
         self.joints = [(joint["name"], joint["type"], *self._joint(joint)) for joint in document.get("joints", [])]
         self.driven = {
             3 * self.names.index(motion["body"]) + i: np.array(motion[key]["acceleration"]["table"]).T
             for motion in document.get("motions", [])
             for i, key in enumerate(("x", "y", "angle"))
         }
+        self.switching: list[Any] = [law for own in self.members.values() for one in own for law in one.laws]
+        self.switching += [contact for contact, *_ in self.contacts]
+
+    def _members(self, alpha: Vector, values: dict[str, Vector]) -> dict[str, list[Member]]:
+        document, found, first = self.document, dict[str, list[Member]](), 0
+        variables = document["design"].get("variables", {})
+        for name, group in document["members"].items():
+            laws = group["law"] if isinstance(group["law"], list) else [group["law"]]
+            p, q = (document["points"][group[key]] for key in ("from", "to"))
+            found[name] = own = []
+            for i, (a, b) in enumerate(zip(p["grid"]["list"], q["grid"]["list"], strict=True)):
+                scale = float(alpha[first + i]) ** document["design"]["power"]
+                given = {
+                    row["parameter"]: float(values[key][i if row.get("each") == "member" else 0])
+                    for key, row in variables.items()
+                    if row["group"] == name
+                }
+                each = [Law(keys | given) for keys in laws]
+                ends = self.point(p["body"], a), self.point(q["body"], b)
+                own.append(Member(scale, float(np.hypot(*np.subtract(b, a))), each, *ends))
+            first += len(own)
+        return found
+
+    def _contacts(self) -> Iterator[tuple[Contact, Point, int, Vector, Vector]]:
+        """Each with its point, the edge's body, and in that body's axes the edge's beginning and direction."""
+        for keys in self.document.get("contacts", []):
+            points, edge = self.document["points"][keys["points"]], keys["on"]
+            begin = self.point(edge["body"], edge["from"])
+            along = np.subtract(edge["to"], edge["from"])
+            length = float(np.hypot(*along))
+            for at in points["grid"]["list"]:
+                yield Contact(keys, length), self.point(points["body"], at), begin.b, begin.arm, along / length
 
     def point(self, body: str, at: Any) -> Point:
         """A point given in global axes at the start."""
@@ -187,16 +181,39 @@ class Model:
             right.append(float(np.interp(t, *table)))
         return np.array(rows).reshape(-1, self.n), np.array(right)
 
+    def _touch(self, where: list[Any], q: Vector, v: Vector) -> tuple[Any, ...]:
+        """Place along an edge, depth, rate of that, sliding; the edge's axes (2, 2), the point's J and the edge's."""
+        at, edge, begin, e = where
+        x, speed, jacobian, _ = at.seen(q, v)
+        origin, moving, turn, w = np.zeros(2), np.zeros(2), 0.0, 0.0
+        there = np.zeros((2, self.n))
+        if edge >= 0:
+            i = 3 * edge
+            origin, moving, turn, w = q[i : i + 2], v[i : i + 2], q[i + 2], v[i + 2]
+            there[0, i] = there[1, i + 1] = 1.0
+            there[:, i + 2] = QUARTER @ (x - origin)
+        back = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+        place = back @ (x - origin) - begin
+        rate = back @ (speed - moving - w * (QUARTER @ (x - origin)))
+        axes = np.array([e, QUARTER @ e])
+        (s, height), (slide, rise) = axes @ place, axes @ rate
+        return float(s), -float(height), -float(rise), float(slide), axes @ back, jacobian, there
+
     def balance(self, t: float, y: Vector) -> tuple[Vector, Vector]:
-        """q'' (n,) and the multipliers."""
+        """q'' (n,) and the multipliers, in the modes that all is in."""
         q, v = y[: self.n], y[self.n :]
         mass, force = np.diag(self.mass), self.weight.copy()
         for own in self.members.values():
             for scale, free, laws, a, b in own:
                 length, rate, row, bias = stretch(a, b, q, v)
                 for law in laws:
-                    mass += scale * law.inertance * np.outer(row, row)
+                    if law.inertance != 0.0:
+                        mass += scale * law.inertance * np.outer(row, row)
                     force -= scale * (law.force(length - free, rate, t) + law.inertance * bias) * row
+        for contact, *where in self.contacts:
+            if contact.mode == ACTS:
+                _, depth, rate, slide, axes, jacobian, there = self._touch(where, q, v)
+                force += (axes.T @ contact.force(depth, rate, slide)) @ (jacobian - there)
         for load in self.document.get("loads", []):
             force[3 * self.names.index(load["body"]) + 2] += np.interp(t, *np.array(load["moment"]["table"]).T)
         rows, right = self.rows(q, v, t)
@@ -209,119 +226,164 @@ class Model:
         """Times at which something given has a kink."""
         tables = [table[0] for table in self.driven.values()]
         tables += [np.array(load["moment"]["table"])[:, 0] for load in self.document.get("loads", [])]
-        laws = [law for own in self.members.values() for member in own[:1] for law in member[2]]
+        laws = [law for own in self.members.values() for law in own[0].laws]
         tables += [np.array(law.keys["table"])[:, 0] for law in laws if law.kind == "table"]
         return sorted({0.0, self.end, *(float(t) for table in tables for t in table if 0.0 < t < self.end)})
 
-    def solve(self) -> None:
-        """The motion, as pieces (start, end, dense solution)."""
-        y = np.concatenate([self.q0, self.v0])
-        self.pieces = []
-        for low, high in pairwise(self.breaks()):
-            found = solve_ivp(
-                lambda t, y: np.concatenate([y[self.n :], self.balance(t, y)[0]]), (low, high), y, method="DOP853",
-                rtol=RTOL, atol=ATOL, max_step=self.end / 60.0, dense_output=True,
-            )  # fmt: skip
-            self.pieces.append((low, high, found.sol))
-            y = found.y[:, -1]
+    def _seen(self, y: Vector) -> Iterator[tuple[Any, tuple[float, ...]]]:
+        """All that switches, with what it switches by."""
+        q, v = y[: self.n], y[self.n :]
+        for own in self.members.values():
+            for one in own:
+                if any(law.switches for law in one.laws):
+                    length, rate, _, _ = stretch(one.a, one.b, q, v)
+                    yield from ((law, (length - one.free, rate)) for law in one.laws if law.switches)
+        for contact, *where in self.contacts:
+            yield contact, self._touch(where, q, v)[:3]
 
-    def look(self, response: Any, t: float, y: Vector) -> float:
-        """A response at a time and state."""
+    def _margins(self, y: Vector) -> Vector:
+        return np.array([each.margin(*seen) for each, seen in self._seen(y)])
+
+    def solve(self) -> None:
+        """The motion, in pieces."""
+        t, y = 0.0, np.concatenate([self.q0, self.v0])
+        for each, seen in self._seen(y):
+            each.place(*seen)
+        self.pieces: list[Piece] = []
+        switched = 0
+        for high in self.breaks()[1:]:
+            while t < high:
+                steps, who = self._steps(t, y, high)
+                self.pieces.append(Piece(t, steps[-1].t, steps, self._modes()))
+                t, y = steps[-1].t, np.asarray(steps[-1](steps[-1].t))
+                if who >= 0:
+                    each, seen = list(self._seen(y))[who]
+                    each.after(*seen)
+                    switched += 1
+                    if switched > MOST:
+                        raise ArithmeticError("it chatters")
+
+    def _steps(self, t: float, y: Vector, high: float) -> tuple[list[Any], int]:
+        """Steps from a state to a time, or to where a margin is used up: that of number so much, else -1."""
+        solver = DOP853(
+            lambda t, y: np.concatenate([y[self.n :], self.balance(t, y)[0]]), t, y, high, rtol=RTOL, atol=ATOL,
+            max_step=self.end / STEPS,
+        )  # fmt: skip
+        steps: list[Any] = []
+        before = self._margins(y)
+        while solver.status == "running":
+            solver.step()
+            step = solver.dense_output()
+            steps.append(step)
+            if not len(before):
+                continue
+            for low, end in pairwise(np.linspace(step.t_old, step.t, CHECKS).tolist()):
+                after = self._margins(step(end))
+                gone = [
+                    (self._used_up(step, i, low, end, before[i]), i) for i in np.flatnonzero(after < -NOUGHT).tolist()
+                ]
+                if gone:
+                    step.t, who = min(gone)
+                    return steps, who
+                before = after
+        return steps, -1
+
+    def _used_up(self, step: Any, i: int, low: float, high: float, at_low: float) -> float:
+        """When, between two times at the second of which it is, the margin of number i is used up."""
+
+        def margin(t: float) -> float:
+            each, seen = next(found for k, found in enumerate(self._seen(step(t))) if k == i)
+            return float(each.margin(*seen))
+
+        if at_low <= 0.0:  # as good as used up when the piece began; a little further it may be inside yet
+            inside = low + 1e-3 * (high - low)
+            if margin(inside) <= 0.0:
+                return low + 1e-12 * (high - low)
+            low = inside
+        return float(brentq(margin, low, high, xtol=1e-15, rtol=1e-15))
+
+    def _modes(self) -> list[tuple[int, float]]:
+        return [(each.mode, getattr(each, "growth", 0.0)) for each in self.switching]
+
+    def _restore(self, piece: Piece) -> None:
+        """Put all into the modes of a piece."""
+        for each, (mode, growth) in zip(self.switching, piece.modes, strict=True):
+            each.mode, each.growth = mode, growth
+
+    def look(self, response: Any, t: float, y: Vector) -> Vector:
+        """The components of a response at a time and state, in the modes that all is in."""
         q, v = y[: self.n], y[self.n :]
         if response == "energy":
-            return sum(
-                scale * law.energy(stretch(a, b, q, v)[0] - free)
+            stored = [
+                one.scale * law.energy(stretch(one.a, one.b, q, v)[0] - one.free)
                 for own in self.members.values()
-                for scale, free, laws, a, b in own
-                for law in laws
-            )
+                for one in own
+                for law in one.laws
+            ]
+            return np.array([sum(stored)])
         ((kind, keys),) = response.items()
         if kind in ("displacement", "velocity"):
             x, u, _, _ = (point := self.point(keys["body"], keys["at"])).seen(q, v)
-            return float(np.hypot(*(x - point.fixed if kind == "displacement" else u)))
+            return x - point.fixed if kind == "displacement" else u
         if kind in ("angle", "angular_velocity"):
-            return float((q if kind == "angle" else v)[3 * self.names.index(keys["body"]) + 2])
+            place = 3 * self.names.index(keys["body"]) + 2
+            return np.array([(q if kind == "angle" else v)[place]])
         acceleration, lam = self.balance(t, y)
         if kind == "acceleration":
             _, _, jacobian, extra = self.point(keys["body"], keys["at"]).seen(q, v)
-            return float(np.hypot(*(jacobian @ acceleration + extra)))
+            return np.asarray(jacobian @ acceleration + extra)
         if kind == "member_force":
-            largest = 0.0
+            forces = []
             for scale, free, laws, p, end in self.members[keys["group"]]:
                 length, rate, row, bias = stretch(p, end, q, v)
-                force = sum(
-                    law.force(length - free, rate, t) + law.inertance * (row @ acceleration + bias) for law in laws
-                )
-                largest = max(largest, abs(scale * float(force)))
-            return largest
+                inertial = row @ acceleration + bias
+                total = sum(law.force(length - free, rate, t) + law.inertance * inertial for law in laws)
+                forces.append(scale * float(total))
+            return np.array(forces)
         first = 0
         for name, kind_of, *_ in self.joints:
             count = 1 if kind_of == "distance" else 2
             if name == keys["joint"]:
-                return float(np.linalg.norm(lam[first : first + count]))
+                return np.asarray(lam[first : first + count])
             first += count
         raise KeyError(kind)
 
     def objective(self, response: Any, over_time: str) -> tuple[float, float]:
         """The value, and the largest size that the response has at the places looked at."""
-
-        def along(sol: Callable[[float], Vector], power: int = 1) -> Callable[[float], float]:
-            return lambda t: self.look(response, t, sol(t)) ** power
-
-        g = [along(sol) for _, _, sol in self.pieces]
-        spans = [(low, high) for low, high, _ in self.pieces]
-        grids = [np.linspace(low, high, 2 + int(LOOKS * (high - low) / self.end)) for low, high in spans]
-        values = [np.array([f(t) for t in grid]) for f, grid in zip(g, grids, strict=True)]
-        size = max(float(np.abs(each).max()) for each in values)
-        if over_time == "final":
-            return float(values[-1][-1]), size
-        if over_time in ("max", "min", "max_abs"):
-            signs = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}[over_time]
-            best = max(
-                highest(f, grid, seen, sign) for f, grid, seen in zip(g, grids, values, strict=True) for sign in signs
-            )
-            return (-best if over_time == "min" else best), size
+        led = isinstance(response, dict) and "member_force" in response
+        signed = isinstance(response, dict) and ("angle" in response or "angular_velocity" in response)
         power = 2 if over_time == "rms" else 1
-        total = sum(integral(along(sol, power), low, high) for low, high, sol in self.pieces)
+        size = total = value = 0.0
+        best: list[float] = []
+        for piece in self.pieces:
+            self._restore(piece)
+
+            def components(t: float, piece: Piece = piece) -> Vector:
+                return self.look(response, t, piece(t))
+
+            def g(t: float, components: Look = components) -> float:
+                found = components(t)
+                return float(found[0]) if signed else length(found, led)
+
+            grid = np.linspace(piece.low, piece.high, 4 + int(LOOKS * (piece.high - piece.low) / self.end))
+            seen = np.array([components(t) for t in grid])
+            cuts = [] if signed else sorted(kinks(components, grid, seen, led))
+            sizes = seen[:, 0] if signed else np.array([length(each, led) for each in seen])
+            size = max(size, float(np.abs(sizes).max()))
+            if over_time == "final":
+                value = float(sizes[-1])
+            elif over_time in ("max", "min", "max_abs"):
+                at = np.array([g(t) for t in cuts])
+                order = np.argsort(np.append(grid, cuts), kind="stable")
+                every, values = np.append(grid, cuts)[order], np.append(sizes, at)[order]
+                signs = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}[over_time]
+                best += [highest(g, every, values, sign) for sign in signs]
+            else:
+                total += integral(lambda t, g=g: g(t) ** power, [piece.low, *cuts, piece.high])  # type: ignore[misc]
+        if over_time == "final":
+            return value, size
+        if best:
+            return (-max(best) if over_time == "min" else max(best)), size
         if over_time == "integral":
             return total, size
         return (total / self.end if over_time == "mean" else float(np.sqrt(total / self.end))), size
-
-
-def highest(f: Callable[[float], float], grid: Vector, seen: Vector, sign: float) -> float:
-    """The largest value of sign f over a grid (K,) with values seen (K,), refined about those that come near."""
-    values = sign * seen
-    best = float(np.max(values))
-    near = np.flatnonzero(values >= best - 0.02 * max(abs(best), float(np.ptp(values))))
-    for i in near.tolist():
-        low, high = max(i - 1, 0), min(i + 1, len(grid) - 1)
-        if values[i] < values[low] or values[i] < values[high]:
-            continue
-        found = minimize_scalar(
-            lambda t: -sign * f(t), bounds=(grid[low], grid[high]), method="bounded", options={"xatol": 1e-12}
-        )
-        best = max(best, -float(found.fun))
-    return best
-
-
-def integral(f: Callable[[float], float], low: float, high: float) -> float:
-    """By Gauss-Legendre panels that are halved where they do not agree with their halves."""
-    nodes, weights = np.polynomial.legendre.leggauss(6)
-
-    def panel(a: float, b: float) -> float:
-        middle, half = 0.5 * (a + b), 0.5 * (b - a)
-        return half * float(sum(w * f(middle + half * x) for x, w in zip(nodes, weights, strict=True)))
-
-    edges = np.linspace(low, high, PANELS + 1)
-    left = [(a, b, panel(a, b), 0) for a, b in pairwise(edges)]
-    whole = sum(abs(rough) for _, _, rough, _ in left)
-    total = 0.0
-    while left:
-        a, b, rough, depth = left.pop()
-        middle = 0.5 * (a + b)
-        one, two = panel(a, middle), panel(middle, b)
-        if abs(one + two - rough) <= AGREE * whole or depth == DEPTH:
-            total += one + two
-        else:
-            left += [(a, middle, one, depth + 1), (middle, b, two, depth + 1)]
-    return total

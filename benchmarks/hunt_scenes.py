@@ -10,6 +10,16 @@ from typing import Any
 
 import numpy as np
 
+#: laws that some parameter of can vary, and which
+VARIED = {
+    "spring": ("stiffness", "preload"),
+    "gap": ("stiffness", "gap"),
+    "cubic": ("stiffness", "cubic"),
+    "pulse": ("peak", "rate", "time"),
+    "actuator": ("proportional", "derivative", "target"),
+    "crush": ("stiffness", "force", "gap"),
+    "inerter": ("inertance",),
+}
 LAWS = ("spring", "damped", "gap", "stop", "cubic", "curve", "pulse", "table", "actuator", "limited", "inerter", "two")
 REDUCTIONS = ("max", "min", "max_abs", "mean", "rms", "integral", "final")
 #: the end of every scene, s
@@ -85,8 +95,96 @@ def scene(seed: int, change: Change = Change()) -> dict[str, Any]:
     if rng.random() < 0.5:
         rows = [[t, change.spin(level)] for t, level in zip((0.0, 0.2, 0.5, END), levels, strict=True)]
         document["loads"] = [{"body": change.name(names[-1]), "moment": {"table": rows}}]
+    more = Source(np.random.default_rng([seed, 1]))
+    if more.rng.random() < 0.35:
+        _contacts(document, names, places, more, change)
+    if more.rng.random() < 0.25:
+        _legs(document, names, places, more, change)
+    if more.rng.random() < 0.4:
+        _variables(document, more, change)
     _objectives(document, names, places, rng, draw, change)
     return document
+
+
+class Source:
+    """Random numbers of what was added to scenes later: they leave what older seeds drew as it was."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
+
+    def __call__(self, low: float, high: float) -> float:
+        """A number with six decimal places."""
+        return float(np.round(self.rng.uniform(low, high), 6))
+
+
+def _contacts(document: dict[str, Any], names: list[str], places: Any, draw: Source, change: Change) -> None:
+    """Points of a body above an edge of the ground, or of another body, some of them beside it."""
+    chain = ["ground", *names]
+    falls, holds = draw.rng.choice(len(chain), 2, replace=False).tolist()
+    if falls == 0 or draw.rng.random() < 0.6:
+        falls, holds = falls or holds, 0
+    x, y = places[chain[falls]]
+    feet = [(x + draw(-0.4, 0.4), y - draw(0.1, 0.4)) for _ in range(int(draw.rng.integers(1, 3)))]
+    low = min(foot[1] for foot in feet) - draw(0.02, 0.3)
+    left, right, rise = x - draw(0.3, 1.5), x + draw(0.3, 1.5), draw(-0.02, 0.02)
+    # left of the way from left to right is above; mirrored, it is so on the way back
+    edge = [change.point(left, low - rise), change.point(right, low)]
+    begin, end = edge[::-1] if change.mirror else edge
+    document.setdefault("points", {})["feet"] = {
+        "body": change.name(chain[falls]), "grid": {"list": [change.point(*foot) for foot in feet]}
+    }  # fmt: skip
+    contact = {
+        "name": "floor",
+        "points": "feet",
+        "on": {"body": change.name(chain[holds]), "from": begin, "to": end},
+        "stiffness": change.force * draw(300.0, 3000.0),
+        "damping": change.force * draw(2.0, 30.0),
+        "friction": draw(0.1, 0.5) if draw.rng.random() < 0.6 else 0.0,
+        "slip": draw(0.05, 0.3),
+    }
+    if draw.rng.random() < 0.3:
+        contact["damping"] = 0.0
+    document["contacts"] = [contact]
+
+
+def _legs(document: dict[str, Any], names: list[str], places: Any, draw: Source, change: Change) -> None:
+    """A group that is crushed for good."""
+    chain = ["ground", *names]
+    a, b = sorted(draw.rng.choice(len(chain), 2, replace=False).tolist())
+    members = int(draw.rng.integers(1, 3))
+    x, y = places[chain[b]]
+    ends: list[list[list[float]]] = [[], []]
+    for _ in range(members):
+        near, way, length = (x + draw(-0.4, 0.4), y + draw(-0.4, 0.4)), draw(0.0, 6.28), draw(0.8, 1.6)
+        ends[0].append(change.point(near[0] + length * cos(way), near[1] + length * sin(way)))
+        ends[1].append(change.point(*near))
+    points = document.setdefault("points", {})
+    points["top"] = {"body": change.name(chain[a]), "grid": {"list": ends[0]}}
+    points["foot"] = {"body": change.name(chain[b]), "grid": {"list": ends[1]}}
+    stiffness, force = change.force * draw(200.0, 1500.0), change.force * draw(4.0, 25.0)
+    law = {"type": "crush", "stiffness": stiffness, "force": force, "gap": draw(0.0, 0.05)}
+    law["side"] = "tension" if draw.rng.random() < 0.5 else "compression"
+    way_from, way_to = ("foot", "top") if change.swap else ("top", "foot")
+    document["members"][change.prefix + "legs"] = {"from": way_from, "to": way_to, "connect": "pairs", "law": law}
+
+
+def _variables(document: dict[str, Any], draw: Source, change: Change) -> None:
+    """Parameters of laws that are design variables, at the values that the laws have."""
+    groups = [name for name, group in document["members"].items() if isinstance(group["law"], dict)]
+    found: dict[str, Any] = {}
+    for name in draw.rng.permutation(groups)[:2].tolist():
+        law = document["members"][name]["law"]
+        there = [parameter for parameter in VARIED.get(law["type"], ()) if law.get(parameter, 0.0) != 0.0]
+        if not there:
+            continue
+        parameter = str(draw.rng.choice(there))
+        value = law[parameter]
+        row = {"group": name, "parameter": parameter, "lower": 0.5 * value, "upper": 1.5 * value}
+        if draw.rng.random() < 0.4:
+            row["each"] = "member"
+        found[f"{change.prefix}of_{parameter}_{len(found)}"] = row
+    if found:
+        document["design"]["variables"] = found
 
 
 def _held(document: dict[str, Any], names: list[str], places: Any, rng: Any, draw: Any, change: Change) -> None:
