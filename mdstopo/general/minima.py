@@ -5,9 +5,9 @@ value, and so does the minimum of a design nearby, where the time t of the cross
 
     dG = df_a + f_a' dt = df_b + f_b' dt,   so   dG = (f_b' df_a - f_a' df_b) / (f_b' - f_a'),
 
-a mean of both derivatives. A norm that passes zero has its minimum there and keeps it: dG = 0. Where it only comes near
-zero it turns round so sharply that its time has to be found better than from rates by differences: from its square,
-which is smooth.
+a mean of both derivatives; where b stays as it is, held at an actuator's limit, that of b alone. A norm that passes
+zero has its minimum there and keeps it: dG = 0. Where it only comes near zero it turns round so sharply that its time
+has to be found better than from rates by differences: from its square, which is smooth.
 """
 
 from functools import cached_property

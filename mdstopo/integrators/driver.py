@@ -13,11 +13,12 @@ import numpy as np
 
 from mdstopo.case.memory import holds_steps
 from mdstopo.evaluation import USUAL, Rows, Shape
+from mdstopo.integrators.integrands import ROUNDS, is_integrated, landed, landings
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.mechanics.carrying import ROOMY
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.packing import aligned, pack
+from mdstopo.scene.packing import Packed, aligned, pack
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
@@ -81,13 +82,15 @@ class Driver:
         self.method = method
         self._entry: Any = None
         self._beside = beside
-        self.packed = pack(scene.model)
+        self.packed = self._plain = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
-        self._shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
+        #: coordinates, pairs, whether anything depends on velocity, whether loads turn: what room is made for
+        self.shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
         fixed = step > 0.0 or method.name == "generalized_alpha"
         newton = NEWTON_TOLERANCE if fixed else min(max(tolerance, NEWTON_TOLERANCE), LOOSE_NEWTON)
         self.settings = np.array([tolerance, newton, step, CLOSENESS])
         self.reductions = reductions
+        self._integrated = is_integrated(method.name, step, reductions)
         self.work = np.zeros(WORK, dtype=np.int64)
         padded = scene.model.member.shape[1]
         count = len(reductions)
@@ -133,7 +136,7 @@ class Driver:
         self._look: dict[bool, Callable[..., Any]] = {}
 
     def _make_room(self, steps: int, stages: int) -> None:
-        n, n_pair, damped, turning = self._shape
+        n, n_pair, damped, turning = self.shape
         floats, ints = room_for(n, n_pair, steps, stages, damped, turning)
         self.limits = np.array([MAX_STEPS, steps, stages], dtype=np.int64)
         self.room = np.zeros(floats)
@@ -170,6 +173,26 @@ class Driver:
         """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
         if alpha is not self._alpha:
             self._alpha[:] = alpha
+        self._take(self._plain)
+        code, count, time = self._run(tangent)
+        if code == OK and self._integrated:
+            more, times = landings(self, count), list[float]()
+            for _ in range(ROUNDS):
+                if not more:
+                    break
+                times += more
+                self._take(pack(landed(self.scene.model, times)))
+                code, count, time = self._run(tangent)
+                more = landings(self, count) if code == OK else []
+        return code, count, time
+
+    def _take(self, packed: Packed) -> None:
+        """Let the kernels see a model, packed."""
+        if packed is not self.packed:
+            self.packed = packed
+            self._simulate, self._look = {}, {}
+
+    def _run(self, tangent: bool) -> tuple[int, int, float]:
         while True:
             self.work.fill(0)
             if tangent not in self._simulate:
@@ -213,11 +236,13 @@ class Driver:
         room_ints: IndexArray,
         strength: FloatArray,
         times: FloatArray | None = None,
+        packed: Packed | None = None,
     ) -> tuple[Any, ...]:
         asked = np.zeros(0) if times is None else times
+        ints, floats = self.packed if packed is None else packed
         return (
-            self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self.scene.damped, limits,
-            count, room, room_ints, strength, asked, np.zeros((3, len(asked), self._shape[0])),
+            self.entry.TAG, ints, floats, self.method.tables, self.scene.damped, limits,
+            count, room, room_ints, strength, asked, np.zeros((3, len(asked), self.shape[0])),
             np.zeros(WORK, dtype=np.int64),
         )  # fmt: skip
 
@@ -232,9 +257,9 @@ class DenseSteps:
     def __init__(self, driver: Driver, count: int) -> None:
         self._driver = driver
         self._room, self._ints = driver.room.copy(), driver.room_ints.copy()
-        self._limits, self._strength = driver.limits, driver.strength[:3].copy()
+        self._limits, self._strength, self._packed = driver.limits, driver.strength[:3].copy(), driver.packed
         self.count = count
-        n, n_pair, damped, turning = driver._shape
+        n, n_pair, damped, turning = driver.shape
         arrays = carve.py_func(  # type: ignore[attr-defined]
             self._room, self._ints, n, n_pair, int(self._limits[1]), int(self._limits[2]), damped, turning
         )
@@ -247,8 +272,9 @@ class DenseSteps:
         if self.count == 0:
             raise ValueError("no step was completed")
         arguments = self._driver._dense_arguments(
-            self.count, self._limits, self._room, self._ints, self._strength, np.array(times, dtype=np.float64)
-        )
+            self.count, self._limits, self._room, self._ints, self._strength, np.array(times, dtype=np.float64),
+            self._packed,
+        )  # fmt: skip
         self._driver.looking.dense(*arguments)
         out: FloatArray = arguments[-2]
         return out

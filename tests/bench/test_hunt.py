@@ -28,8 +28,8 @@ def model(monkeypatch):
     monkeypatch.syspath_prepend(str(ROOT))
     from benchmarks.hunt_model import Model
 
-    def solved(document, alpha=(1.0,)):
-        found = Model(document, np.array(alpha))
+    def solved(document, alpha=(1.0,), values=None):
+        found = Model(document, np.array(alpha), values)
         found.solve()
         return found
 
@@ -81,10 +81,122 @@ def test_the_power_of_a_design_scales_its_forces(model):
     ],
 )
 def test_laws_are_those_of_the_format(model, law, x, rate, t, force, energy):
-    from benchmarks.hunt_model import Law
+    from benchmarks.hunt_laws import Law
 
-    assert Law(law).force(x, rate, t) == pytest.approx(force, rel=1e-12, abs=1e-15)
-    assert Law(law).energy(x) == pytest.approx(energy, rel=1e-12, abs=1e-15)
+    found = Law(law)
+    found.place(x, rate)
+    assert found.force(x, rate, t) == pytest.approx(force, rel=1e-12, abs=1e-15)
+    assert found.energy(x) == pytest.approx(energy, rel=1e-12, abs=1e-15)
+
+
+LEG = {"type": "crush", "stiffness": 100.0, "force": 5.0, "gap": 0.1, "side": "tension"}
+
+
+def test_a_leg_is_crushed_and_stays_so(model):
+    """Drawn out at 1 m/s against 5 N, which is small beside its momentum: then back along its stiffness."""
+    from benchmarks.hunt_laws import ACTS, FREE, HELD, Law
+
+    leg = Law(LEG)
+    leg.place(0.0, 1.0)
+    assert leg.mode == FREE
+    assert leg.margin(0.0, 1.0) == pytest.approx(0.1)
+    leg.after(0.1, 1.0)
+    assert leg.mode == ACTS
+    assert leg.force(0.12, 1.0, 0.0) == pytest.approx(2.0)
+    leg.after(0.15, 1.0)
+    assert leg.mode == HELD
+    assert leg.force(0.4, 1.0, 0.0) == 5.0
+    assert leg.energy(0.4) == pytest.approx(0.125)
+    leg.after(0.4, 0.0)
+    assert leg.mode == ACTS
+    assert leg.growth == pytest.approx(0.25)
+    assert leg.force(0.38, -1.0, 0.0) == pytest.approx(3.0)
+    leg.after(0.35, -1.0)
+    assert leg.mode == FREE
+    assert leg.margin(0.2, -1.0) == pytest.approx(0.15)
+
+
+def falling(friction, velocity, edge, damping=0.0):
+    body = {"mass": 2.0, "inertia": 1e6, "position": [0.0, 1.0], "velocity": velocity, "angular_velocity": 0.0}
+    return {
+        "gravity": [0.0, -10.0],
+        "time": {"end": 1.0},
+        "bodies": {"a": body},
+        "points": {"feet": {"body": "a", "grid": {"list": [[0.0, 0.8]]}}},
+        "members": {},
+        "design": {"power": 1},
+        "contacts": [
+            {
+                "points": "feet",
+                "on": {"body": "ground", "from": edge[0], "to": edge[1]},
+                "stiffness": 800.0,
+                "damping": damping,
+                "friction": friction,
+                "slip": 1e-3,
+            }
+        ],
+    }
+
+
+def test_what_falls_on_a_floor_bounces_back_as_high(model):
+    """From 0.8 m; in contact it swings about the depth m g / k with w^2 = k / m = 400."""
+    scene = model(falling(0.0, [0.0, 0.0], [[-1.0, 0.0], [1.0, 0.0]]), ())
+    touch, w, sag = 0.4, 20.0, 10.0 / 400.0
+    turn = math.pi / 2.0 + math.atan(sag * w / 4.0)  # until the lowest point
+    high = scene.objective({"acceleration": {"body": "a", "at": [0.0, 1.0]}}, "max")[0]
+    assert high == pytest.approx(w * w * math.hypot(sag, 4.0 / w), rel=1e-9)
+    assert [piece.low for piece in scene.pieces] == pytest.approx([0.0, touch, touch + 2.0 * turn / w], rel=1e-9)
+
+
+def test_what_slides_on_a_floor_is_held_back_by_its_friction(model):
+    """It begins at the depth of rest; mu g = 3 m/s^2 slow it down from 5 m/s."""
+    document = falling(0.3, [5.0, 0.0], [[-1.0, 0.825], [9.0, 0.825]])
+    scene = model(document, ())
+    speed = scene.objective({"velocity": {"body": "a", "at": [0.0, 1.0]}}, "final")[0]
+    assert speed == pytest.approx(2.0, rel=1e-5)
+
+
+def test_beyond_the_end_of_an_edge_nothing_holds(model):
+    scene = model(falling(0.0, [2.0, 0.0], [[-1.0, 0.0], [0.5, 0.0]]), ())
+    place = scene.objective({"displacement": {"body": "a", "at": [0.0, 1.0]}}, "final")[0]
+    assert place == pytest.approx(math.hypot(2.0, 5.0), rel=1e-9)
+
+
+def test_parameters_that_vary_take_the_place_of_the_laws_own(monkeypatch):
+    from tests.test_project import ROOT
+
+    monkeypatch.syspath_prepend(str(ROOT))
+    from benchmarks.hunt_model import Model
+
+    rows = {"k": {"group": "g", "parameter": "stiffness", "each": "member"}}
+    document = SWING | {"design": {"power": 1, "variables": rows}}
+    scene = Model(document, np.array([1.0]), {"k": np.array([72.0])})
+    scene.solve()
+    assert scene.objective({"member_force": {"group": "g"}}, "max")[0] == pytest.approx(72.0 / 6.0, rel=1e-10)
+
+
+def test_integrals_know_the_kinks_of_what_they_integrate(monkeypatch):
+    """Where another component becomes the largest, and where one leads only briefly between two looks."""
+    from tests.test_project import ROOT
+
+    monkeypatch.syspath_prepend(str(ROOT))
+    from benchmarks.hunt_reductions import integral, kinks
+
+    def look(t):
+        return np.array([1.0 - 0.5 * (t - 0.5031) ** 2, 1.0 - 1e-6 + 3.0 * (t - 0.5031), -0.2])
+
+    def brief(t):
+        return np.array([1.0, 1.0 + 1e-6 - 4.0 * (t - 0.50312) ** 2])
+
+    grid = np.linspace(0.0, 1.0, 101)
+    cuts = kinks(look, grid, np.array([look(t) for t in grid]), True)
+    assert len(cuts) == 1
+    assert look(cuts[0])[0] == pytest.approx(look(cuts[0])[1], abs=1e-13)
+    cuts = sorted(kinks(brief, grid, np.array([brief(t) for t in grid]), True))
+    half = math.sqrt(1e-6 / 4.0)
+    assert cuts == pytest.approx([0.50312 - half, 0.50312 + half], abs=1e-10)
+    found = integral(lambda t: float(brief(t).max()), [0.0, *cuts, 1.0])
+    assert found - 1.0 == pytest.approx(4.0 / 3.0 * 1e-6 * half, rel=1e-3)
 
 
 def hanging(joint, velocity=(0.0, 0.0), spin=0.0):
@@ -145,15 +257,23 @@ def test_an_inerter_and_a_driven_body_share_the_acceleration(model):
     assert scene.objective({"member_force": {"group": "g"}}, "mean")[0] == pytest.approx(2.4, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", [1, 4, 10])
+def values(document):
+    """Of a scene's variables, one for each member: those that the laws have."""
+    return {
+        name: np.full(9, document["members"][row["group"]]["law"][row["parameter"]])
+        for name, row in document["design"].get("variables", {}).items()
+    }
+
+
+@pytest.mark.parametrize("seed", [1, 4, 10, 209])
 def test_a_scene_written_in_another_way_is_the_same_to_the_second_model(model, seed):
     from benchmarks.hunt_scenes import CHANGES, scene
 
     document = scene(seed)
     count = sum(len(document["points"][group["from"]]["grid"]["list"]) for group in document["members"].values())
     alpha = np.linspace(0.5, 1.0, count)
-    places = model(document, alpha).pieces[-1][2](0.5)
+    places = model(document, alpha, values(document)).pieces[-1](0.8)
     for change in CHANGES.values():
-        again = model(scene(seed, change), alpha).pieces[-1][2](0.5)
+        again = model(scene(seed, change), alpha, values(scene(seed, change))).pieces[-1](0.8)
         for at in range(0, len(places) // 2, 3):
             assert again[at : at + 2] == pytest.approx(change.point(*places[at : at + 2]), abs=1e-9)

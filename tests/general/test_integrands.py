@@ -331,3 +331,70 @@ def test_gradients_of_means_of_norms_that_come_near_zero_are_those_of_the_values
     for name in "AVD":
         slope = differences(tight, name, alpha, 1e-4)
         assert np.abs(found.gradients[name] - slope).max() <= 1e-7 * np.abs(slope).max(), name
+
+
+#: what swings past a point of rest: its speed and acceleration come near zero several times
+NEAR_ZERO = """
+format: 1
+time: {end: 2}
+bodies: {a: {mass: 1, inertia: 1, position: [1, 0], velocity: [1, 0.1]}}
+members:
+  s: {from: {body: ground, at: [-5, 0]}, to: {body: a, at: [1, 0]}, law: {type: spring, stiffness: 9, preload: 1}}
+  u: {from: {body: ground, at: [1, 7]}, to: {body: a, at: [1, 0]}, law: {type: spring, stiffness: 6}}
+design: {initial: 1}
+objectives:
+  V: {response: {velocity: {body: a}}, over_time: integral}
+  A: {response: {acceleration: {body: a}}, over_time: mean}
+combine: {weights: {V: 1, A: 1}}
+"""
+
+
+@pytest.mark.parametrize("name", ["V", "A"])
+def test_gradients_of_integrals_hold_the_tolerance_where_a_norm_comes_near_zero(name):
+    """Near zero derivatives bend more sharply than values: steps that are good for these are not for those."""
+    found = evaluate(read_case(NEAR_ZERO))
+    exact = evaluate(read_case(NEAR_ZERO, overrides={"solver.tolerance": 1e-12}))
+    assert found.objectives[name] == pytest.approx(exact.objectives[name], rel=1e-8)
+    largest = np.abs(exact.gradients[name]).max()
+    assert found.gradients[name] == pytest.approx(exact.gradients[name], abs=1e-7 * largest)
+
+
+#: a body that nothing slows down passes by: the error of its motion is zero with any step
+PASSING = """
+format: 1
+time: {end: 1}
+bodies: {a: {mass: MASS, inertia: MASS, position: [0, 0], velocity: [5, 0]}}
+members:
+  g: {from: {body: ground, at: [1.5, 0.3]}, to: {body: a, at: [0, 0]}, law: LAW}
+design: {initial: 1}
+objectives:
+  E: {response: energy, over_time: OVER}
+"""
+
+
+@pytest.mark.parametrize("law", ["{type: cubic, stiffness: 1, cubic: 1e-30}", "{type: spring, stiffness: 1}"])
+@pytest.mark.parametrize("over_time", ["mean", "rms", "integral"])
+def test_integrals_hold_the_tolerance_where_the_motion_does_not_feel_what_is_integrated(over_time, law):
+    """G = integral of k (L - L0)^2 / 2 and its power over a straight way; G is linear in alpha."""
+    from scipy.integrate import quad
+
+    def stored(t):
+        return 0.5 * (np.hypot(1.5 - 5.0 * t, 0.3) - np.hypot(1.5, 0.3)) ** 2
+
+    power = 2 if over_time == "rms" else 1
+    value = sum(quad(lambda t: stored(t) ** power, a, b, epsabs=1e-14)[0] for a, b in ((0, 0.3), (0.3, 0.6), (0.6, 1)))
+    value = np.sqrt(value) if over_time == "rms" else value
+    text = PASSING.replace("OVER", over_time).replace("LAW", law).replace("MASS", "1.0e12")
+    found = evaluate(read_case(text))
+    assert found.objectives["E"] == pytest.approx(value, rel=1e-8)
+    assert found.gradients["E"] == pytest.approx([value], rel=1e-8)
+
+
+def test_the_energy_of_a_driven_body_is_integrated_to_the_tolerance():
+    text = PASSING.replace("OVER", "mean").replace("LAW", "{type: spring, stiffness: 1, damping: 0.1}")
+    text += "motions: [{body: a, x: {velocity: 5}, y: {velocity: 0}, angle: {velocity: 0}}]\n"
+    free = PASSING.replace("OVER", "mean").replace("LAW", "{type: cubic, stiffness: 1, cubic: 1e-30}")
+    found = evaluate(read_case(text.replace("MASS", "1")))
+    other = evaluate(read_case(free.replace("MASS", "1.0e12"), overrides={"solver.tolerance": 1e-12}))
+    assert found.objectives["E"] == pytest.approx(other.objectives["E"], rel=1e-8)
+    assert found.gradients["E"] == pytest.approx(other.gradients["E"], rel=1e-8)

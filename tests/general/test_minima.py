@@ -121,3 +121,31 @@ combine: {weights: {LOW: 1, A: 1, MEAN: 1}}
         for name in ("LOW", "A"):
             assert found.objectives[name] == pytest.approx(0.0, abs=1e-12)
             assert not found.gradients[name].any()
+
+
+#: one of two actuators is at its limit all the time; the force of the other falls below that and rises again
+PLATEAU = """
+format: 1
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: 1, position: [0, 0]}}
+motions: [{body: a, x: {velocity: 1}, y: {velocity: 0}, angle: {velocity: 0}}]
+points:
+  anchors: {body: ground, grid: {list: [[-3, 0], [3, 0]]}}
+  pads: {body: a, grid: {list: [[0, 0], [0, 0]]}}
+members:
+  g:
+    from: anchors
+    to: pads
+    connect: pairs
+    law: {type: actuator, proportional: 10, derivative: 0, target: 0.5, limit: 2}
+design: {initial: 1}
+objectives:
+  LOWEST: {response: {member_force: {group: g}}, over_time: min}
+"""
+
+
+def test_a_minimum_on_a_plateau_is_that_of_the_member_that_holds_it():
+    """|t - 0.5| falls below a fifth, where the second member's force is 2 alpha_2 all the time."""
+    found = evaluate(read_case(PLATEAU), np.array([1.0, 0.6]))
+    assert found.objectives["LOWEST"] == pytest.approx(1.2, rel=1e-12)
+    assert found.gradients["LOWEST"] == pytest.approx([0.0, 2.0], abs=1e-12)

@@ -1,0 +1,79 @@
+"""Where steps are to end for the sake of an integral over time of the stored energy.
+
+The integral is that of one more coordinate, by the weights of the stages, but no error control looks at it. Where the
+motion feels the members, steps that are short enough for it are short enough for their energy. A body that is hardly
+slowed down passes by weak springs in a step or two, and their energy is no polynomial in it. So the energies of the
+stages, which are there, are written as a sum of Legendre polynomials: how fast its terms fall off tells what a rule of
+a given order leaves. Steps that leave too much are halved, and the motion is computed once more.
+"""
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.integrators.gauss_tables import LEGENDRE, LEVELS, gauss_tables
+from mdstopo.integrators.runge_kutta_tables import GENERAL, NYSTROEM, ORDERS, VECTORS, B, C, runge_kutta_tables
+from mdstopo.integrators.steps import carve
+from mdstopo.scene.model import FloatArray, IndexArray, Model
+from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
+
+if TYPE_CHECKING:
+    from mdstopo.integrators.driver import Driver
+
+#: how often a motion is computed anew: each time steps are halved
+ROUNDS = 8
+#: what a step may leave, relative to the tolerance and the whole integral
+SHARE = 0.1
+
+
+def is_integrated(method: str, step: float, reductions: IndexArray) -> bool:
+    """Whether steps may be chosen for an integral: one is looked at, and the method chooses its steps."""
+    return method in ("gauss", "runge_kutta") and not step > 0.0 and bool(np.isin(reductions, (MEAN, INTEGRAL)).any())
+
+
+def landed(model: Model, times: list[float]) -> Model:
+    """The model with further ends of segments; what acts in time is the same function as before."""
+    whole = np.unique(np.append(model.times, times))
+    parent = np.clip(np.searchsorted(model.times, whole[:-1], side="right") - 1, 0, len(model.times) - 2)
+    tau = whole[:-1] - model.times[parent]
+    force, turning = model.force[parent].copy(), model.load_force[parent].copy()
+    force[..., 0] += tau[:, None] * force[..., 1]
+    turning[..., 0] += tau[:, None, None] * turning[..., 1]
+    return model._replace(times=whole, force=force, load_force=turning)
+
+
+def landings(driver: "Driver", count: int) -> list[float]:
+    """Middles of the steps, of the `count` that were computed last, whose energy their rule does not integrate."""
+    n, n_pair, damped, turning = driver.shape
+    t, _, index, scalar, *_ = carve.py_func(  # type: ignore[attr-defined]
+        driver.room, driver.room_ints, n, n_pair, int(driver.limits[1]), int(driver.limits[2]), damped, turning
+    )
+    energy, first = scalar[:, 1], index[: count + 1, 0]
+    width = np.diff(t[: count + 1])
+    left = np.zeros(count)
+    whole = 0.0
+    for w in range(count):
+        rule, used, order = _rule(driver.method.name, damped, int(first[w + 1] - first[w]))
+        sizes = np.abs(rule @ energy[first[w] + used])
+        whole += width[w] * sizes[0]
+        largest, last = float(sizes.max()), float(sizes[-2:].max())
+        if largest > 0.0:
+            left[w] = width[w] * largest * (last / largest) ** (order / (len(sizes) - 1))
+    bad = left > SHARE * float(driver.settings[0]) * whole
+    middles: list[float] = (t[:count] + 0.5 * width)[bad].tolist()
+    return middles
+
+
+@cache
+def _rule(method: str, damped: bool, stages: int) -> tuple[FloatArray, IndexArray, int]:
+    """What turns values at some stages into Legendre coefficients over the step, which stages, the rule's order."""
+    if method == "gauss":
+        return gauss_tables()[LEVELS.index(stages), LEGENDRE, :stages, :stages], np.arange(stages), 2 * stages
+    which = GENERAL if damped else NYSTROEM
+    vectors = runge_kutta_tables()[which, VECTORS, :, :stages]
+    used = np.flatnonzero(vectors[B] != 0.0)
+    nodes, first = np.unique(vectors[C, used], return_index=True)  # two stages may stand at one time
+    used = used[first]
+    values = np.polynomial.legendre.legvander(2.0 * nodes - 1.0, len(nodes) - 1)
+    return np.linalg.inv(values), used, ORDERS[which]
