@@ -8,8 +8,9 @@ Every scene is evaluated at the default tolerance, and then
 - its error estimates against what the second model says the errors are.
 
 Values are compared relative to the largest size that the response has in the motion, gradients relative to the largest
-part of the slope along the direction (and to a thousandth of that size where they are smaller). A difference that two
-step sizes do not agree on decides nothing.
+part of the slope along the direction (and to a thousandth of that size where they are smaller). What joints hold at zero
+is zero to rounding, so that no size is below a millionth. A difference that two step sizes do not agree on decides
+nothing.
 """
 
 import json
@@ -32,8 +33,8 @@ from mdstopo.case.reader import read_case
 TOLERANCE, FINE = 1e-8, 1e-12
 #: steps of differences, relative to the design
 STEPS = (4e-3, 1e-3, 2.5e-4)
-#: what the second model is good to: smaller errors cannot be told
-RESOLVED = 1e-11
+#: what the second model is good to, relative and, where it rounds what is zero, absolute: smaller errors cannot be told
+RESOLVED, ROUNDED = 1e-11, 1e-13
 #: the smallest size that a response counts with: what joints hold at zero is zero to rounding
 SMALLEST = 1e-6
 
@@ -123,7 +124,7 @@ def look(seed: int, found: Found) -> None:
         label = f"{keys['over_time']} of {keys['response']}"
         error = abs(result.objectives[name] - value) / size
         found.values.append((error / TOLERANCE, seed, label))
-        if error > RESOLVED and name in result.errors:
+        if error > RESOLVED and error * size > ROUNDED and name in result.errors:
             found.estimates.append((result.errors[name].value / (error * size), seed, label))
     _gradients(own, found)
     _changes(own, found)

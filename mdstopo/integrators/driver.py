@@ -174,17 +174,24 @@ class Driver:
         if alpha is not self._alpha:
             self._alpha[:] = alpha
         self._take(self._plain)
-        code, count, time = self._run(tangent)
-        if code == OK and self._integrated:
-            more, times = landings(self, count), list[float]()
-            for _ in range(ROUNDS):
-                if not more:
-                    break
-                times += more
-                self._take(pack(landed(self.scene.model, times)))
-                code, count, time = self._run(tangent)
-                more = landings(self, count) if code == OK else []
-        return code, count, time
+        found = self._run(tangent)
+        return self._resolve(tangent, found) if self._integrated and found[0] == OK else found
+
+    def _resolve(self, tangent: bool, found: tuple[int, int, float]) -> tuple[int, int, float]:
+        """The run that was `found`, or one whose steps are short enough for the integral of the energy, too."""
+        more, first = landings(self, found[1])
+        times, total, plain = list[float](), first, found
+        for _ in range(ROUNDS):
+            if not more or found[0] != OK:
+                break
+            times += more
+            self._take(pack(landed(self.scene.model, times)))
+            found = self._run(tangent)
+            more, total = landings(self, found[1])
+        if found is plain or abs(total - first) > float(self.settings[0]) * abs(total):
+            return found
+        self._take(self._plain)  # it was good enough: numbers stay what they were
+        return self._run(tangent)
 
     def _take(self, packed: Packed) -> None:
         """Let the kernels see a model, packed."""

@@ -386,8 +386,8 @@ def test_integrals_hold_the_tolerance_where_the_motion_does_not_feel_what_is_int
     value = np.sqrt(value) if over_time == "rms" else value
     text = PASSING.replace("OVER", over_time).replace("LAW", law).replace("MASS", "1.0e12")
     found = evaluate(read_case(text))
-    assert found.objectives["E"] == pytest.approx(value, rel=1e-8)
-    assert found.gradients["E"] == pytest.approx([value], rel=1e-8)
+    assert found.objectives["E"] == pytest.approx(value, rel=5e-8)
+    assert found.gradients["E"] == pytest.approx([value], rel=5e-8)
 
 
 def test_the_energy_of_a_driven_body_is_integrated_to_the_tolerance():
