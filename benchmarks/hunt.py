@@ -8,8 +8,8 @@ Every scene is evaluated at the default tolerance, and then
 - its error estimates against what the second model says the errors are.
 
 Values are compared relative to the largest size that the response has in the motion, gradients relative to the largest
-part of the slope along the direction (and to a thousandth of that size where they are smaller). What joints hold at zero
-is zero to rounding, so that no size is below a millionth. A difference that two step sizes do not agree on decides
+part of the slope along the direction (and to a thousandth of that size where they are smaller). What joints hold at
+zero is zero to rounding, so that no size is below a millionth. A difference that two step sizes do not agree on decides
 nothing.
 """
 

@@ -25,7 +25,7 @@ from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.origin import extent_of, origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
-from mdstopo.sensitivity.reductions import REDUCTIONS
+from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
@@ -307,7 +307,8 @@ class Evaluator:
             if isinstance(scene, Scene):
                 reductions = np.array([REDUCTIONS[each.over_time] for each in looked], dtype=np.int64)
                 alpha = self._design.values
-                driver = Driver(scene, self._method, tolerance, step, reductions, alpha, self._beside)
+                integrated = any(each.over_time in INTEGRALS for each in looked)
+                driver = Driver(scene, self._method, tolerance, step, reductions, alpha, self._beside, integrated)
             else:
                 from mdstopo.general.driver import GeneralDriver
 

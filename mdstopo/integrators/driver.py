@@ -13,7 +13,7 @@ import numpy as np
 
 from mdstopo.case.memory import holds_steps
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.integrators.integrands import ROUNDS, is_integrated, landed, landings
+from mdstopo.integrators.integrands import ROUNDS, landed, landings
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.mechanics.carrying import ROOMY
 from mdstopo.scene.compile import Scene
@@ -65,7 +65,8 @@ class Looked(NamedTuple):
 class Driver:
     """One scene, one method, ready to run.
 
-    alpha (N,): the array that every design is put in; shared with whoever gives designs.
+    alpha (N,): the array that every design is put in; shared with whoever gives designs. integrated: whether something
+    is looked at that is integrated over time, so that steps have to be good for that, too.
     """
 
     def __init__(
@@ -77,6 +78,7 @@ class Driver:
         reductions: IndexArray,
         alpha: FloatArray,
         beside: Beside | None = None,
+        integrated: bool = False,
     ) -> None:
         self.scene = scene
         self.method = method
@@ -90,7 +92,7 @@ class Driver:
         newton = NEWTON_TOLERANCE if fixed else min(max(tolerance, NEWTON_TOLERANCE), LOOSE_NEWTON)
         self.settings = np.array([tolerance, newton, step, CLOSENESS])
         self.reductions = reductions
-        self._integrated = is_integrated(method.name, step, reductions)
+        self._integrated = integrated and not fixed
         self.work = np.zeros(WORK, dtype=np.int64)
         padded = scene.model.member.shape[1]
         count = len(reductions)

@@ -17,7 +17,6 @@ from mdstopo.integrators.gauss_tables import LEGENDRE, LEVELS, gauss_tables
 from mdstopo.integrators.runge_kutta_tables import GENERAL, NYSTROEM, ORDERS, VECTORS, B, C, runge_kutta_tables
 from mdstopo.integrators.steps import carve
 from mdstopo.scene.model import FloatArray, IndexArray, Model
-from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 
 if TYPE_CHECKING:
     from mdstopo.integrators.driver import Driver
@@ -28,11 +27,6 @@ ROUNDS = 8
 #: times less: of 60 random scenes one or two have such a step, in vain. So what changes the integral by less than the
 #: tolerance is not taken
 SHARE = 10.0
-
-
-def is_integrated(method: str, step: float, reductions: IndexArray) -> bool:
-    """Whether steps may be chosen for an integral: one is looked at, and the method chooses its steps."""
-    return method in ("gauss", "runge_kutta") and not step > 0.0 and bool(np.isin(reductions, (MEAN, INTEGRAL)).any())
 
 
 def landed(model: Model, times: list[float]) -> Model:

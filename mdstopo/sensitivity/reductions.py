@@ -11,3 +11,6 @@ REDUCTIONS = {
     "max_abs": MAX_ABS,
     "rms": RMS,
 }
+
+#: those that are integrals over time
+INTEGRALS = ("mean", "integral", "rms")
