@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.kinks import kinks
-from mdstopo.general.responses import kinked
+from mdstopo.general.responses import ANGLE, POINT, kinked
+from mdstopo.general.start import size_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.model import FloatArray
 
@@ -33,8 +34,10 @@ ROUNDS = 3
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
 SHARE = 1e-3
-#: halvings of one step at most
-HALVINGS = 24
+#: halvings of one step at most; from which of them on one is in vain that leaves more than so much of the difference
+HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
+#: places and angles below this share of the scene's size, or of a radian, are rounding
+NOUGHT = 1e-12
 #: steps nearer together than this share of the simulated time are one
 APART = 1e-10
 
@@ -67,22 +70,35 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
             value = driver.see(j, count, places, False, rates=False)[:, 0]
             return value * value if square else value
 
-        found += halves(t, ends, look, rule, SHARE * float(driver.settings[0]))
+        nothing = _rounding(driver, j, float(t[-1] - t[0]))
+        nothing = nothing * nothing if INTEGRALS[name] == 2 else nothing
+        found += halves(t, ends, look, rule, SHARE * float(driver.settings[0]), nothing * float(t[-1] - t[0]))
     return found
 
 
-def halves(t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolerance: float) -> list[float]:
+def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
+    """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
+    kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
+    if kind not in (POINT, ANGLE):
+        return 0.0
+    return float(NOUGHT * (size_of(driver.case) if kind == POINT else 1.0) / span**order)
+
+
+def halves(
+    t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolerance: float, nothing: float = 0.0
+) -> list[float]:
     """Times that halve the intervals between `ends` (k + 1,), and their halves, until the rule is good on each.
 
     t (m + 1,): ends of steps, all of them among `ends`; rule (2, s): nodes and weights on (0, 1). Good is what differs
-    from the Gauss-Legendre sum by the tolerance times the whole integral at most.
+    from the Gauss-Legendre sum by the tolerance times the whole integral at most; an integral below `nothing` is zero.
     """
     places = np.concatenate([rule[0], 0.5 * (NODES + 1.0)])
     low, width = ends[:-1], np.diff(ends)
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
     whole = np.nan
-    for _ in range(HALVINGS):
+    before = np.full(0, np.inf)
+    for depth in range(HALVINGS):
         times = low[:, None] + width[:, None] * places
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
         at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
@@ -91,9 +107,16 @@ def halves(t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolera
         better = 0.5 * width * np.einsum("ij,j->i", value[:, rule.shape[1] :], WEIGHTS)
         if np.isnan(whole):
             whole = float(np.abs(better).sum())
-        bad = (np.abs(sums - better) > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
+            if whole <= nothing:
+                break
+        off = np.abs(sums - better)
+        bad = (off > tolerance * whole) & (width > 2.0 * APART * (t[-1] - t[0]))
+        if depth >= PATIENCE:  # what does not fall with its halves is rounding
+            pair = off.reshape(2, -1).sum(axis=0)
+            bad &= np.tile(pair <= VAIN * before, 2)
         if not bad.any():
             break
+        before = off[bad]
         half = 0.5 * width[bad]
         found += (low[bad] + half).tolist()
         low, width = np.concatenate([low[bad], low[bad] + half]), np.concatenate([half, half])

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: how often a motion is computed anew: each time steps are halved
 ROUNDS = 8
+#: halving is in vain where it lowers what is left by less: what does not fall is rounding
+VAIN = 0.7
 #: what a step may leave by its terms, relative to the tolerance and the whole integral. In truth it leaves some hundred
 #: times less: of 60 random scenes one or two have such a step, in vain. So what changes the integral by less than the
 #: tolerance is not taken
@@ -40,8 +42,9 @@ def landed(model: Model, times: list[float]) -> Model:
     return model._replace(times=whole, force=force, load_force=turning)
 
 
-def landings(driver: "Driver", count: int) -> tuple[list[float], float]:
-    """Middles of those of the last run's `count` steps whose energy their rule does not integrate; its integral."""
+def landings(driver: "Driver", count: int) -> tuple[list[float], float, float]:
+    """Middles of those of the last run's `count` steps whose energy their rule does not integrate; its integral, and
+    what all steps leave of it by their terms."""
     n, n_pair, damped, turning = driver.shape
     t, _, index, scalar, *_ = carve.py_func(  # type: ignore[attr-defined]
         driver.room, driver.room_ints, n, n_pair, int(driver.limits[1]), int(driver.limits[2]), damped, turning
@@ -59,7 +62,7 @@ def landings(driver: "Driver", count: int) -> tuple[list[float], float]:
         if largest > 0.0:
             left[w] = width[w] * largest * (last / largest) ** (order / (len(sizes) - 1))
     bad = left > SHARE * float(driver.settings[0]) * abs(whole)
-    return (t[:count] + 0.5 * width)[bad].tolist(), float(whole)
+    return (t[:count] + 0.5 * width)[bad].tolist(), float(whole), float(left.sum())
 
 
 @cache

@@ -398,3 +398,40 @@ def test_the_energy_of_a_driven_body_is_integrated_to_the_tolerance():
     other = evaluate(read_case(free.replace("MASS", "1.0e12"), overrides={"solver.tolerance": 1e-12}))
     assert found.objectives["E"] == pytest.approx(other.objectives["E"], rel=1e-8)
     assert found.gradients["E"] == pytest.approx(other.gradients["E"], rel=1e-8)
+
+
+HELD = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.8}
+bodies: {a: {mass: 1, inertia: 0.3, position: [0.2, 0.1]}}
+joints:
+  - {name: j, type: prismatic, bodies: [ground, a], at: [-0.4, 0.3], axis: [0.53, 0.4]}
+members:
+  s: {from: {body: ground, at: [-1, 1]}, to: {body: a, at: [0.3, 0.4]}, law: {type: spring, stiffness: 60, damping: 1}}
+design: {initial: 1}
+objectives:
+  A: {response: {angular_velocity: {body: a}}, over_time: rms}
+  B: {response: {angle: {body: a}}, over_time: rms}
+  V: {response: {velocity: {body: a}}, over_time: rms}
+combine: {weights: {A: 1, B: 1, V: 1}}
+"""
+
+
+def test_what_joints_hold_at_zero_takes_no_more_steps():
+    """Rounding is no polynomial however short steps are: it is not what they are halved for."""
+    only = HELD.replace("  A: {response: {angular_velocity: {body: a}}, over_time: rms}\n", "")
+    only = only.replace("  B: {response: {angle: {body: a}}, over_time: rms}\n", "").replace("A: 1, B: 1, ", "")
+    found = evaluate(read_case(HELD))
+    assert abs(found.objectives["A"]) < 1e-12
+    assert found.work["steps"] == evaluate(read_case(only)).work["steps"]
+
+
+def test_rounding_is_not_halved_on_and_on():
+    from mdstopo.general.landings import halves
+
+    rng = np.random.default_rng(0)
+    nodes, weights = np.polynomial.legendre.leggauss(5)
+    t = np.linspace(0.0, 1.0, 11)
+    found = halves(t, t, lambda places: rng.normal(size=len(places)), np.stack([nodes + 1, weights]) / 2, 1e-9)
+    assert len(found) < 1000
