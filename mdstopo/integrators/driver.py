@@ -13,7 +13,7 @@ import numpy as np
 
 from mdstopo.case.memory import holds_steps
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.integrators.integrands import ROUNDS, VAIN, landed, landings
+from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, landings
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.mechanics.carrying import ROOMY
 from mdstopo.scene.compile import Scene
@@ -183,14 +183,14 @@ class Driver:
         """The run that was `found`, or one whose steps are short enough for the integral of the energy, too."""
         more, first, left = landings(self, found[1])
         times, total, plain = list[float](), first, found
-        for _ in range(ROUNDS):
+        for lap in range(ROUNDS):
             if not more or found[0] != OK:
                 break
             times += more
             self._take(pack(landed(self.scene.model, times)))
             before, found = left, self._run(tangent)
             more, total, left = landings(self, found[1])
-            if left > VAIN * before:
+            if lap >= PATIENCE and left > VAIN * before:
                 total = first
                 break
         if found is plain or abs(total - first) > float(self.settings[0]) * abs(total):

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 
 #: how often a motion is computed anew: each time steps are halved
 ROUNDS = 8
-#: halving is in vain where it lowers what is left by less: what does not fall is rounding
-VAIN = 0.7
+#: from this time on halving is in vain where it leaves more than so much: what does not fall is rounding
+PATIENCE, VAIN = 2, 0.7
 #: what a step may leave by its terms, relative to the tolerance and the whole integral. In truth it leaves some hundred
 #: times less: of 60 random scenes one or two have such a step, in vain. So what changes the integral by less than the
 #: tolerance is not taken
