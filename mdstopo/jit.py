@@ -57,9 +57,9 @@ def by_type(stub: Callable[..., Any]) -> Callable[[F], F]:
     def enter(choose: F) -> F:
         @when_compiling
         def register() -> None:
-            from mdstopo.native.choice import offer
+            from mdstopo.native.tried import way
 
-            offer(stub, choose)
+            way().offer(stub, choose)
 
         return choose
 

@@ -32,7 +32,11 @@ def rate_of(model, desk):  # type: ignore[no-untyped-def]
         if model.free[d] != 0:
             inverse[d] = 1.0 / model.mass[d]
     return fastest_rate(
-        model.pair, inverse, desk.k.reshape((1, n_pair, 6, 6)), desk.c.reshape((1, n_pair, 6, 6)), np.bool_(True),
+        model.pair,
+        inverse,
+        desk.k.reshape((1, n_pair, 6, 6)),
+        desk.c.reshape((1, n_pair, 6, 6)),
+        np.bool_(True),
         CLOSELY,
     )
 

@@ -57,4 +57,6 @@ def taken(counter: NDArray[np.int64]) -> int:
 @when_compiling
 def _register() -> None:
     """Have Numba know them."""
-    import mdstopo.native.threads_lowering  # noqa: F401
+    from mdstopo.native.tried import way
+
+    way().enter_threads()
