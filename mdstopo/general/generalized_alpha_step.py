@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
 from mdstopo.general.forces import drive_state, turned_pose
 from mdstopo.general.projection import project
@@ -19,7 +20,6 @@ from mdstopo.integrators.steps import (
     deflection,
     motion_weights,
 )
-from mdstopo.jit import kernel
 
 
 @kernel

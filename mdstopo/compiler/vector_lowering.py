@@ -1,4 +1,4 @@
-"""What `native.vector` becomes in machine code, by what Numba documents for those who extend it. Imports Numba."""
+"""What `compiler.vector` becomes in machine code, by what Numba documents for those who extend it. Imports Numba."""
 
 import operator
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from numba import config, types
 from numba.core import cgutils
 from numba.extending import lower_builtin, models, register_model, type_callable
 
-from mdstopo.native import vector
+from mdstopo.compiler import vector
 
 
 def _has_avx512() -> bool:
@@ -25,7 +25,7 @@ def _has_avx512() -> bool:
 
 _AVX512 = _has_avx512()
 _LANES = vector.WIDE if _AVX512 else vector.NARROW
-#: products are fused with sums, as in `jit.member_kernel`; sums are added in the order that is written
+#: products are fused with sums, as in `compiler.jit.member_kernel`; sums are added in the order that is written
 _FUSED = ("contract", "nsz")
 
 

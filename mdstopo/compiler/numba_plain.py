@@ -11,8 +11,8 @@ import numba
 from numba import types
 from numba.extending import overload
 
-from mdstopo.native import threads
-from mdstopo.native.store import cache_folder
+from mdstopo.compiler import threads
+from mdstopo.compiler.store import cache_folder
 
 
 def inner(function: Callable[..., Any], fastmath: frozenset[str], part: bool) -> Any:
@@ -35,7 +35,7 @@ def outer(function: Callable[..., Any], fastmath: frozenset[str], kept: bool = T
 
 
 def compile_for(dispatcher: Any, letters: str) -> None:
-    """Have Numba compile a function for types of arguments (`native.entry.types_of`)."""
+    """Have Numba compile a function for types of arguments (`compiler.entry.types_of`)."""
     dispatcher.compile(tuple(map(numba_type, letters.split())))
 
 

@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from mdstopo.compiler.trusted import make_private, open_lock, read_private, write_private
 from mdstopo.installed import version_of
-from mdstopo.native.trusted import make_private, open_lock, read_private, write_private
 
-#: folders of the package that hold no kernels and that no kernel takes a number from; `tests/native` looks after that
+#: folders of the package that hold no kernels and that no kernel takes a number from; `tests/compiler` looks after that
 WITHOUT_KERNELS = ("bench", "cli", "finalize", "front", "plots", "report", "session", "store")
 _COMPILER = ("numba", "llvmlite", "numpy")
 _SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")

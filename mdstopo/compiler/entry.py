@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.native.kernel import Kernel, way
+from mdstopo.compiler.kernel import Kernel, way
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mdstopo.native.call import Native
-    from mdstopo.native.store import Code
+    from mdstopo.compiler.call import Native
+    from mdstopo.compiler.store import Code
 
 #: by letter, the numbers of an array
 DTYPES = {"d": np.dtype(np.float64), "q": np.dtype(np.int64), "?": np.dtype(np.bool_)}
@@ -112,8 +112,8 @@ class Entry(Kernel):
         """Machine code for these types, from the disk or from Numba; nothing where only Numba itself can call it."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
             return None
-        from mdstopo.native import store
-        from mdstopo.native.call import Native, arrays_are_known
+        from mdstopo.compiler import store
+        from mdstopo.compiler.call import Native, arrays_are_known
 
         if not arrays_are_known():
             return None
@@ -125,7 +125,7 @@ class Entry(Kernel):
         return None if code is None else Native(self.py_func.__qualname__, code, types)
 
     def _built(self, path: Path, types: str) -> Code | None:
-        from mdstopo.native import store, tried
+        from mdstopo.compiler import store, tried
 
         found = tried.private()
         if found is None:
@@ -149,8 +149,8 @@ class Entry(Kernel):
 
     def _wrapped(self) -> Any:
         way()
-        from mdstopo.native import numba_plain
-        from mdstopo.native.tried import private
+        from mdstopo.compiler import numba_plain
+        from mdstopo.compiler.tried import private
 
         return numba_plain.outer(self.py_func, self._fastmath, kept=private() is None)
 

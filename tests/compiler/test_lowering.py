@@ -6,9 +6,9 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from mdstopo.jit import by_type, entry, kernel
-from mdstopo.native.kernel import numba
-from mdstopo.native.tried import has_own_passes
+from mdstopo.compiler.jit import by_type, entry, kernel
+from mdstopo.compiler.kernel import numba
+from mdstopo.compiler.tried import has_own_passes
 
 Pair = namedtuple("Pair", ("left", "right"))
 

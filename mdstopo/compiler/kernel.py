@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import Any
 
-from mdstopo.native import tried
+from mdstopo.compiler import tried
 
 #: has Numba's errors in plain letters: it makes thousands that only itself sees, when it looks for what fits
 _PLAIN = "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"

@@ -10,21 +10,21 @@ from pathlib import Path
 import pytest
 
 import mdstopo
-from mdstopo.native import tried
+from mdstopo.compiler import tried
 
 PACKAGE = Path(mdstopo.__file__).parent
 ROOT = PACKAGE.parent
 #: what Numba documents of `numba.core` and `numba.experimental`
 DOCUMENTED = {"numba.core.cgutils", "numba.experimental.structref"}
-PRIVATE = PACKAGE / "native" / "numba_private.py"
+PRIVATE = PACKAGE / "compiler" / "numba_private.py"
 
 KERNELS = """
 import sys
 import numpy as np
-from mdstopo.native import tried
-from mdstopo.native.vector import lanes, load, total
-from mdstopo.native.threads import shared, taken
-from mdstopo.jit import by_type, entry, kernel, member_kernel
+from mdstopo.compiler import tried
+from mdstopo.compiler.vector import lanes, load, total
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.compiler.jit import by_type, entry, kernel, member_kernel
 
 def chosen(x):
     raise NotImplementedError
@@ -86,18 +86,18 @@ BROKEN = {
     "a version that was not tried": "    tried.TRIED.clear()",
     "a name that is missing": "    import numba.core.codegen as inside; del inside.JITCodeLibrary",
     "allocations with another header": (
-        "    import ctypes, mdstopo.native.numba_private as p; made = p._nrt_python.meminfo_alloc\n"
+        "    import ctypes, mdstopo.compiler.numba_private as p; made = p._nrt_python.meminfo_alloc\n"
         "    class Other:\n"
         "        def meminfo_alloc(self, size):\n"
         "            address = made(size); ctypes.c_int64.from_address(address).value += 1; return address\n"
         "    p._nrt_python = Other()"
     ),
     "code that computes something else": (
-        "    import mdstopo.native.numba_private as p; p._probe_inner = lambda x, k: k * x + 1.0"
+        "    import mdstopo.compiler.numba_private as p; p._probe_inner = lambda x, k: k * x + 1.0"
     ),
-    "machine code that asks for more": "    import mdstopo.native.numba_private as p; p.PROVIDED = frozenset()",
+    "machine code that asks for more": "    import mdstopo.compiler.numba_private as p; p.PROVIDED = frozenset()",
     "a compilation that goes wrong later": (
-        "    import mdstopo.native.numba_private as p; build = p.build\n"
+        "    import mdstopo.compiler.numba_private as p; build = p.build\n"
         "    def stumbles(dispatcher, letters):\n"
         "        if letters.startswith('t2'): return build(dispatcher, letters)\n"
         "        raise AttributeError('gone')\n"

@@ -11,8 +11,8 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from mdstopo.native.entry import DIMENSIONS, DTYPES, EXCUSE, LENGTHS, NUMBERS, PLAIN
-from mdstopo.native.store import CALL, PREPARED, Code
+from mdstopo.compiler.entry import DIMENSIONS, DTYPES, EXCUSE, LENGTHS, NUMBERS, PLAIN
+from mdstopo.compiler.store import CALL, PREPARED, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
@@ -31,7 +31,7 @@ def _target() -> Any:
 
 @functools.cache
 def arrays_are_known() -> bool:
-    """Whether the fields of array objects are where `native.build` has machine code look for them."""
+    """Whether the fields of array objects are where `compiler.build` has machine code look for them."""
     array = np.zeros((2, 3))
     words = (ctypes.c_int64 * (LENGTHS + 1)).from_address(id(array))
     dimensions = ctypes.c_int32.from_address(id(array) + 8 * DIMENSIONS).value
@@ -41,7 +41,7 @@ def arrays_are_known() -> bool:
 
 
 def _format(kind: str) -> str:
-    """How an argument is packed, by its letters in `native.entry.types_of`."""
+    """How an argument is packed, by its letters in `compiler.entry.types_of`."""
     return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
 
 

@@ -2,7 +2,7 @@
 
 `tried` decides whether this module serves: it is imported only with versions that it was tried with, and `check` then
 compiles and calls a function that needs all of it. No other module may name anything of `numba.core`, `numba.np` or
-`numba.experimental.structref._Utils`; `tests/native` looks after that.
+`numba.experimental.structref._Utils`; `tests/compiler` looks after that.
 
 In order: the shorter way from typed code to LLVM's (`Lower`), passes, libraries that make no machine code, the cache
 of functions inside entries, kernels chosen by types, threads, what Numba is spared, the run time that machine code
@@ -36,7 +36,7 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.lowering import Lower as NumbaLower
 from numba.core.registry import cpu_target
-from numba.core.runtime import _nrt_python
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 from numba.core.runtime.nrt import MemInfo
 from numba.core.serialize import dumps
 from numba.core.target_extension import get_local_target, jit_registry
@@ -47,11 +47,11 @@ from numba.experimental.structref import _Utils as _Structure
 from numba.extending import lower_builtin
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
-from mdstopo.native import threads
-from mdstopo.native.entry import EXCUSE, LENGTHS, NUMBERS
-from mdstopo.native.numba_plain import numba_type
-from mdstopo.native.store import CALL, PREPARED, Code, cache_folder, read_checked, write_checked
-from mdstopo.native.tried import UnexpectedError, has_own_passes
+from mdstopo.compiler import threads
+from mdstopo.compiler.entry import EXCUSE, LENGTHS, NUMBERS
+from mdstopo.compiler.numba_plain import numba_type
+from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder, read_checked, write_checked
+from mdstopo.compiler.tried import UnexpectedError, has_own_passes
 
 #: whether our passes over a function fit this version
 _LEAN = has_own_passes()
@@ -434,8 +434,8 @@ class Optimised(JITCodeLibrary):
     """Intermediate code of a function with all that it calls, optimised."""
 
     def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
-        self._verify_declare_only_symbols()  # type: ignore[no-untyped-call]
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
         self._finalized = True
 
     @property
@@ -448,7 +448,7 @@ class Optimised(JITCodeLibrary):
 
     def serialize_using_object_code(self) -> tuple[str, str, bytes]:
         """What the disk keeps; of these libraries that is no machine code."""
-        kept: tuple[str, str, bytes] = self.serialize_using_bitcode()  # type: ignore[no-untyped-call]
+        kept: tuple[str, str, bytes] = self.serialize_using_bitcode()
         return kept
 
 
@@ -468,7 +468,7 @@ class Rolled(Optimised):
 
     def _optimize_final_module(self) -> None:
         if not _LEAN:
-            super()._optimize_final_module()  # type: ignore[no-untyped-call]
+            super()._optimize_final_module()
             return
         target: Any = self._codegen
         first, builder = target._module_pass_manager(
@@ -489,11 +489,11 @@ class Rolled(Optimised):
 def _compiler(library: type[Optimised]) -> type[Compiler]:
     class Lean(Compiler):
         def __init__(self, typingctx: Any, targetctx: Any, given: Any, *rest: Any) -> None:
-            super().__init__(typingctx, targetctx, given, *rest)  # type: ignore[no-untyped-call]
+            super().__init__(typingctx, targetctx, given, *rest)
             self.state.library = library(targetctx.codegen(), library.__name__)
 
         def define_pipelines(self) -> Any:
-            found = super().define_pipelines()  # type: ignore[no-untyped-call]
+            found = super().define_pipelines()
             for manager in found:
                 manager.passes = [(_LEANER.get(each, each), told) for each, told in manager.passes]
                 manager.finalize()
@@ -519,14 +519,9 @@ def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
 
 def _made(function: Callable[..., Any], pipeline: type[Compiler], fastmath: frozenset[str], part: bool) -> Any:
     # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
-    return numba.njit(
-        error_model="numpy",
-        fastmath=set(fastmath) or False,
-        no_cfunc_wrapper=True,
-        no_cpython_wrapper=True,
-        pipeline_class=pipeline,
-        forceinline=part,
-    )(function)
+    options: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "pipeline_class": pipeline}
+    options |= {"error_model": "numpy", "fastmath": set(fastmath) or False, "forceinline": part}
+    return numba.njit(**options)(function)
 
 
 class _Reader:
@@ -542,7 +537,7 @@ class _Reader:
         return self
 
     def unserialize_library(self, kept: tuple[str, str, bytes]) -> Optimised:
-        library = Optimised(self._target.codegen(), kept[0])  # type: ignore[no-untyped-call]
+        library = Optimised(self._target.codegen(), kept[0])
         library._final_module = llvm.parse_bitcode(kept[2])
         library._finalize_final_module()
         return library
@@ -578,7 +573,7 @@ class Cache(_Cache):
             kept = self._read().get(self._key(sig, target_context.codegen()))
             if kept is None:
                 return None
-            return CompileResult._rebuild(_Reader(target_context), *pickle.loads(kept))  # type: ignore[no-untyped-call]
+            return CompileResult._rebuild(_Reader(target_context), *pickle.loads(kept))
         except Exception:
             return None
 
@@ -588,8 +583,8 @@ class Cache(_Cache):
             return
         try:
             whole = self._read()
-            whole[self._key(sig, data.codegen)] = dumps(data._reduce())  # type: ignore[no-untyped-call]
-            write_checked(self._path, dumps(whole))  # type: ignore[no-untyped-call]
+            whole[self._key(sig, data.codegen)] = dumps(data._reduce())
+            write_checked(self._path, dumps(whole))
         except Exception:
             return
 
@@ -601,7 +596,7 @@ class Cache(_Cache):
 
     def _key(self: Any, sig: Any, codegen: Any) -> Any:
         """Types, processor, the function's bytecode and closure, and the file that it stands in."""
-        key = FunctionCache._index_key(self, sig, codegen)  # type: ignore[no-untyped-call]
+        key = FunctionCache._index_key(self, sig, codegen)
         return (*key, _source(inspect.getfile(self._py_func)))
 
     def enable(self) -> None:
@@ -968,11 +963,11 @@ def _reshape(function: Any, build: Any) -> None:
 # An entry compiled by Numba, as machine code that needs neither Numba nor Python's interface.
 #
 # Numba's function takes each array as seven or more arguments. `_glue` writes the function that unfolds the block of
-# numbers which `native.call` fills into those, and what the code expects of Numba's run time (`runtime`).
+# numbers which `compiler.call` fills into those, and what the code expects of Numba's run time (`runtime`).
 
 
 def build(dispatcher: Any, letters: str) -> Code | None:
-    """Machine code of a function for these types (`native.entry.types_of`).
+    """Machine code of a function for these types (`compiler.entry.types_of`).
 
     Nothing where the code would need more of Numba's run time than is provided.
     """
@@ -999,7 +994,7 @@ def build(dispatcher: Any, letters: str) -> Code | None:
 
 
 def _result(kind: Any) -> str | None:
-    """What a function returns, in the letters of `native.store.Code`; nothing where there is no letter for it."""
+    """What a function returns, in the letters of `compiler.store.Code`; nothing where there is no letter for it."""
     letters = {types.boolean: "b", types.int64: "i", types.float64: "f"}
     if kind is types.none:
         return "()"
@@ -1201,7 +1196,7 @@ def _probe() -> Any:
 
 def _check_code(dispatcher: Any) -> None:
     """Whether that function's machine code does what is written."""
-    from mdstopo.native.call import Native
+    from mdstopo.compiler.call import Native
 
     kinds = "t2 d1 d2 b q1 q1 i"
     made = build(dispatcher, kinds)

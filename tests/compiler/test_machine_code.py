@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.jit import entry, kernel
-from mdstopo.native import call, store, tried
-from mdstopo.native.call import Native
-from mdstopo.native.entry import types_of
+from mdstopo.compiler import call, store, tried
+from mdstopo.compiler.call import Native
+from mdstopo.compiler.entry import types_of
+from mdstopo.compiler.jit import entry, kernel
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -316,7 +316,7 @@ def test_types_of_general_scenes_are_found_by_processes_that_have_springs_only()
 
 INSIDE = """
 import numpy as np
-from mdstopo.jit import entry, kernel, member_kernel
+from mdstopo.compiler.jit import entry, kernel, member_kernel
 
 @member_kernel
 def total(x):

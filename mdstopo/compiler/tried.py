@@ -68,7 +68,7 @@ def load() -> None:
     if _Way.known or versions() not in TRIED:
         return
     try:
-        importlib.import_module("mdstopo.native.numba_private")
+        importlib.import_module("mdstopo.compiler.numba_private")
     except Exception as error:
         give_up(error)
 
@@ -82,7 +82,7 @@ def private() -> ModuleType | None:
 
 def way() -> ModuleType:
     """What compiles: `numba_private` or `numba_plain`."""
-    return private() or importlib.import_module("mdstopo.native.numba_plain")
+    return private() or importlib.import_module("mdstopo.compiler.numba_plain")
 
 
 def _decide() -> None:
@@ -93,7 +93,7 @@ def _decide() -> None:
     if _Way.known:
         return
     try:
-        found = importlib.import_module("mdstopo.native.numba_private")
+        found = importlib.import_module("mdstopo.compiler.numba_private")
         found.check(_Way.alone)
     except Exception as error:
         give_up(error)
