@@ -18,7 +18,7 @@ from mdstopo.installed import version_of
 
 #: versions (numba, llvmlite) up to their second number that were tried; whether our passes fit them, or Numba's are
 #: used, and our way of keeping machine code only
-TRIED = {("0.60", "0.43"): False, ("0.64", "0.46"): False, ("0.68", "0.50"): True}
+TRIED = {("0.60", "0.43"): False, ("0.64", "0.46"): True, ("0.68", "0.50"): True}
 
 #: set for the processes that this one starts, once the notice has been given
 _TOLD = "MDSTOPO_NUMBA_NOTICE"
