@@ -127,6 +127,7 @@ class Entry(Kernel):
     def _built(self, path: Path, types: str) -> Code | None:
         from mdstopo.compiler import store, tried
 
+        way()
         found = tried.private()
         if found is None:
             return None

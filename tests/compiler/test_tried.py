@@ -69,9 +69,9 @@ def main():
 """
 
 
-def run(tmp_path: Path, before: str, where: str = "numbers.py") -> tuple[list[str], str]:
+def run(tmp_path: Path, before: str) -> tuple[list[str], str]:
     """What a process prints and complains of that runs these kernels, with something done before."""
-    place = tmp_path / where
+    place = tmp_path / "kernels.py"
     place.write_text(f"{KERNELS}\nif __name__ == '__main__':\n{before}\n    main()\n")
     env = os.environ | {"PYTHONPATH": str(ROOT), "MDSTOPO_CACHE_DIR": str(tmp_path / "cache")}
     env.pop("MDSTOPO_NUMBA_NOTICE", None)
@@ -121,6 +121,11 @@ def test_anything_unexpected_leads_to_numba_s_own_way_with_one_notice(broken: st
 def test_versions_that_were_tried_are_used_without_a_notice(tmp_path: Path) -> None:
     assert tried.versions() in tried.TRIED
     assert run(tmp_path, "") == ([f"{RIGHT} True", "refused"], "")
+
+
+def test_a_process_of_our_own_compiles_without_importing_scipy(tmp_path: Path) -> None:
+    told = "    import atexit, mdstopo.cli; atexit.register(lambda: print('scipy' in sys.modules))"
+    assert run(tmp_path, told) == ([f"{RIGHT} True", "refused", "False"], "")
 
 
 def test_the_oldest_and_the_newest_version_are_among_those_that_were_tried() -> None:
