@@ -79,7 +79,8 @@ def parts(names: str = "") -> Iterator[Table]:
             )
             for child in (whole, bare):
                 child.end()
-    columns = ("part", "what", "with, ms", "without, ms", "ratio, median (quartiles)", "first call, s", "pays")
+    compiling = "compiling with / without, s of the processor"
+    columns = ("part", "what", "with, ms", "without, ms", "ratio, median (quartiles)", compiling, "pays")
     yield Table("What parts of our own save", columns, rows)
 
 
@@ -87,10 +88,7 @@ class _Child:
     """A process that computes a case with a part or without it, and times that when it is asked to."""
 
     def __init__(self, part: str, kept: bool, folder: Path) -> None:
-        place = folder / (part.replace(" ", "-") if not kept else "whole")
-        place.mkdir(exist_ok=True, mode=0o700)
-        stated = os.environ.get("MDSTOPO_CACHE_DIR") if kept else None
-        environment = os.environ | {"MDSTOPO_CACHE_DIR": stated or str(place)}
+        environment = os.environ | {"MDSTOPO_CACHE_DIR": tempfile.mkdtemp(dir=folder)}
         words = [sys.executable, "-m", "benchmarks.parts", part, "whole" if kept else "bare"]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(words, stdin=pipe, stdout=pipe, env=environment, text=True)
@@ -127,7 +125,7 @@ def _call(case: str, integrator: str, what: str) -> Callable[[], object]:
 
 
 def _no_process(*_: object, **__: object) -> None:
-    """In place of a process that would compile beside this one, with the part that is left out here."""
+    """In place of a process that would compile beside this one, where nothing is left out."""
     raise OSError
 
 
@@ -136,11 +134,11 @@ def _serve(part: str, kept: bool) -> None:
     case, integrator, what, leave_out = PARTS[part]
     if not kept:
         leave_out()
-        subprocess.Popen = _no_process  # type: ignore[assignment,misc]
+    subprocess.Popen = _no_process  # type: ignore[assignment,misc]
     call = _call(case, integrator, what)
-    began = time.perf_counter()
+    began = time.process_time()
     call()
-    print(time.perf_counter() - began, flush=True)
+    print(time.process_time() - began, flush=True)
     for _ in sys.stdin:
         times = []
         end = time.perf_counter() + SECONDS

@@ -69,7 +69,8 @@ def offer(stub: Callable[..., Any], choose: Callable[..., Any]) -> None:
 def enter_threads() -> None:
     """Tell Numba what `threads.shared` and `threads.taken` do, with one thread."""
 
-    @overload(threads.shared)
+    # inlined, because Numba does not cache what hands over an object of its own
+    @overload(threads.shared, jit_options={"forceinline": True})
     def shared(kernel, threads, job):  # type: ignore[no-untyped-def]
         def call(kernel, threads, job):  # type: ignore[no-untyped-def]
             kernel(*job)
