@@ -3,6 +3,7 @@
 #   make run                      set up .venv, optimise cases/fig6.yaml, write results/fig6.h5
 #   make test                     set up .venv with the tools of development, run the tests
 #   make test-lowest              the same with the lowest versions of dependencies that pyproject.toml allows
+#   make test-numba               kernels, gradients and warm starts with the oldest, a middle and the newest Numba
 #   make lint, make types         ruff, and who may import whom; mypy
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
@@ -16,6 +17,10 @@ PYTHON ?= $(or $(shell command -v python3.11),python3)
 VENV ?= .venv
 # the environment of `make test-lowest`
 LOWEST ?= .venv-lowest
+# environments of `make test-numba`, one for each version: the lower bound of pyproject.toml, one between, the newest
+NUMBAS ?= oldest 0.64 newest
+NUMBA_VENVS ?= .venv-numba
+NUMBA_TESTS ?= tests/compiler tests/mechanics tests/engine/test_gradients.py
 BIN := $(VENV)/bin
 CASE ?= cases/fig6.yaml
 RESULT := results/$(basename $(notdir $(CASE))).h5
@@ -31,10 +36,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-lowest lint types docs reproduce bench peers readme clean
+.PHONY: help run test test-lowest test-numba lint types docs reproduce bench peers readme clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,13p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,14p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -81,6 +86,27 @@ $(LOWEST)/.ready: pyproject.toml
 test-lowest: $(LOWEST)/.ready
 	$(LOWEST)/bin/python -m pytest --numprocesses $(JOBS) --dist loadfile $(TESTS)
 
+# A version that pip does not find for this Python is left out, and said so.
+$(NUMBA_VENVS)/%/.ready: pyproject.toml
+	$(PYTHON) -m venv --clear $(@D)
+	@wanted=$*; case $$wanted in \
+	  oldest) wanted=$$(sed -n 's/^ *"numba>=\([0-9.]*\).*/numba==\1/p' pyproject.toml);; \
+	  newest) wanted=numba;; \
+	  *) wanted="numba==$$wanted.*";; esac; \
+	if $(@D)/bin/python -m pip install --quiet "$$wanted"; then \
+	  $(@D)/bin/python -m pip install --quiet --upgrade-strategy only-if-needed --editable '.[dev]'; \
+	else echo "$$wanted cannot be installed for this Python: left out"; touch $(@D)/left-out; fi
+	@touch $@
+
+test-numba: $(foreach version,$(NUMBAS),$(NUMBA_VENVS)/$(version)/.ready)
+	@failed=; for version in $(NUMBAS); do \
+	  place=$(NUMBA_VENVS)/$$version; \
+	  if [ -e $$place/left-out ]; then echo "Numba $$version: left out"; continue; fi; \
+	  $$place/bin/python -c 'import llvmlite, numba; print("Numba", numba.__version__, "llvmlite", llvmlite.__version__)'; \
+	  $$place/bin/python -m pytest --numprocesses $(JOBS) --dist loadfile $(or $(TESTS),$(NUMBA_TESTS)) || failed="$$failed $$version"; \
+	done; \
+	if [ -n "$$failed" ]; then echo "failed with Numba$$failed"; exit 1; fi
+
 lint: $(VENV)/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/lint-imports --no-cache
@@ -116,5 +142,5 @@ readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme
 
 clean:
-	rm -rf $(VENV) $(LOWEST) build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(LOWEST) $(NUMBA_VENVS) build dist site *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -28,6 +28,7 @@ SECTIONS = {
     "ring": "a closed loop of bodies beside other programs, forward runs too",
     "forward": "forward runs of the paper's bodies beside other programs",
     "million": "a million members beside JAX",
+    "parts": "what parts of our own save: single precision, sines and powers, counting (compiles for minutes)",
     "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
     "hunt": "random scenes against a second model, differences, invariances and the error estimates (--minutes)",
 }
@@ -39,7 +40,7 @@ PEERS = ("peers", "ring", "forward", "million")
 CAMPAIGNS = ("damage", "hunt")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *CAMPAIGNS, "optimum")
+NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {

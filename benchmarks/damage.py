@@ -335,7 +335,7 @@ def _damaged_results(folder: Path, count: int, rng: np.random.Generator) -> "Cou
 
 def _own_cache(folder: Path) -> Path:
     """A copy of what the case needs of the cache of machine code."""
-    from mdstopo.native.store import cache_folder
+    from mdstopo.compiler.store import cache_folder
 
     place = folder / "cache"
     place.mkdir(mode=0o700, exist_ok=True)
@@ -345,7 +345,7 @@ def _own_cache(folder: Path) -> Path:
 
 
 def _damaged_codes(folder: Path, cache: Path, count: int, rng: np.random.Generator) -> "Counter[str]":
-    from mdstopo.native import store
+    from mdstopo.compiler import store
 
     found: Counter[str] = Counter()
     files = sorted(each for each in cache.glob("*/*") if each.suffix in (".code", ".kept"))

@@ -96,10 +96,7 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
     ("case", (Box(("case",), "the format: keys, mistakes with their places, immutable objects", station="1"),)),
     (
         "compiler",
-        (
-            Box(("jit",), "marks what is compiled", 0.0, 0.35),
-            Box(("native",), "machine code: made, kept, called without Numba", 0.35, 0.65),
-        ),
+        (Box(("compiler",), "marks what is compiled; machine code: made, kept, called without Numba"),),
     ),
     (
         "records",

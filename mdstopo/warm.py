@@ -1,9 +1,9 @@
 """First use on a machine: the kernels are compiled side by side, in two processes.
 
-Compiled kernels are kept on disk (`jit`), and their argument types are the same for every case. So while this process
-compiles an integrator and the optimiser, another one compiles what looks at the steps, on a case of its own: a body on
-a spring. Afterwards everything is read from the disk. If the other process fails, nothing is lost but time: what is
-missing is compiled here when it is called.
+Compiled kernels are kept on disk (`compiler`), and their argument types are the same for every case. So while this
+process compiles an integrator and the optimiser, another one compiles what looks at the steps, on a case of its own: a
+body on a spring. Afterwards everything is read from the disk. If the other process fails, nothing is lost but time:
+what is missing is compiled here when it is called.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mdstopo.children import command, end_with_parent
-from mdstopo.native.store import cache_folder
+from mdstopo.compiler.store import cache_folder
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case

@@ -193,7 +193,9 @@ def absent_members() -> Omission:
     sparse = design.copy()
     sparse[: len(sparse) // 2] = 0.0
     return Omission(
-        "members with alpha = 0, half of them", "springs x states", side(made, "spring_states", design),
+        "members with alpha = 0, half of them",
+        "springs x states",
+        side(made, "spring_states", design),
         side(made, "spring_states", sparse),
     )
 

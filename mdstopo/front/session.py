@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
+from mdstopo.compiler.threads import cores
 from mdstopo.design_problem import sign_of
 from mdstopo.front.content import Quality, begun_part, front_part, quality, read_begun, read_tasks, tasks_part
 from mdstopo.front.jobs import Setting, perform
 from mdstopo.front.plan import Front, NoEndError, Planner, Request, Starts
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.tasks import Found, Result, StoppedError, Task, failed, front_key
-from mdstopo.native.threads import cores
 from mdstopo.optimizer.starts import design_of_family
 from mdstopo.optimizer.state import State
 from mdstopo.session.callbacks import ignore, never

@@ -11,13 +11,13 @@ import numpy as np
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case
+from mdstopo.compiler.threads import cores
 from mdstopo.front.content import read_tasks, tasks_part
 from mdstopo.front.directions import MOST, parse_range
 from mdstopo.front.jobs import Setting, Trial, first
 from mdstopo.front.pool import Here, Lost, Pool, Processes
 from mdstopo.front.session import WORTH, Snapshot
 from mdstopo.front.tasks import Found, case_key, failed
-from mdstopo.native.threads import cores
 from mdstopo.session.callbacks import ignore, never
 from mdstopo.session.ready import compile_apart
 from mdstopo.session.shortfall import of_many

@@ -9,6 +9,7 @@ the way changes the cotangents by saltation (`events`); a peak at an event is no
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unknowns
 from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.duties import point_of, step_back, weights_of
@@ -29,7 +30,6 @@ from mdstopo.general.responses import (
 )
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
-from mdstopo.jit import kernel
 
 #: share of the value inside a step below which an integrand has no direction of its own, or may have turned round; and
 #: by which two forces may differ where the largest changes hands

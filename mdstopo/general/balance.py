@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.forces import (
     add_inerter_tangents,
     add_inerters,
@@ -28,7 +29,6 @@ from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.joints.revolute import PLACES, revolute_pull
 from mdstopo.mechanics.joints.table import (

@@ -7,10 +7,10 @@ method is at the limit of its stability there.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import solve_unknowns
 from mdstopo.general.contact import contact_rows
 from mdstopo.general.members import rate_of_row
-from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import CLOSED, MU, SLIP, C, K, contact_force
 
 #: a step this long, relative to the time in which friction brakes by `slip`, has no error but that of rounding

@@ -7,6 +7,7 @@ with z from the transposed system and (g_q, g_lam). Free bodies make it singular
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry
 from mdstopo.general.balance import balance, joint_slopes, make_desk
 from mdstopo.general.duties import point_of
 from mdstopo.general.forces import general_forces
@@ -15,7 +16,6 @@ from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.responses import ENERGY, response
 from mdstopo.general.track import carve_track, copy_vector, restore_modes
-from mdstopo.jit import entry
 
 
 @entry

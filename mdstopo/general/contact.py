@@ -12,8 +12,8 @@ import math
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.members import rate_of_row
-from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import (
     CLOSED,
     contact_force,

@@ -17,10 +17,10 @@ Sets are counted through the blocks of the law, in their order: slots.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.events import member_rows
 from mdstopo.general.members import direction
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
-from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.crush import CRUSHING, ELASTIC
 from mdstopo.mechanics.laws.table import ACTIVE_FROM, CRUSH, FREE_LENGTH, law, law_set_slope

@@ -7,6 +7,7 @@ are each member's own. At events the derivatives jump by saltation. At the row's
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.balance import make_desk
 from mdstopo.general.crush import count_sets, sets_forward, through_sets, time_forward
@@ -17,7 +18,6 @@ from mdstopo.general.members import unscale_general
 from mdstopo.general.model import INERTER, unpack_general
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.track import carve_track, restore_modes
-from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 

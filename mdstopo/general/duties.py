@@ -20,7 +20,7 @@ The tag is a tuple of zeros whose length says which method is meant.
 from collections.abc import Callable
 from typing import Any
 
-from mdstopo.jit import by_type
+from mdstopo.compiler.jit import by_type
 
 DUTIES: dict[str, dict[int, Any]] = {
     "point_of": {},

@@ -16,12 +16,12 @@ import math
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.contact import contact_switch
 from mdstopo.general.members import direction, stretch_of
 from mdstopo.general.model import INERTER
 from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import deflection
-from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
 from mdstopo.mechanics.geometry import relative_pose
 from mdstopo.mechanics.laws.table import (

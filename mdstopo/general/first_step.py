@@ -8,9 +8,9 @@ bends; the error of a step is about FIRST (h/tau)^order.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance
 from mdstopo.integrators.steps import FORCES, TURN, deflection, largest_turn, motion_weights
-from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
 
 #: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,

@@ -9,11 +9,11 @@ import math
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.general.switches import APART, DAMPED
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.angles import cos_sin
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangent
 from mdstopo.mechanics.geometry import add_pair_force, fill_pose

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.padding import whole_vectors
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
 from mdstopo.general.members import block_design, rate_of_row
 from mdstopo.general.model import INERTER
@@ -10,11 +12,9 @@ from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.switches import carriers
 from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
-from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.alike import elastic_designs
 from mdstopo.mechanics.laws.table import SPRING, law
-from mdstopo.native.padding import whole_vectors
 
 
 @kernel

@@ -13,6 +13,7 @@ jumps, a method of second order loses nothing, and steps that stay as they are h
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
@@ -35,7 +36,6 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     deflection,
 )
-from mdstopo.jit import entry
 from mdstopo.mechanics.geometry import POSE, relative_pose
 
 TAG = (0, 0)

@@ -6,6 +6,7 @@ beside q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.duties import implement
 from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.projection import project_back, project_forward
@@ -13,7 +14,6 @@ from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_fo
 from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.generalized_alpha_linear import cubic, hermite
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel, part
 
 
 @kernel

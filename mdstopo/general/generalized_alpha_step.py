@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
 from mdstopo.general.forces import drive_state, turned_pose
 from mdstopo.general.projection import project
@@ -19,7 +20,6 @@ from mdstopo.integrators.steps import (
     deflection,
     motion_weights,
 )
-from mdstopo.jit import kernel
 
 
 @kernel
@@ -32,7 +32,11 @@ def rate_of(model, desk):  # type: ignore[no-untyped-def]
         if model.free[d] != 0:
             inverse[d] = 1.0 / model.mass[d]
     return fastest_rate(
-        model.pair, inverse, desk.k.reshape((1, n_pair, 6, 6)), desk.c.reshape((1, n_pair, 6, 6)), np.bool_(True),
+        model.pair,
+        inverse,
+        desk.k.reshape((1, n_pair, 6, 6)),
+        desk.c.reshape((1, n_pair, 6, 6)),
+        np.bool_(True),
         CLOSELY,
     )
 

@@ -17,7 +17,7 @@ part in it (`weakest`).
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
 
 #: a pivot, or an eigenvalue, of a scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12

@@ -5,9 +5,9 @@ cubic through both ends tells where they might; there the step is cut, and both 
 until nothing is doubtful. Then the root is bracketed and closed in on.
 """
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.events import block_of
 from mdstopo.general.members import stretch_of
-from mdstopo.jit import kernel
 from mdstopo.mechanics.contact import contact_grazes
 from mdstopo.mechanics.laws.table import law_grazes
 

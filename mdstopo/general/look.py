@@ -1,11 +1,11 @@
 """What Python calls for integrals over time and their gradients, by the adjoint sweep; rows: `row_sweep`."""
 
+from mdstopo.compiler.jit import entry
 from mdstopo.general.adjoint import integral_gradient
 from mdstopo.general.balance import make_desk
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.track import carve_track
-from mdstopo.jit import entry
 
 
 @entry

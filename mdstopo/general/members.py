@@ -12,14 +12,14 @@ Blocks of springs, which neither switch nor remember, take the vectors of `mecha
 
 import math
 
+from mdstopo.compiler.jit import inline, kernel, part
+from mdstopo.compiler.padding import whole_vectors
 from mdstopo.general.model import INERTER
-from mdstopo.jit import inline, kernel, part
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import CRUSH, CURVE, SPRING, law, law_first_set, law_start
-from mdstopo.native.padding import whole_vectors
 
 #: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
 SCALE, MODE, SET = range(3)

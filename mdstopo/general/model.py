@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.structures import bundle
-from mdstopo.jit import kernel
 from mdstopo.scene.model import FloatArray, IndexArray
 
 #: columns of `GeneralModel.block`; code -1 is an inerter. A block has all members of a group, or where each has a

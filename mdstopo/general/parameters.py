@@ -22,6 +22,7 @@ With tau exactly at the start (at the end) it can move to one side only: that si
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import block_of, member_rows
 from mdstopo.general.forces import inerter_row
@@ -29,7 +30,6 @@ from mdstopo.general.members import rate_of_row
 from mdstopo.general.model import INERTER
 from mdstopo.general.responses import value_at
 from mdstopo.general.track import restore_modes
-from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,

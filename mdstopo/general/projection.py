@@ -8,6 +8,7 @@ all the same, so that these belong to what was computed. Driven coordinates are 
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import (
     factor_matrix,
     gather,
@@ -19,7 +20,6 @@ from mdstopo.general.balance import (
 )
 from mdstopo.general.forces import turn_bodies
 from mdstopo.general.switches import DIAGONAL
-from mdstopo.jit import kernel
 from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 

@@ -8,12 +8,12 @@ import math
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance, gather, gather_multipliers
 from mdstopo.general.duties import beside, derivatives
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.model import INERTER
-from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import add_pair_force
 from mdstopo.mechanics.joints.revolute import PLACES, turn
 from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE

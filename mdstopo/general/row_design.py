@@ -6,6 +6,9 @@ row multiplies them with its own.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.padding import whole_vectors
+from mdstopo.compiler.vector import lanes
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
 from mdstopo.general.members import direction, rate_of_row
 from mdstopo.general.model import INERTER
@@ -13,12 +16,9 @@ from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.switches import carriers
 from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
-from mdstopo.jit import kernel
 from mdstopo.mechanics.geometry import POSE, copy_rows, pair_displacement
 from mdstopo.mechanics.laws.alike import alike_designs, elastic_designs_of_rows
 from mdstopo.mechanics.laws.table import FREE_LENGTH, SPRING, law
-from mdstopo.native.padding import whole_vectors
-from mdstopo.native.vector import lanes
 
 
 @kernel

@@ -7,6 +7,7 @@ read or formed once for all of them; each row joins at its own step. A point ins
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.adjoint import row_cotangents, through_events
 from mdstopo.general.balance import make_desk
 from mdstopo.general.crush import add_sets, count_sets, keep_start
@@ -17,7 +18,6 @@ from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
 from mdstopo.general.row_design import add_designs_of_rows
 from mdstopo.general.track import carve_track, restore_modes
-from mdstopo.jit import entry, kernel
 
 
 @kernel

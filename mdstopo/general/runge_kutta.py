@@ -7,6 +7,7 @@ that a switching member's margin does not survive is shortened until it ends at 
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.crush import begins_at_plateau
@@ -47,7 +48,6 @@ from mdstopo.integrators.steps import (
     largest_turn,
     motion_weights,
 )
-from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose
 
 TAG = (0,)

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.duties import implement
 from mdstopo.general.runge_kutta import TAG, advance, scene_size
 from mdstopo.general.step_linear import explicit_back, explicit_forward
 from mdstopo.general.track import keep_state, restore_modes
 from mdstopo.integrators.runge_kutta import MOST
 from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.jit import kernel
 
 
 @kernel

@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.balance import joint_slopes, joint_state, make_desk
 from mdstopo.general.direct import own_force
 from mdstopo.general.forces import drive_state, general_forces
 from mdstopo.general.members import scale_general, set_modes
 from mdstopo.general.model import INERTER, unpack_general
 from mdstopo.general.parameters import parameter_slopes
-from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.laws.table import FREE_LENGTH
 

@@ -17,10 +17,10 @@ across it; then steps become shorter until the joints count as singular.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import solve_unknowns
 from mdstopo.general.joint_matrix import growth
 from mdstopo.general.switches import OF_JOINTS
-from mdstopo.jit import kernel
 
 #: a step may not end where sigma is less than this share of what it was at its begin
 NEAR = 0.1

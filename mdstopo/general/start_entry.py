@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry
 from mdstopo.general.balance import balance, joint_state, make_desk
 from mdstopo.general.forces import drive_state, turn_bodies
 from mdstopo.general.members import scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.runge_kutta import scene_size, start_modes
-from mdstopo.jit import entry
 from mdstopo.mechanics.joints.revolute import PLACES, turn
 from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.balance import (
     factor_matrix,
     joint_slopes,
@@ -19,7 +20,6 @@ from mdstopo.general.switches import DAMPED
 from mdstopo.general.track import has_factors, mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.geometry import copy_rows
 
 #: change of a sweep of the iterative method, relative, at which it has settled

@@ -6,7 +6,7 @@ one. Inside kernels a structure is made and read like a named tuple; Python neve
 
 from typing import Any
 
-from mdstopo.native.kernel import numba, when_compiling
+from mdstopo.compiler.kernel import numba, when_compiling
 
 _KINDS: dict[str, type] = {}
 _ENDING = "Structure"

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.model import INERTER
-from mdstopo.jit import kernel
 from mdstopo.mechanics.laws.table import SPRING
 
 #: places of a desk's `switches`: whether the mass is diagonal; whether the factors on the desk are those of the joints'

@@ -27,10 +27,10 @@ event     (E, 5) integers       the state at which it happened, member (padded),
 
 from typing import Any
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED
-from mdstopo.jit import kernel
 from mdstopo.scene.model import IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)

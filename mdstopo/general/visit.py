@@ -2,13 +2,13 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.duties import beside, point_of
 from mdstopo.general.forces import drive_state
 from mdstopo.general.model import unpack_general
 from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
 from mdstopo.general.track import carve_track, copy_vector, restore_modes
-from mdstopo.jit import entry, kernel
 
 
 @entry

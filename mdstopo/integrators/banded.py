@@ -5,7 +5,7 @@ its length costs. For two bodies it is plain dense elimination. Row i holds colu
 fills up to 2 half places right of the diagonal.
 """
 
-from mdstopo.jit import kernel
+from mdstopo.compiler.jit import kernel
 
 
 @kernel

@@ -28,7 +28,7 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 
 from typing import Any
 
-from mdstopo.jit import by_type, kernel
+from mdstopo.compiler.jit import by_type, kernel
 
 Implementation = Any  # a compiled function
 

@@ -17,6 +17,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, part
 from mdstopo.integrators.gauss_balance import ABOUT, Room, balance, dense_rows, fastest_rate
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
@@ -50,7 +51,6 @@ from mdstopo.integrators.steps import (
     motion_weights,
     solved_to,
 )
-from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads, forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose

@@ -9,6 +9,8 @@ from collections import namedtuple
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes, store, zero
 from mdstopo.integrators.rows import (
     add_products,
     integrate_to_nodes,
@@ -19,14 +21,12 @@ from mdstopo.integrators.rows import (
     take_rows,
 )
 from mdstopo.integrators.steps import SWEEPS
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,
     subtract_products,
     subtract_transposed,
 )
-from mdstopo.native.vector import lanes, store, zero
 
 #: what the windows of one simulation work in: at nodes (first index), of pairs, of the state at the start; rows (10,
 #: nodes, W) and vectors (11, W) as in `rows`: those that `balance` works in are rows 2 to 4, `gauss` names the others.

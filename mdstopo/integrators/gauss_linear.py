@@ -6,6 +6,7 @@ window, transposed or not, by sweeps that contract as the forward ones did.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.contract import implement
 from mdstopo.integrators.gauss import COUNTS, TAG, GaussSteps
 from mdstopo.integrators.gauss_balance import dense_rows, fill_dense, pull_back
@@ -21,7 +22,6 @@ from mdstopo.integrators.rows import (
     take_rows,
 )
 from mdstopo.integrators.steps import REVERSE, SWEEPS
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     subtract_products,

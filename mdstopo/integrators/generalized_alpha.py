@@ -19,6 +19,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel
 from mdstopo.integrators.banded import factorise, half_width, solve
 from mdstopo.integrators.gauss_balance import CLOSELY, fastest_rate
 from mdstopo.integrators.steps import (
@@ -38,7 +39,6 @@ from mdstopo.integrators.steps import (
     keep_state,
     motion_weights,
 )
-from mdstopo.jit import kernel
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.passes import SUMS

@@ -8,10 +8,10 @@ stages); room, room_ints for the steps; strength (3 or more, M_padded), see `car
 import numpy as np
 
 import mdstopo.integrators.generalized_alpha_linear  # noqa: F401  (enters the contract's table)
+from mdstopo.compiler.jit import entry
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, integrate, longest_step
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start
 from mdstopo.integrators.steps import carve
-from mdstopo.jit import entry
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.passes import scale_members
 from mdstopo.scene.packing import unpack

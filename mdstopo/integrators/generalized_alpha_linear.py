@@ -8,11 +8,11 @@ loads makes its own.
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.banded import half_width, solve
 from mdstopo.integrators.contract import implement
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, effective_matrix, weights_of
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,

@@ -6,8 +6,8 @@ without remainders.
 
 import numpy as np
 
-from mdstopo.jit import part
-from mdstopo.native.vector import WIDE, lanes, larger, largest, load, magnitude, store, total, zero
+from mdstopo.compiler.jit import part
+from mdstopo.compiler.vector import WIDE, lanes, larger, largest, load, magnitude, store, total, zero
 
 
 @part

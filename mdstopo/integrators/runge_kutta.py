@@ -10,6 +10,7 @@ from collections import namedtuple
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 from mdstopo.integrators.steps import (
     ACCEPTED,
@@ -31,7 +32,6 @@ from mdstopo.integrators.steps import (
     lasting,
     motion_weights,
 )
-from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose

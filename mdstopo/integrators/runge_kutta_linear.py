@@ -2,11 +2,11 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.contract import implement
 from mdstopo.integrators.runge_kutta import MOST, TAG, RungeKuttaSteps, advance
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.jit import kernel, part
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,

@@ -24,7 +24,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)

@@ -7,7 +7,7 @@ of r the series are taken as far as a double sees them. Errors are below three u
 
 import math
 
-from mdstopo.jit import inline, part
+from mdstopo.compiler.jit import inline, part
 
 #: a quarter turn, rad: 33 digits of it, the next 33, and the rest
 QUARTER = 1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21

@@ -5,7 +5,7 @@ One pass returns a few numbers a pair of bodies and pose (`SUMS`); everything he
 
 import math
 
-from mdstopo.jit import inline, kernel, part
+from mdstopo.compiler.jit import inline, kernel, part
 from mdstopo.mechanics.geometry import add_pair_force, relative_pose
 from mdstopo.mechanics.passes import member_sums, springs_of
 

@@ -8,9 +8,9 @@ at mu = 1 one that carries nothing has a slope.
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.threads import shared, taken
 from mdstopo.mechanics.passes import springs_of, threads_for
-from mdstopo.native.threads import shared, taken
 from mdstopo.scene.model import BLOCK, VECTOR, Model, Springs
 
 #: costs of a member of a grid and of another: all that are left have to cost at most three quarters of what all do

@@ -12,7 +12,7 @@ slip, the point, the edge's first end, its direction, its length.
 
 import math
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 CONTACT = 11
 K, C, MU, SLIP, PX, PY, AX, AY, TX, TY, LENGTH = range(CONTACT)

@@ -6,7 +6,7 @@ T = dxi/dq (3 x 6, columns x_A y_A psi_A x_B y_B psi_B). With one member's row b
 compatibility matrix (Eq. 32) is B = -b T, and dDelta/dq = -B (Eq. 36). Nothing here depends on members.
 """
 
-from mdstopo.jit import part
+from mdstopo.compiler.jit import part
 from mdstopo.mechanics.angles import cos_sin
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A

@@ -6,10 +6,10 @@ pass over them. Sums are added tile by tile, in order.
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import lanes
 from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.native.vector import lanes
 from mdstopo.scene.model import ROWS, TILE
 
 #: places of a tile: of each it reads two numbers, where `passes` reads six

@@ -3,12 +3,14 @@
 A pass returns a few numbers a pair of bodies and pose (`SUMS`), or a number a member. The order of sums is fixed:
 members within a tile, tiles in order. All passes go through the chunks of the members (`Model.chunk`): whole blocks, or
 of very many members parts of them. The sums of parts are made each by itself and added in order, so that threads can
-share them (`native.threads`) and no bit depends on how many do.
+share them (`compiler.threads`) and no bit depends on how many do.
 """
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.compiler.vector import lanes, load, store
 from mdstopo.mechanics.geometry import POSE, copy_rows, pair_displacement, relative_pose
 from mdstopo.mechanics.grids import design_grid, sum_grid
 from mdstopo.mechanics.laws.spring import (
@@ -21,8 +23,6 @@ from mdstopo.mechanics.laws.spring import (
     viscous_tangent,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.native.threads import shared, taken
-from mdstopo.native.vector import lanes, load, store
 from mdstopo.scene.model import TILE, Springs
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)

@@ -6,7 +6,8 @@ so it serves where bodies move by much more than that. Grids of undamped springs
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import WIDE, inverse_root, lanes, lanes_of, load, store, zero, zero_of
 from mdstopo.mechanics.assembly import place_bodies, sum_bodies
 from mdstopo.mechanics.grids import tile_of
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
@@ -21,7 +22,6 @@ from mdstopo.mechanics.laws.spring_grid import (
 )
 from mdstopo.mechanics.laws.sums import add_tangent
 from mdstopo.mechanics.passes import springs_of
-from mdstopo.native.vector import WIDE, inverse_root, lanes, lanes_of, load, store, zero, zero_of
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mdstopo.jit import entry
+from mdstopo.compiler.jit import entry
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.passes import SUMS

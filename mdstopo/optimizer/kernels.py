@@ -20,7 +20,7 @@ small elimination at the end.
 
 import numpy as np
 
-from mdstopo.jit import member_kernel, vector_entry
+from mdstopo.compiler.jit import member_kernel, vector_entry
 from mdstopo.optimizer.powers import powers
 from mdstopo.optimizer.problem import Floats, Ints
 

@@ -6,7 +6,7 @@ tries to. A maximum is taken over the numbers' bits, because that of floats is n
 
 import numpy as np
 
-from mdstopo.jit import member_kernel
+from mdstopo.compiler.jit import member_kernel
 from mdstopo.optimizer.problem import Floats, Ints
 
 #: terms that the series of `primitives` may have, a multiple of four, and what the next one may be of the first

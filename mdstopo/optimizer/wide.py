@@ -21,7 +21,7 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.native.threads import allowed
+from mdstopo.compiler.threads import allowed
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair

@@ -9,8 +9,8 @@ Sums are added in a fixed order, so that results do not depend on the number of 
 
 import numpy as np
 
-from mdstopo.jit import member_kernel, vector_entry
-from mdstopo.native.vector import fetch
+from mdstopo.compiler.jit import member_kernel, vector_entry
+from mdstopo.compiler.vector import fetch
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.wide_passes import SOON, part

@@ -5,9 +5,9 @@ Of an array whose numbers are all alike the first `PIECE` may be given: what is 
 
 import numpy as np
 
-from mdstopo.jit import kernel, member_kernel, vector_entry
-from mdstopo.native.threads import shared, taken
-from mdstopo.native.vector import fetch, lanes, load, total, zero
+from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.compiler.vector import fetch, lanes, load, total, zero
 from mdstopo.optimizer.powers import largest
 from mdstopo.optimizer.problem import Floats, Ints
 

@@ -11,9 +11,9 @@ Arrays, one column for each such variable:
 
 import numpy as np
 
-from mdstopo.jit import inline, kernel, member_kernel
-from mdstopo.native.padding import whole_vectors
-from mdstopo.native.vector import lanes, load, negative
+from mdstopo.compiler.jit import inline, kernel, member_kernel
+from mdstopo.compiler.padding import whole_vectors
+from mdstopo.compiler.vector import lanes, load, negative
 from mdstopo.optimizer.powers import largest, primitives
 from mdstopo.optimizer.problem import Floats, Ints
 

@@ -9,10 +9,10 @@ of variables; sums of the pieces are added in order, so that results do not depe
 
 import numpy as np
 
-from mdstopo.jit import inline, kernel, member_kernel
-from mdstopo.native.padding import whole_vectors
-from mdstopo.native.threads import shared, taken
-from mdstopo.native.vector import fetch, lanes, larger, load, magnitude, negative, store, total, unmarked, zero
+from mdstopo.compiler.jit import inline, kernel, member_kernel
+from mdstopo.compiler.padding import whole_vectors
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.compiler.vector import fetch, lanes, larger, load, magnitude, negative, store, total, unmarked, zero
 from mdstopo.optimizer.powers import primitives
 from mdstopo.optimizer.problem import Floats, Ints
 from mdstopo.optimizer.wide_passes import PIECE, RUN, part, pieces

@@ -5,7 +5,7 @@ Along the motion dg/dt = sum over pairs of E_xi . xi', and dg/dq = T^T E_xi: bot
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.geometry import add_pair_force, relative_pose
 from mdstopo.mechanics.passes import member_sums
 

@@ -11,7 +11,7 @@ The slopes follow by c_psi = J c, A_psi = -A J, and for c' = w_b J c, c'' = w_b'
 
 import math
 
-from mdstopo.jit import kernel
+from mdstopo.compiler.jit import kernel
 
 #: ACROSS: the component perpendicular to the vector as it is, whose own value is 0
 X, Y, NORM, ACROSS = range(4)

@@ -7,7 +7,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case, VolumeRow
-from mdstopo.jit import vector_entry
+from mdstopo.compiler.jit import vector_entry
 
 
 class Design:

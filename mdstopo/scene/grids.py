@@ -8,7 +8,7 @@ not turn the points of the second grid once for each member, and sum most of wha
 import numpy as np
 
 from mdstopo.case.model import MemberGroup
-from mdstopo.native.vector import WIDE
+from mdstopo.compiler.vector import WIDE
 from mdstopo.scene.model import CHUNK, COUNT, LENGTH, START, WIDTH, IndexArray
 
 #: places in a row at least: fewer vectors than two are not worth a row's own sums

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mdstopo.jit import part
-from mdstopo.native.threads import allowed
+from mdstopo.compiler.jit import part
+from mdstopo.compiler.threads import allowed
 from mdstopo.scene.model import BLOCK, CHUNK, MANY, ROWS, START, STOP, WIDTH, FloatArray, IndexArray, Model
 
 #: numbers in a line of the cache

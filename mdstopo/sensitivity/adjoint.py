@@ -8,8 +8,8 @@ inside. The peak's time is held fixed (envelope theorem).
 
 import numpy as np
 
+from mdstopo.compiler.jit import part
 from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
-from mdstopo.jit import part
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope

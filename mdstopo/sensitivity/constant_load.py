@@ -10,7 +10,7 @@ dropped. An approximation; the paper's Figure 6 shows how far it carries.
 
 import numpy as np
 
-from mdstopo.jit import entry
+from mdstopo.compiler.jit import entry
 from mdstopo.mechanics.assembly import pair_tangents
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import (

@@ -7,9 +7,9 @@ time. O(N) memory; with the histories of the response, dg/dalpha at every step's
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel
 from mdstopo.integrators.contract import carried, parent_of, reach, stage_weights, steps_of
 from mdstopo.integrators.steps import carve
-from mdstopo.jit import entry, kernel
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, energy_gradient, springs_of, unscale_gradient
 from mdstopo.responses.energy import energy_at, energy_slope

@@ -9,11 +9,11 @@ where not, that is said, and `direct` is the method to take.
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, kernel, member_kernel
 from mdstopo.integrators.contract import steps_of
 from mdstopo.integrators.generalized_alpha import weights_of
 from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import SWEEPS, carve
-from mdstopo.jit import entry, kernel, member_kernel
 from mdstopo.mechanics.assembly import add_turning, subtract_products
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design

@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry, part
 from mdstopo.integrators.contract import point_of, steps_of
 from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, deflection, solved_to, step_at
-from mdstopo.jit import entry, part
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose

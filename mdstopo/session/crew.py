@@ -15,7 +15,7 @@ from contextlib import suppress
 from typing import IO, Any
 
 from mdstopo.children import command
-from mdstopo.native.threads import VARIABLE, cores
+from mdstopo.compiler.threads import VARIABLE, cores
 
 
 def streams() -> tuple[IO[bytes], IO[bytes]]:

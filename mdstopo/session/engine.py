@@ -65,7 +65,7 @@ def compiling(case: Case) -> str:
 
 def compilation_due(case: Case) -> bool:
     """Whether the kernels of this version have never been compiled here for such a case."""
-    from mdstopo.native.store import cache_folder
+    from mdstopo.compiler.store import cache_folder
 
     pattern = "mdstopo.general.*" if beyond_springs(case) else "mdstopo.integrators.*"
     return next(cache_folder().glob(pattern), None) is None

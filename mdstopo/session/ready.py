@@ -129,7 +129,7 @@ class _Toy:
 
 def _marker(case: Case) -> Path:
     """An empty file that says that the kernels for such cases are cached."""
-    from mdstopo.native.store import cache_folder
+    from mdstopo.compiler.store import cache_folder
 
     family = "general" if beyond_springs(case) else "springs"
     family += "".join(f"-{many}" for many in (MANY, WIDE) if case.space.size >= many)

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from mdstopo.native.trusted import NotOursError, open_lock
+from mdstopo.compiler.trusted import NotOursError, open_lock
 from mdstopo.store.errors import InUseError, StoreError
 
 _LONGEST = 300  # bytes of a holder's name

@@ -19,7 +19,7 @@ COMPILING = 300.0
 
 def _marker() -> Path:
     """An empty file that says that the kernels of all scenes are cached."""
-    from mdstopo.native.store import cache_folder
+    from mdstopo.compiler.store import cache_folder
 
     return cache_folder() / "ready-stress"
 

@@ -4,11 +4,11 @@ import numba
 import numpy as np
 import pytest
 
+from mdstopo.compiler.kernel import numba as with_kernels
+from mdstopo.compiler.threads import VARIABLE
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics import passes
 from mdstopo.mechanics.geometry import POSE
-from mdstopo.native.kernel import numba as with_kernels
-from mdstopo.native.threads import VARIABLE
 from mdstopo.scene.model import CHUNK, MANY
 from mdstopo.scene.packing import pack, unpack
 from tests.engine.scenes import read

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from mdstopo.compiler.jit import entry
 from mdstopo.general.ready import Ready
-from mdstopo.jit import entry
 
 
 @entry

@@ -4,10 +4,10 @@ import numba
 import numpy as np
 import pytest
 
+from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.laws import alike
 from mdstopo.mechanics.passes import SUMS
-from mdstopo.native.kernel import numba as with_vectors
 
 with_vectors()
 COUNT, START, STOP = 48, 16, 40

@@ -5,7 +5,7 @@ from decimal import Decimal, localcontext
 import numpy as np
 import pytest
 
-from mdstopo.jit import entry
+from mdstopo.compiler.jit import entry
 from mdstopo.mechanics.angles import FAR, QUARTER, cos_sin
 
 PI = Decimal("3.14159265358979323846264338327950288419716939937510582097494459")

@@ -4,11 +4,11 @@ import numba
 import numpy as np
 import pytest
 
+from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.passes import SUMS, member_sums
 from mdstopo.mechanics.rough import may_be_rough, rough_sums
-from mdstopo.native.kernel import numba as with_vectors
 from mdstopo.scene import compile as scenes
 from mdstopo.scene.grids import STRIDE
 from mdstopo.scene.model import Springs

@@ -4,13 +4,13 @@ import numba
 import numpy as np
 import pytest
 
+from mdstopo.compiler.kernel import numba as with_vectors
+from mdstopo.compiler.threads import shared
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.laws.spring import shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, _scale_chunks, _unscale_chunks, member_sums
-from mdstopo.native.kernel import numba as with_vectors
-from mdstopo.native.threads import shared
 from mdstopo.scene.grids import places_of
 from mdstopo.scene.model import START, STOP, WIDTH, Springs
 from mdstopo.scene.packing import chunks_of

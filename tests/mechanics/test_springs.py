@@ -4,8 +4,8 @@ import numba
 import numpy as np
 import pytest
 
+from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.mechanics.laws import spring
-from mdstopo.native.kernel import numba as with_vectors
 
 with_vectors()
 COUNT = 48

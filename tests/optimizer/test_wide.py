@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from mdstopo.jit import vector_entry
-from mdstopo.native.threads import VARIABLE
+from mdstopo.compiler.jit import vector_entry
+from mdstopo.compiler.threads import VARIABLE
 from mdstopo.optimizer import driver, separable, wide
 from mdstopo.optimizer.driver import Gsao
 from mdstopo.optimizer.powers import largest, powers, primitives

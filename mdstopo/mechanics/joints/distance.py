@@ -8,7 +8,7 @@ Parameters: s_A (2), s_B (2), -, -, -, L.
 
 import math
 
-from mdstopo.jit import kernel
+from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.joints.revolute import arms
 
 

@@ -3,7 +3,7 @@
 Parameters: s_A (2), s_B (2), -, -, theta_0.
 """
 
-from mdstopo.jit import kernel
+from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.joints.revolute import (
     revolute_acceleration_slopes,
     revolute_gamma,

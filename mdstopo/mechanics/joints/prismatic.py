@@ -8,7 +8,7 @@ n . p is constant, so with E = x_B + c - x_A and m = n turned by a right angle
 Parameters: s_A (2), s_B (2), n_0 (2), theta_0.
 """
 
-from mdstopo.jit import kernel
+from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.joints.revolute import arms
 
 

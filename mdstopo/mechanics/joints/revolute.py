@@ -5,7 +5,7 @@ Parameters: s_A (2), s_B (2). Used by the fixed joint too, which adds a row of i
 
 import math
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
 
 #: places of w: x, y, psi of both bodies, then cos and sin of both angles, which many joints share
 PLACES = 10

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from mdstopo.case.model import DistanceJoint, Joint, PrismaticJoint
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.joints.distance import (
     distance_acceleration_slopes,
     distance_gamma,

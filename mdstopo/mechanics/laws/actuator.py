@@ -3,7 +3,7 @@
 Modes: linear, held at +limit, held at -limit.
 """
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 LINEAR, UPPER, LOWER = range(3)
 

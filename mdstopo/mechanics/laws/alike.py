@@ -9,10 +9,10 @@ elongation has.
 
 import numpy as np
 
-from mdstopo.jit import kernel
+from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_parts, elastic_work
 from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
-from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 
 @kernel

@@ -6,7 +6,7 @@ permanent set (`strength` row 2), so y = side x - gap is what is elastic: 0 <= y
 grows with its elongation; it is written down when crushing ends, where y is F / k again: nothing jumps.
 """
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 OPEN, ELASTIC, CRUSHING = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide

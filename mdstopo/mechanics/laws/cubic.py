@@ -1,6 +1,6 @@
 """`cubic`: f = k1 x + k3 x^3, V = k1 x^2/2 + k3 x^4/4. Parameters: k1, k3."""
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 
 @inline

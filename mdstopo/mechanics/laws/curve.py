@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 #: how far a piece goes on beyond its ends, relative to the narrowest: what rests on a knot does not change its mode by
 #: rounding, and the force is off by no more than the square of it

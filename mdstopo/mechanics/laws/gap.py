@@ -5,7 +5,7 @@ with f = side (k y + c side x'); compression is the mirror image. Modes: open, c
 clip holds at zero, because damping would reverse it. In each mode the formula goes on beyond its end.
 """
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 OPEN, CLOSED, CLIPPED = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide

@@ -1,6 +1,6 @@
 """`spring` (Eq. 2) in scalar form: f = k x + c x' + preload, V = k x^2/2. Parameters: k, c, preload."""
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 
 @inline

@@ -2,7 +2,7 @@
 
 import math
 
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 
 
 @inline

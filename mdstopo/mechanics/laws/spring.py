@@ -21,9 +21,9 @@ import math
 
 import numpy as np
 
-from mdstopo.jit import inline, kernel, member_kernel, part
+from mdstopo.compiler.jit import inline, kernel, member_kernel, part
+from mdstopo.compiler.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 from mdstopo.mechanics.laws.sums import upper_triangle
-from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, zero
 
 ELASTIC = 0
 VISCOUS = 1

@@ -16,10 +16,10 @@ import math
 
 import numpy as np
 
-from mdstopo.jit import kernel, part
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.vector import inverse_root, lanes, larger, largest, load, store, total, where_larger, zero
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.sums import upper_triangle
-from mdstopo.native.vector import inverse_root, lanes, larger, largest, load, store, total, where_larger, zero
 
 
 @kernel

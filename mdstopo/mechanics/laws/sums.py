@@ -1,7 +1,7 @@
 """From what members add up to, to the sums of a pair of bodies (`passes.SUMS`)."""
 
-from mdstopo.jit import part
-from mdstopo.native.vector import total
+from mdstopo.compiler.jit import part
+from mdstopo.compiler.vector import total
 
 
 @part

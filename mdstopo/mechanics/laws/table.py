@@ -20,7 +20,7 @@ from mdstopo.case.laws import (
     SpringLaw,
     TableLaw,
 )
-from mdstopo.jit import inline
+from mdstopo.compiler.jit import inline
 from mdstopo.mechanics.laws.actuator import (
     actuator_force,
     actuator_margin,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.native.kernel import when_compiling
+from mdstopo.compiler.kernel import when_compiling
 
 Floats = NDArray[np.float64]
 AnyFloats = NDArray[np.floating[Any]]
@@ -105,4 +105,4 @@ def negative(vector: Floats) -> int:
 @when_compiling
 def _register() -> None:
     """Have Numba know them."""
-    import mdstopo.native.vector_lowering  # noqa: F401
+    import mdstopo.compiler.vector_lowering  # noqa: F401

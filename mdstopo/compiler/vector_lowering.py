@@ -1,28 +1,31 @@
-"""What `native.vector` becomes in machine code. Imported by what compiles, because it imports Numba."""
+"""What `compiler.vector` becomes in machine code, by what Numba documents for those who extend it. Imports Numba."""
 
 import operator
 from collections.abc import Callable
 from typing import Any
 
-from llvmlite import ir
+from llvmlite import binding, ir
 from numba import config, types
 from numba.core import cgutils
-from numba.core.codegen import get_host_cpu_features
-from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import lower_builtin, models, register_model
+from numba.extending import lower_builtin, models, register_model, type_callable
 
-from mdstopo.native import vector
+from mdstopo.compiler import vector
 
 
-def _features() -> str:
-    """Features of the processor that Numba compiles for: fewer than it has under NUMBA_ENABLE_AVX=0."""
-    asked: str | None = config.CPU_FEATURES  # type: ignore[attr-defined]  # set by its reader of the environment
-    return str(get_host_cpu_features()) if asked is None else asked
+def _has_avx512() -> bool:
+    """Whether Numba compiles for a processor with AVX-512: not so under NUMBA_ENABLE_AVX=0."""
+    settings: Any = config
+    if settings.CPU_FEATURES is not None:
+        return "+avx512f" in settings.CPU_FEATURES.split(",")
+    try:
+        return bool(settings.ENABLE_AVX) and bool(binding.get_host_cpu_features().get("avx512f"))
+    except RuntimeError:  # a processor whose features LLVM cannot tell
+        return False
 
 
-_AVX512 = "+avx512f" in _features().split(",")
+_AVX512 = _has_avx512()
 _LANES = vector.WIDE if _AVX512 else vector.NARROW
-#: products are fused with sums, as in `jit.member_kernel`; sums are added in the order that is written
+#: products are fused with sums, as in `compiler.jit.member_kernel`; sums are added in the order that is written
 _FUSED = ("contract", "nsz")
 
 
@@ -56,21 +59,23 @@ Result = Callable[..., Any]
 def _implement(function: Callable[..., Any], given: tuple[type, ...], result: Result, lower: Lower) -> None:
     """Tell Numba what `function` gives for arguments of types of these classes, and by what code."""
 
-    class Typed(AbstractTemplate):
-        key = function
+    def found(*asked: Any) -> Any:
+        return result(*asked) if all(map(_fits, asked, given)) else None
 
-        def generic(self, asked: Any, _named: Any) -> Any:
-            if len(asked) != len(given) or not all(map(_fits, asked, given)):
-                return None
-            found = result(*asked)
-            return None if found is None else signature(found, *asked)
+    # Numba asks how many arguments there are
+    with_arguments: tuple[Callable[..., Any], ...] = (
+        lambda: found(),
+        lambda a: found(a),
+        lambda a, b: found(a, b),
+        lambda a, b, c: found(a, b, c),
+    )
 
     def lowered(context: Any, build: Any, kinds: Any, arguments: Any) -> Any:
         values = [_data(context, build, *pair) for pair in zip(kinds.args, arguments, strict=True)]
         value = lower(build, kinds.args, values)
         return context.get_dummy_value() if kinds.return_type is types.none else value
 
-    infer_global(function)(Typed)
+    type_callable(function)(lambda _context: with_arguments[len(given)])
     lower_builtin(function, *given)(lowered)
 
 
@@ -84,7 +89,15 @@ def _fits(asked: Any, given: type) -> bool:
 
 def _data(context: Any, build: Any, kind: Any, given: Any) -> Any:
     """The address of an array's numbers; anything else as it is."""
-    return context.make_array(kind)(context, build, given).data if isinstance(kind, types.Array) else given
+    if not isinstance(kind, types.Array):
+        return given
+    return cgutils.create_struct_proxy(kind)(context, build, value=given).data
+
+
+def _declared(build: Any, form: Any, name: str) -> Any:
+    """A function of LLVM's, declared once in a module."""
+    found = build.module.globals.get(name)
+    return ir.Function(build.module, form, name) if found is None else found
 
 
 def _of(array: Any, *_: Any) -> Any:
@@ -148,7 +161,7 @@ def _fetch(build: Any, _kinds: Any, arguments: Any) -> None:
     data, i = arguments
     byte, flag = ir.IntType(8).as_pointer(), ir.IntType(32)
     form = ir.FunctionType(ir.VoidType(), [byte, flag, flag, flag])
-    call = cgutils.get_or_insert_function(build.module, form, "llvm.prefetch.p0")
+    call = _declared(build, form, "llvm.prefetch.p0")
     to_be_read, often, numbers = (ir.Constant(flag, value) for value in (0, 3, 1))
     build.call(call, [build.bitcast(build.gep(data, [i]), byte), to_be_read, often, numbers])
 
@@ -183,7 +196,7 @@ def _larger_of(build: Any, one: Any, other: Any) -> Any:
 def _unary(build: Any, kind: VectorType, name: str, x: Any) -> Any:
     form = ir.FunctionType(kind.code, [kind.code])
     letters = f"v{kind.count}f{kind.number.bitwidth}"
-    return build.call(cgutils.get_or_insert_function(build.module, form, f"llvm.{name}.{letters}"), [x])
+    return build.call(_declared(build, form, f"llvm.{name}.{letters}"), [x])
 
 
 def _negative(build: Any, kinds: Any, arguments: Any) -> Any:
@@ -217,7 +230,7 @@ def _refined(build: Any, kind: VectorType, x: Any) -> Any:
     rough = kind is ROUGH
     form = ir.FunctionType(kind.code, [kind.code, kind.code, ir.IntType(kind.count)])
     name = f"llvm.x86.avx512.rsqrt14.p{'s' if rough else 'd'}.512"
-    start = cgutils.get_or_insert_function(build.module, form, name)
+    start = _declared(build, form, name)
     y = build.call(start, [x, _constant(kind, 0.0), ir.Constant(ir.IntType(kind.count), -1)])
     # other flags would allow e to be taken apart
     fused = ("contract",)

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import mdstopo
-from mdstopo.native import store
-from mdstopo.native.store import Code
-from mdstopo.native.trusted import is_private, make_private, read_private
+from mdstopo.compiler import store
+from mdstopo.compiler.store import Code
+from mdstopo.compiler.trusted import is_private, make_private, read_private
 
 PACKAGE = Path(mdstopo.__file__).parent
 
@@ -125,7 +125,7 @@ def test_folders_outside_the_key_have_no_kernels_and_give_kernels_nothing() -> N
     outside = {f"mdstopo.{name}" for name in store.WITHOUT_KERNELS}
     for path in PACKAGE.glob("**/*.py"):
         taken = imports(path)
-        compiles = "mdstopo.jit" in taken
+        compiles = "mdstopo.compiler.jit" in taken
         if path.relative_to(PACKAGE).parts[0] in store.WITHOUT_KERNELS:
             assert not compiles, path
         elif compiles:
@@ -168,7 +168,7 @@ def test_the_lock_of_the_cache_follows_no_link(tmp_path: Path) -> None:
 MODULE = textwrap.dedent(
     """
     import sys, resource
-    from mdstopo.jit import entry, kernel
+    from mdstopo.compiler.jit import entry, kernel
     @kernel
     def inner(x):
         return 2.0 * x

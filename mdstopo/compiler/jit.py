@@ -1,15 +1,15 @@
 """The decorators that mark what is compiled, without compiling anything and without importing Numba.
 
 A `kernel` is called by other kernels only. An `entry` is called from Python: at its first call its machine code is
-read from the disk (`native.store`). Where it has never been compiled for these types of arguments on this machine,
+read from the disk (`compiler.store`). Where it has never been compiled for these types of arguments on this machine,
 Numba compiles it there and then, and the code is kept. So a process whose kernels are on the disk never imports Numba.
 """
 
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-from mdstopo.native.entry import Entry
-from mdstopo.native.kernel import Kernel, when_compiling
+from mdstopo.compiler.entry import Entry
+from mdstopo.compiler.kernel import Kernel, when_compiling
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -57,9 +57,9 @@ def by_type(stub: Callable[..., Any]) -> Callable[[F], F]:
     def enter(choose: F) -> F:
         @when_compiling
         def register() -> None:
-            from mdstopo.native.choice import offer
+            from mdstopo.compiler.tried import way
 
-            offer(stub, choose)
+            way().offer(stub, choose)
 
         return choose
 

@@ -35,7 +35,7 @@ def elsewhere(count: int, **setting: str) -> list[dict[str, list[float]]]:
     """The same of so many scenes, by kernels for another processor."""
     program = (
         "import json\n"
-        "from tests.native.test_processors import found\n"
+        "from tests.compiler.test_processors import found\n"
         f"print(json.dumps([found(seed) for seed in range({count})]))\n"
     )
     environment = {name: value for name, value in os.environ.items() if name not in STATED} | setting

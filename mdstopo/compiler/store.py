@@ -13,14 +13,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from mdstopo.compiler.trusted import make_private, open_lock, read_private, write_private
 from mdstopo.installed import version_of
-from mdstopo.native.trusted import make_private, open_lock, read_private, write_private
 
-#: folders of the package that hold no kernels and that no kernel takes a number from; `tests/native` looks after that
+#: folders of the package that hold no kernels and that no kernel takes a number from; `tests/compiler` looks after that
 WITHOUT_KERNELS = ("bench", "cli", "finalize", "front", "plots", "report", "session", "store")
 _COMPILER = ("numba", "llvmlite", "numpy")
 _SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
-_MAGIC = b"mdstopo code 2\n"
+_MAGIC = b"mdstopo code 3\n"
 #: folders of other sources and versions: how many are kept, and how long after their last use, in seconds
 _KEPT, _LASTING = 12, 30 * 86400.0
 _DAY = 86400.0

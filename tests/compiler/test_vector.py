@@ -8,9 +8,8 @@ import numba
 import numpy as np
 import pytest
 
-from mdstopo.integrators.rows import largest_difference, row_width
-from mdstopo.native.kernel import numba as with_vectors
-from mdstopo.native.vector import (
+from mdstopo.compiler.kernel import numba as with_vectors
+from mdstopo.compiler.vector import (
     NARROW,
     WIDE,
     fetch,
@@ -29,6 +28,7 @@ from mdstopo.native.vector import (
     zero,
     zero_of,
 )
+from mdstopo.integrators.rows import largest_difference, row_width
 
 FLOOR = 1e-30
 with_vectors()
@@ -212,7 +212,7 @@ def test_a_number_lost_anywhere_is_seen(bad):
 def test_processors_without_the_widest_vectors_get_the_same_numbers(narrow):
     program = (
         "import numpy as np\n"
-        "from tests.native import test_vector as own\n"
+        "from tests.compiler import test_vector as own\n"
         "assert own._width() == own.NARROW\n"
         "own.test_inverse_roots_are_right_to_rounding_over_the_whole_range()\n"
         "own.test_inverse_roots_are_zero_up_to_the_floor_and_of_what_is_no_number()\n"

@@ -1,7 +1,7 @@
 """Lengths in whole vectors."""
 
-from mdstopo.jit import part
-from mdstopo.native.vector import lanes
+from mdstopo.compiler.jit import part
+from mdstopo.compiler.vector import lanes
 
 
 @part

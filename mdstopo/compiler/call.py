@@ -11,24 +11,14 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from mdstopo.native.entry import DIMENSIONS, DTYPES, LENGTHS, NUMBERS, PLAIN
-from mdstopo.native.store import CALL, PREPARED, Code
+from mdstopo.compiler.entry import DIMENSIONS, DTYPES, EXCUSE, LENGTHS, NUMBERS, PLAIN
+from mdstopo.compiler.store import CALL, PREPARED, Code
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
 
 #: the eight bytes of a result, by its letter
 _SLOTS = {"f": "d", "i": "q", "b": "?7x"}
-
-
-class _Excuse(ctypes.Structure):
-    _fields_ = (
-        ("data", ctypes.c_void_p),
-        ("size", ctypes.c_int32),
-        ("hash", ctypes.c_void_p),
-        ("maker", ctypes.c_void_p),
-        ("computed", ctypes.c_int32),
-    )
 
 
 @functools.cache
@@ -41,7 +31,7 @@ def _target() -> Any:
 
 @functools.cache
 def arrays_are_known() -> bool:
-    """Whether the fields of array objects are where `native.build` has machine code look for them."""
+    """Whether the fields of array objects are where `compiler.build` has machine code look for them."""
     array = np.zeros((2, 3))
     words = (ctypes.c_int64 * (LENGTHS + 1)).from_address(id(array))
     dimensions = ctypes.c_int32.from_address(id(array) + 8 * DIMENSIONS).value
@@ -51,7 +41,7 @@ def arrays_are_known() -> bool:
 
 
 def _format(kind: str) -> str:
-    """How an argument is packed, by its letters in `native.entry.types_of`."""
+    """How an argument is packed, by its letters in `compiler.entry.types_of`."""
     return "q" * int(kind[1:]) if kind[0] == "t" else {"f": "d"}.get(kind, "q")
 
 
@@ -93,8 +83,8 @@ class Native:
         self._unpack = struct.Struct("".join(_SLOTS[letter] for letter in result)).unpack_from if result else None
         form = "".join(_format(kind) for kind in self._kinds)
         self._pack = struct.Struct(form).pack_into
-        #: words of what a call returns, with the excuse; of all in a block
-        self._behind = len(result) + 1
+        #: words of what a call returns, with what it raises; of all in a block
+        self._behind = len(result) + EXCUSE
         self._block = ctypes.c_int64 * (len(form) + self._behind)
 
     def __call__(self, *arguments: Any) -> Any:
@@ -106,7 +96,7 @@ class Native:
     def run(self, block: Any) -> Any:
         """Call it with a block of numbers."""
         if self._call(block):
-            self._fail(block[-1])
+            self._fail(*block[-EXCUSE:])
         return self._found(block)
 
     def prepare(self, *arguments: Any) -> Callable[..., Any]:
@@ -130,7 +120,7 @@ class Native:
                 view, place = placed[which]
                 view[place] = value
             if function(address):
-                self._fail(block[-1])
+                self._fail(*block[-EXCUSE:])
             return found(block)
 
         return call
@@ -174,17 +164,13 @@ class Native:
         results = self._unpack(block, 8 * (len(block) - self._behind))
         return results[0] if self._single else results
 
-    def _fail(self, address: int) -> None:
-        """Raise what the compiled code raised: its class and arguments, pickled where Numba keeps them.
-
-        Numba's record: the pickle's address and size, its hash, how arguments known only then are made, their number.
-        """
+    def _fail(self, address: int, size: int, computed: int) -> None:
+        """Raise what the compiled code raised: its class and arguments are pickled where it says."""
         import pickle
 
         if not address:
             raise RuntimeError(f"the compiled {self._name} failed")
-        record = _Excuse.from_address(address)
-        raised, arguments = pickle.loads(ctypes.string_at(record.data, record.size))[:2]
-        if record.computed > 0:
+        raised, arguments = pickle.loads(ctypes.string_at(address, size))[:2]
+        if computed > 0:
             raise raised(f"in the compiled {self._name}")
         raise raised(*(arguments or ()))

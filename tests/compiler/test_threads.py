@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from mdstopo.cli.group import run_group
-from mdstopo.jit import entry, kernel
-from mdstopo.native import threads
-from mdstopo.native.threads import MOST, VARIABLE, ThreadsError, allowed, cores, shared, taken
+from mdstopo.compiler import threads
+from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.threads import MOST, VARIABLE, ThreadsError, allowed, cores, shared, taken
 from mdstopo.session import crew
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.native.kernel import when_compiling
+from mdstopo.compiler.kernel import when_compiling
 
 #: threads of one pass at most
 MOST = 64
@@ -57,4 +57,6 @@ def taken(counter: NDArray[np.int64]) -> int:
 @when_compiling
 def _register() -> None:
     """Have Numba know them."""
-    import mdstopo.native.threads_lowering  # noqa: F401
+    from mdstopo.compiler.tried import way
+
+    way().enter_threads()

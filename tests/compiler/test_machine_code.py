@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.jit import entry, kernel
-from mdstopo.native import build, call, store
-from mdstopo.native.call import Native
-from mdstopo.native.entry import types_of
+from mdstopo.compiler import call, store, tried
+from mdstopo.compiler.call import Native
+from mdstopo.compiler.entry import types_of
+from mdstopo.compiler.jit import entry, kernel
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -86,6 +86,12 @@ def _first_and_size(x):
 def nothing(x):
     """Returns nothing."""
     x[0] = 3.0
+
+
+def numba_private():
+    found = tried.private()
+    assert found is not None
+    return found
 
 
 def _arguments():
@@ -226,7 +232,8 @@ def test_of_several_processes_one_compiles_and_the_others_find_it(tmp_path, monk
     path = tmp_path / "doubled.code"
     monkeypatch.setattr(store, "path_of", lambda *_: path)
     builds = []
-    compiled = build.build
+    private = numba_private()
+    compiled = private.build
 
     def slowly(*arguments):
         builds.append(threading.get_ident())
@@ -235,7 +242,7 @@ def test_of_several_processes_one_compiles_and_the_others_find_it(tmp_path, monk
         assert waiting.is_alive()  # it does not compile beside us
         return compiled(*arguments)
 
-    monkeypatch.setattr(build, "build", slowly)
+    monkeypatch.setattr(private, "build", slowly)
     found = []
     waiting = threading.Thread(target=lambda: found.append(other(np.full(1, 3.0))))
     assert doubled(np.full(1, 2.0)) == 4.0
@@ -250,8 +257,9 @@ def test_code_that_needs_more_of_numba_than_is_provided_goes_through_numba(monke
     def summed(x):
         return np.zeros(3).sum() + x[0]
 
-    monkeypatch.setattr(build, "PROVIDED", frozenset())
-    assert build.build(summed.dispatcher, "d1") is None
+    private = numba_private()
+    monkeypatch.setattr(private, "PROVIDED", frozenset())
+    assert private.build(summed.dispatcher, "d1") is None
     assert summed(np.full(1, 2.0)) == 2.0
     assert summed._native == {"d1": None}
 
@@ -308,7 +316,7 @@ def test_types_of_general_scenes_are_found_by_processes_that_have_springs_only()
 
 INSIDE = """
 import numpy as np
-from mdstopo.jit import entry, kernel, member_kernel
+from mdstopo.compiler.jit import entry, kernel, member_kernel
 
 @member_kernel
 def total(x):

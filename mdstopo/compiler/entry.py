@@ -12,19 +12,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mdstopo.native.kernel import Kernel
+from mdstopo.compiler.kernel import Kernel, way
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mdstopo.native.call import Native
-    from mdstopo.native.store import Code
+    from mdstopo.compiler.call import Native
+    from mdstopo.compiler.store import Code
 
 #: by letter, the numbers of an array
 DTYPES = {"d": np.dtype(np.float64), "q": np.dtype(np.int64), "?": np.dtype(np.bool_)}
 _LETTERS = {dtype: letter for letter, dtype in DTYPES.items()}
 #: what an array has to be, of `flags.num`: in C order and aligned
 PLAIN = 0x1 | 0x100
+#: words behind the results that tell what was raised: where a pickle of its class and arguments is, which size it has,
+#: and how many arguments were known only then and are not in it
+EXCUSE = 3
 #: of an array object's words, behind those that all objects have: where its numbers are, how many dimensions it has,
 #: and where its lengths are (NumPy's ndarraytypes.h)
 NUMBERS, DIMENSIONS, LENGTHS = (object.__basicsize__ // 8 + k for k in range(3))
@@ -57,8 +60,6 @@ def types_of(arguments: tuple[Any, ...]) -> str | None:
 
 class Entry(Kernel):
     """A compiled function that Python calls; other compiled functions may call it too."""
-
-    _inner = False
 
     def __init__(self, function: Callable[..., Any], fastmath: frozenset[str]) -> None:
         super().__init__(function, fastmath)
@@ -111,8 +112,8 @@ class Entry(Kernel):
         """Machine code for these types, from the disk or from Numba; nothing where only Numba itself can call it."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
             return None
-        from mdstopo.native import store
-        from mdstopo.native.call import Native, arrays_are_known
+        from mdstopo.compiler import store
+        from mdstopo.compiler.call import Native, arrays_are_known
 
         if not arrays_are_known():
             return None
@@ -124,10 +125,19 @@ class Entry(Kernel):
         return None if code is None else Native(self.py_func.__qualname__, code, types)
 
     def _built(self, path: Path, types: str) -> Code | None:
-        from mdstopo.native import store
-        from mdstopo.native.build import build
+        from mdstopo.compiler import store, tried
 
-        code = build(self.dispatcher, types)
+        way()
+        found = tried.private()
+        if found is None:
+            return None
+        try:
+            code: Code | None = found.build(self.dispatcher, types)
+        except Exception as error:
+            with tried.without_private(error):
+                self._callable = self._wrapped()
+                way().compile_for(self._callable, types)
+            return None
         if code is not None:
             store.write(path, code)
         return code
@@ -135,5 +145,15 @@ class Entry(Kernel):
     def _by_numba(self, *arguments: Any) -> Any:
         """Called through Numba's own wrapper: the slow way in, for what the machine code does not take."""
         if self._callable is None:
-            self._callable = self._made()
+            self._callable = self._wrapped()
         return self._callable(*arguments)
+
+    def _wrapped(self) -> Any:
+        way()
+        from mdstopo.compiler import numba_plain
+        from mdstopo.compiler.tried import private
+
+        return numba_plain.outer(self.py_func, self._fastmath, kept=private() is None)
+
+    def _inside(self) -> Any:
+        return way().outer(self.py_func, self._fastmath)

@@ -5,9 +5,9 @@ import os
 import numpy as np
 import pytest
 
+from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.structures import bundle
-from mdstopo.jit import entry, kernel
-from mdstopo.native.kernel import Kernel
 
 
 @kernel

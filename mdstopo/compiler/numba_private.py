@@ -1,0 +1,1216 @@
+"""Everything that is private or undocumented in Numba and llvmlite, as far as this program uses it. Imports Numba.
+
+`tried` decides whether this module serves: it is imported only with versions that it was tried with, and `check` then
+compiles and calls a function that needs all of it. No other module may name anything of `numba.core`, `numba.np` or
+`numba.experimental.structref._Utils`; `tests/compiler` looks after that.
+
+In order: the shorter way from typed code to LLVM's (`Lower`), passes, libraries that make no machine code, the cache
+of functions inside entries, kernels chosen by types, threads, what Numba is spared, the run time that machine code
+needs, and an entry's machine code itself (`build`).
+"""
+
+import ctypes
+import functools
+import hashlib
+import inspect
+import os
+import pickle
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import CodeType
+from typing import Any
+
+import numba
+import numba.core.typing.cffi_utils  # here, while cffi and scipy are spared: see `kernel`
+import numba.np.arraymath
+import numpy as np
+from llvmlite import binding as llvm
+from llvmlite import ir as llvm_ir
+from llvmlite.ir.instructions import InsertValue
+from numba import types
+from numba.core import analysis, cgutils, ir
+from numba.core.caching import FunctionCache, _Cache
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler, CompileResult
+from numba.core.compiler_machinery import register_pass
+from numba.core.imputils import impl_ret_borrowed
+from numba.core.lowering import Lower as NumbaLower
+from numba.core.registry import cpu_target
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
+from numba.core.runtime.nrt import MemInfo
+from numba.core.serialize import dumps
+from numba.core.target_extension import get_local_target, jit_registry
+from numba.core.typed_passes import AnnotateTypes, BaseNativeLowering, NativeLowering, NopythonRewrites
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.core.untyped_passes import InlineClosureLikes
+from numba.experimental.structref import _Utils as _Structure
+from numba.extending import lower_builtin
+from numba.np.arrayobj import fix_integer_index, load_item, store_item
+
+from mdstopo.compiler import threads
+from mdstopo.compiler.entry import EXCUSE, LENGTHS, NUMBERS
+from mdstopo.compiler.numba_plain import numba_type
+from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder, read_checked, write_checked
+from mdstopo.compiler.tried import UnexpectedError, has_own_passes
+
+#: whether our passes over a function fit this version
+_LEAN = has_own_passes()
+
+
+# The way from typed code to LLVM's
+# From Numba's typed code to LLVM's, in half as many instructions: the time to compile goes with their number.
+#
+# Numba's own `Lower` leaves the same to LLVM to find out. What is computed is the same, but for the last bits where
+# LLVM may fuse or reorder what it sees:
+#
+# What a function got from its caller lives as long as the call. So neither it nor views of it are counted: a scene is a
+# tuple or structure of thirty arrays, each of which would be counted at every mention of it. The fields of a structure
+# are set when it is made, and never again.
+#
+# A variable that is assigned once, before all its uses, is a value and needs no place in memory; and a part of a tuple
+# or array that has just been put together is known.
+#
+# Numbers that index an array in C order become an address from the array's fields, not from a copy of them in memory.
+# So does another shape of one that a function got.
+
+#: places of an array's fields in Numba's structure of it
+_HOLDER, _PARENT, _COUNT, _SIZE, _DATA, _SHAPE, _STRIDES = range(7)
+
+
+class Lower(NumbaLower):
+    """Numba's, with less for LLVM to do away with."""
+
+    def init(self) -> None:
+        # a generator's variables outlive the call that sets them: they are kept between calls
+        self._lasting = bool(self.func_ir.func_id.is_generator)
+        self._borrowed = set() if self._lasting else borrowed(self.blocks, self.fndesc.typemap)
+        self._counting = self.context
+        self._plain = self.context.subtarget(enable_nrt=False)
+        self._plain.__dict__.pop("nrt", None)  # the other one's counter, where it has been made
+        super().init()
+
+    def setup_function(self, fndesc: Any) -> None:
+        super().setup_function(fndesc)
+        self.builder = _Builder(self.entry_block)
+        self.call_helper = self.call_conv.init_call_helper(self.builder)
+
+    def _find_singly_assigned_variable(self) -> None:
+        """Those that need no place in memory; ones that are counted keep it, because they may be let go of twice."""
+        super()._find_singly_assigned_variable()
+        once = set() if self._lasting else assigned_once(self.blocks)
+        self._held = {name for name in once if self._is_counted(name)} - self._singly_assigned_vars
+        self._singly_assigned_vars |= once - self._held
+        self._values: dict[str, Any] = {}
+
+    def _is_counted(self, name: str) -> bool:
+        return name not in self._borrowed and self.context.data_model_manager[self.typeof(name)].contains_nrt_meminfo()
+
+    def loadvar(self, name: str) -> Any:
+        held = self._values.get(name)
+        return super().loadvar(name) if held is None else held
+
+    def storevar(self, value: Any, name: str, argidx: int | None = None) -> None:
+        self._values.pop(name, None)  # what it held before, which is let go of, is read from memory
+        super().storevar(value, name, argidx)
+        if name in self._held:
+            self._values[name] = value
+
+    def delvar(self, name: str) -> None:
+        if self._is_counted(name):
+            super().delvar(name)
+
+    def lower_inst(self, inst: Any) -> None:
+        if not isinstance(inst, ir.Assign) or inst.target.name not in self._borrowed:
+            super().lower_inst(inst)
+            return
+        self.context = self._plain
+        try:
+            super().lower_inst(inst)
+        finally:
+            self.context = self._counting
+
+    def lower_expr(self, resty: Any, expr: Any) -> Any:
+        if self.context is self._plain and expr.op == "getattr":
+            kind = self.typeof(expr.value.name)
+            if isinstance(kind, types.StructRef):
+                return self._field(kind, self.loadvar(expr.value.name), expr.attr, resty)
+        if self.context is self._plain and expr.op == "call":
+            return self._reshaped(resty, expr)
+        return super().lower_expr(resty, expr)
+
+    def _field(self, kind: Any, given: Any, name: str, wanted: Any) -> Any:
+        """A field of a structure that lives as long as the call, not counted."""
+        fields = _Structure(self._counting, self.builder, kind).get_data_struct(given)
+        return self.context.cast(self.builder, getattr(fields, name), kind.field_dict[name], wanted)
+
+    def _reshaped(self, kind: Any, call: Any) -> Any:
+        """An array in C order, in another shape, of which no length is -1; the numbers must be as many."""
+        build = self.builder
+        given = self.loadvar(call.func.name)
+        shape = [size for each in call.args for size in self._index(each.name, _lengths(self.typeof(each.name)))]
+        count = llvm_ir.Constant(cgutils.intp_t, 1)
+        strides: list[Any] = []
+        for length in reversed(shape):
+            strides.insert(0, build.mul(count, build.extract_value(given, _SIZE)))
+            count = build.mul(count, length)
+        other = build.icmp_signed("!=", count, build.extract_value(given, _COUNT))
+        with build.if_then(other, likely=False):
+            self.call_conv.return_user_exc(build, ValueError, ("total size of new array must be unchanged",))
+        made = self.context.get_constant_undef(kind)
+        for k in (_HOLDER, _PARENT, _COUNT, _SIZE, _DATA):
+            made = build.insert_value(made, build.extract_value(given, k), k)
+        for k, pair in enumerate(zip(shape, strides, strict=True)):
+            for place, value in zip((_SHAPE, _STRIDES), pair, strict=True):
+                made = build.insert_value(made, value, [place, k])
+        return made
+
+    def lower_getitem(self, resty: Any, expr: Any, value: Any, index: Any, signature: Any) -> Any:
+        array, wanted = signature.args
+        kinds = self._numbers(value.name, array, wanted)
+        if not kinds:
+            return super().lower_getitem(resty, expr, value, index, signature)
+        given = self.loadvar(value.name)
+        address = self._address(array, given, kinds, self._index(index.name, wanted))
+        if len(kinds) == array.ndim:
+            found = load_item(self.context, self.builder, array, address)
+        else:
+            found = self._view(signature.return_type, given, address)
+            found = impl_ret_borrowed(self.context, self.builder, signature.return_type, found)
+        return self.context.cast(self.builder, found, signature.return_type, resty)
+
+    def lower_setitem(self, target_var: Any, index_var: Any, value_var: Any, signature: Any) -> Any:
+        array, wanted, kind = signature.args
+        kinds = self._numbers(target_var.name, array, wanted)
+        if not kinds or len(kinds) < array.ndim:
+            return super().lower_setitem(target_var, index_var, value_var, signature)
+        given = self.loadvar(target_var.name)
+        value = self.context.cast(self.builder, self.loadvar(value_var.name), self.typeof(value_var.name), kind)
+        address = self._address(array, given, kinds, self._index(index_var.name, wanted))
+        store_item(
+            self.context, self.builder, array, self.context.cast(self.builder, value, kind, array.dtype), address
+        )
+
+    def _numbers(self, name: str, array: Any, wanted: Any) -> tuple[Any, ...]:
+        """The types of the numbers that index an array; none where something else does, or it is not in C order.
+
+        Nor where the variable may also hold None: then it is more than the array.
+        """
+        if not isinstance(array, types.Array) or array.layout != "C" or self.context.enable_boundscheck:
+            return ()
+        if isinstance(self.typeof(name), types.Optional):
+            return ()
+        kinds = _kinds(wanted)
+        fits = len(kinds) <= array.ndim and all(isinstance(kind, types.Integer) for kind in kinds)
+        return kinds if fits else ()
+
+    def _index(self, name: str, wanted: Any) -> list[Any]:
+        """The numbers of an index."""
+        value = self.context.cast(self.builder, self.loadvar(name), self.typeof(name), wanted)
+        if not isinstance(wanted, types.BaseTuple):
+            return [value]
+        return [self.builder.extract_value(value, k) for k in range(len(wanted))]
+
+    def _address(self, array: Any, given: Any, kinds: Any, index: Any) -> Any:
+        """Where the item is, or the first one of the view; the arithmetic is Numba's own."""
+        build = self.builder
+        shape = [build.extract_value(given, [_SHAPE, k]) for k in range(array.ndim)]
+        places = [fix_integer_index(self.context, build, *each) for each in zip(kinds, index, shape, strict=False)]
+        data = build.extract_value(given, _DATA)
+        return cgutils.get_item_pointer2(self.context, build, data, shape, (), "C", places)
+
+    def _view(self, kind: Any, given: Any, address: Any) -> Any:
+        """The array of the last dimensions of another."""
+        build = self.builder
+        first = len(given.type.elements[_SHAPE]) - kind.ndim
+        shape = [build.extract_value(given, [_SHAPE, first + k]) for k in range(kind.ndim)]
+        count = llvm_ir.Constant(cgutils.intp_t, 1)
+        for length in shape:
+            count = build.mul(count, length, flags=["nsw"])
+        made = build.insert_value(self.context.get_constant_undef(kind), address, _DATA)
+        made = build.insert_value(made, count, _COUNT)
+        for k in (_HOLDER, _PARENT, _SIZE):
+            made = build.insert_value(made, build.extract_value(given, k), k)
+        for k, length in enumerate(shape):
+            made = build.insert_value(made, length, [_SHAPE, k])
+            made = build.insert_value(made, build.extract_value(given, [_STRIDES, first + k]), [_STRIDES, k])
+        return made
+
+
+def _lengths(given: Any) -> Any:
+    """The type of a shape, or of one of its lengths, as lengths are kept."""
+    return types.UniTuple(types.intp, len(given)) if isinstance(given, types.BaseTuple) else types.intp
+
+
+def _kinds(index: Any) -> tuple[Any, ...]:
+    """The types of the parts of an index."""
+    return tuple(index.types) if isinstance(index, types.BaseTuple) else (index,)  # type: ignore[attr-defined]
+
+
+class _Builder(llvm_ir.IRBuilder):  # type: ignore[misc]  # llvmlite is not typed
+    """A writer of instructions that takes a part of a value from where it was put in, or was last taken."""
+
+    def __init__(self, block: Any) -> None:
+        super().__init__(block)
+        self._taken: dict[Any, Any] = {}
+
+    def extract_value(self, agg: Any, idx: Any, name: str = "") -> Any:
+        places = list(idx) if isinstance(idx, (tuple, list)) else [idx]
+        while places:
+            put = _put_in(agg, places)
+            if put is None:
+                break
+            agg, places = put.operands[1], places[len(put.indices) :]
+        if not places:
+            return agg
+        key = id(self.block), id(agg), tuple(places)  # the instruction below keeps both alive
+        if key not in self._taken:
+            self._taken[key] = super().extract_value(agg, places, name)
+        return self._taken[key]
+
+
+def _put_in(value: Any, places: list[int]) -> Any:
+    """The instruction that put in the part of a value at these places, whole or as part of more; else nothing."""
+    while isinstance(value, InsertValue):
+        at = list(value.indices)
+        if at == places[: len(at)]:
+            return value
+        if at[: len(places)] == places:
+            return None  # it is put together from parts
+        value = value.operands[0]
+    return None
+
+
+def assigned_once(blocks: Any) -> set[str]:
+    """Names of variables with one assignment, which every use comes after on all ways."""
+    made: dict[str, list[int]] = {}
+    for k, block in blocks.items():
+        for inst in block.find_insts(ir.Assign):
+            made.setdefault(inst.target.name, []).append(k)
+    once = {name: places[0] for name, places in made.items() if len(places) == 1}
+    before = analysis.compute_cfg_from_blocks(blocks).dominators()
+    others = set(analysis.must_use_alloca(blocks))
+    for k, block in blocks.items():
+        here = set()  # assigned in this block so far
+        for inst in block.body:
+            used = [] if isinstance(inst, ir.Del) else [each.name for each in inst.list_vars()]
+            if isinstance(inst, ir.Assign):
+                used.remove(inst.target.name)
+            for name in used:
+                start = once.get(name)
+                # blocks are written by rising number
+                if start is not None and not (name in here if start == k else start in before[k] and start < k):
+                    others.add(name)
+            if isinstance(inst, ir.Assign):
+                here.add(inst.target.name)
+    return once.keys() - others
+
+
+def borrowed(blocks: Any, typemap: Any) -> set[str]:
+    """Names of variables that only ever hold what the function was given, parts of it, and views of its arrays."""
+    made: dict[str, list[Any]] = {}
+    for block in blocks.values():
+        for inst in block.find_insts(ir.Assign):
+            made.setdefault(inst.target.name, []).append(inst.value)
+    names = set(made)
+    while True:
+        others = {name for name in names if not all(_borrows(value, names, typemap) for value in made[name])}
+        if not others:
+            return names
+        names -= others
+
+
+def _reshapes(kind: Any) -> bool:
+    """Whether a type is that of the method `reshape` of an array."""
+    return isinstance(kind, types.BoundFunction) and bool(kind.typing_key == "array.reshape")
+
+
+def _borrows(value: Any, names: set[str], typemap: Any) -> bool:
+    if isinstance(value, (ir.Arg, ir.Const, ir.Global, ir.FreeVar)):
+        return True
+    if isinstance(value, ir.Var):
+        return value.name in names
+    if not isinstance(value, ir.Expr):
+        return False
+    if value.op == "build_tuple":
+        return all(item.name in names for item in value.items)
+    if value.op == "call":
+        return value.func.name in names and _reshapes(typemap[value.func.name])
+    if value.op not in ("getattr", "getitem", "static_getitem", "exhaust_iter") or value.value.name not in names:
+        return False
+    whole = typemap[value.value.name]
+    if isinstance(whole, types.StructRef):
+        return bool(value.op == "getattr")
+    if isinstance(whole, types.BaseTuple):
+        return True
+    if value.op == "getattr":
+        return isinstance(whole, types.Array) and whole.layout == "C" and bool(value.attr == "reshape")
+    index = {"getitem": "index", "static_getitem": "index_var"}.get(value.op)
+    if index is None or not isinstance(whole, types.Array) or getattr(value, index) is None:
+        return False
+    return all(
+        isinstance(each, (types.Integer, types.SliceType)) for each in _kinds(typemap[getattr(value, index).name])
+    )
+
+
+# Passes over a function
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(BaseNativeLowering):
+    """By our `Lower`."""
+
+    _name = "mdstopo_lowering"  # type: ignore[assignment]
+    lowering_class = Lower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Rewrites(NopythonRewrites):
+    """Only where there is something to rewrite: arithmetic with whole arrays."""
+
+    _name = "mdstopo_rewrites"
+
+    def run_pass(self, state: Any) -> bool:
+        return any(_is_array_arithmetic(inst, state.typemap) for inst in _assignments(state)) and super().run_pass(
+            state
+        )
+
+
+def _assignments(state: Any) -> Iterator[Any]:
+    for block in state.func_ir.blocks.values():
+        yield from block.find_insts(ir.Assign)
+
+
+def _is_array_arithmetic(inst: Any, typemap: Any) -> bool:
+    made = inst.value
+    if not isinstance(made, ir.Expr) or not isinstance(typemap[inst.target.name], types.Array):
+        return False
+    if made.op == "call":
+        return isinstance(getattr(typemap[made.func.name], "typing_key", None), np.ufunc)
+    return made.op in ("binop", "inplace_binop", "unary")
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Closures(InlineClosureLikes):
+    """Only where a function holds another."""
+
+    _name = "mdstopo_closures"
+
+    def run_pass(self, state: Any) -> bool:
+        held = state.func_id.code.co_consts
+        return any(isinstance(each, CodeType) for each in held) and super().run_pass(state)
+
+
+@register_pass(mutates_CFG=False, analysis_only=True)
+class _Unannotated(AnnotateTypes):
+    """No listing of types beside the source."""
+
+    _name = "mdstopo_unannotated"
+
+    def run_pass(self, state: Any) -> bool:
+        state.type_annotation = ""
+        return False
+
+
+#: ours, by the pass of Numba's that it takes the place of; none where they do not fit
+_LEANER: dict[Any, Any] = {
+    NativeLowering: _Lowering,
+    NopythonRewrites: _Rewrites,
+    InlineClosureLikes: _Closures,
+    AnnotateTypes: _Unannotated,
+}
+if not _LEAN:
+    _LEANER = {}
+
+# Libraries
+# What is kept of a function while an entry is compiled: its intermediate code, nothing else.
+#
+# Numba makes machine code of every function, and optimises each with all that it calls. Here only entries are called
+# from outside, and an entry holds a copy of all that it calls. So a function inside gets no machine code, and one at
+# body level (`jit.kernel`) is optimised in its entry only: a quarter of the compile time is saved. A loop over members
+# is optimised by itself too, so that its vectors do not depend on who calls it. Loops of entries are not unrolled.
+
+
+class Optimised(JITCodeLibrary):
+    """Intermediate code of a function with all that it calls, optimised."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._verify_declare_only_symbols()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:
+        """Who is told which Python objects the function holds: nobody, as nothing runs here."""
+        return self
+
+    def set_env(self, name: str, held: Any) -> None:
+        """Tell nobody."""
+
+    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
+        """What the disk keeps; of these libraries that is no machine code."""
+        kept: tuple[str, str, bytes] = self.serialize_using_bitcode()
+        return kept
+
+
+class Left(Optimised):
+    """The same, left to be optimised where it is called."""
+
+    def _optimize_final_module(self) -> None:
+        pass
+
+
+class Rolled(Optimised):
+    """An entry by Numba's passes, but that its loops are not unrolled.
+
+    Most of it runs once a call, over few bodies, and copies of loops are only more to read. Loops over members at body
+    level (strengths, gathering) are left as they are, too; member kernels have been optimised before.
+    """
+
+    def _optimize_final_module(self) -> None:
+        if not _LEAN:
+            super()._optimize_final_module()
+            return
+        target: Any = self._codegen
+        first, builder = target._module_pass_manager(
+            loop_vectorize=target._loopvect, slp_vectorize=False, opt=target._opt_level, cost="cheap"
+        )
+        first.run(self._final_module, builder)
+        config: Any = numba.config
+        options = llvm.create_pipeline_tuning_options(int(config.OPT))
+        options.loop_vectorization = bool(config.LOOP_VECTORIZE)
+        options.slp_vectorization = False
+        options.loop_interleaving = options.loop_unrolling = False
+        builder = llvm.create_pass_builder(target._tm, options)
+        full = builder.getModulePassManager()
+        full.add_refprune_pass()
+        full.run(self._final_module, builder)
+
+
+def _compiler(library: type[Optimised]) -> type[Compiler]:
+    class Lean(Compiler):
+        def __init__(self, typingctx: Any, targetctx: Any, given: Any, *rest: Any) -> None:
+            super().__init__(typingctx, targetctx, given, *rest)
+            self.state.library = library(targetctx.codegen(), library.__name__)
+
+        def define_pipelines(self) -> Any:
+            found = super().define_pipelines()
+            for manager in found:
+                manager.passes = [(_LEANER.get(each, each), told) for each, told in manager.passes]
+                manager.finalize()
+            return found
+
+    return Lean
+
+
+_OPTIMISED, _LEFT, _ROLLED = map(_compiler, (Optimised, Left, Rolled))
+
+
+def inner(function: Callable[..., Any], fastmath: frozenset[str], part: bool) -> Any:
+    """Numba's object for a function that other compiled functions call."""
+    found = _made(function, _OPTIMISED if fastmath else _LEFT, fastmath, part)
+    found._cache = Cache(function)
+    return found
+
+
+def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
+    """Numba's object for an entry, for `build`; its machine code is kept by `store`."""
+    return _made(function, _OPTIMISED if fastmath else _ROLLED, fastmath, False)
+
+
+def _made(function: Callable[..., Any], pipeline: type[Compiler], fastmath: frozenset[str], part: bool) -> Any:
+    # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
+    options: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "pipeline_class": pipeline}
+    options |= {"error_model": "numpy", "fastmath": set(fastmath) or False, "forceinline": part}
+    return numba.njit(**options)(function)
+
+
+class _Reader:
+    """Numba's target, reading libraries of this kind."""
+
+    def __init__(self, target: Any) -> None:
+        self._target = target
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._target, name)
+
+    def codegen(self) -> "_Reader":
+        return self
+
+    def unserialize_library(self, kept: tuple[str, str, bytes]) -> Optimised:
+        library = Optimised(self._target.codegen(), kept[0])
+        library._final_module = llvm.parse_bitcode(kept[2])
+        library._finalize_final_module()
+        return library
+
+
+@functools.cache
+def _source(path: str) -> bytes:
+    return hashlib.sha256(Path(path).read_bytes()).digest()
+
+
+class Cache(_Cache):
+    """Functions inside entries on the disk, for other processes that compile entries which call them.
+
+    In the place of Numba's own, which ends the program where a file is damaged or the disk full: one file for a
+    function, with a checksum; whatever is wrong with it means that the function is compiled once more.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self._py_func = function
+        code = function.__code__
+        names = f"{code.co_filename} {function.__qualname__} {code.co_firstlineno}"
+        self._path = cache_folder() / f"inside-{hashlib.sha256(names.encode()).hexdigest()[:24]}.kept"
+
+    @property
+    def cache_path(self) -> str:
+        """Where it is kept."""
+        return str(self._path.parent)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The function compiled for these types; nothing where it has not been kept."""
+        target_context.refresh()
+        try:
+            kept = self._read().get(self._key(sig, target_context.codegen()))
+            if kept is None:
+                return None
+            return CompileResult._rebuild(_Reader(target_context), *pickle.loads(kept))
+        except Exception:
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep it where that is possible."""
+        if any(not each.can_cache for each in data.lifted) or data.library.has_dynamic_globals:
+            return
+        try:
+            whole = self._read()
+            whole[self._key(sig, data.codegen)] = dumps(data._reduce())
+            write_checked(self._path, dumps(whole))
+        except Exception:
+            return
+
+    def _read(self) -> dict[Any, bytes]:
+        """All that is kept of the function, by its key."""
+        data = read_checked(self._path)
+        found = {} if data is None else pickle.loads(data)
+        return found if isinstance(found, dict) else {}
+
+    def _key(self: Any, sig: Any, codegen: Any) -> Any:
+        """Types, processor, the function's bytecode and closure, and the file that it stands in."""
+        key = FunctionCache._index_key(self, sig, codegen)
+        return (*key, _source(inspect.getfile(self._py_func)))
+
+    def enable(self) -> None:
+        """It always is."""
+
+    def disable(self) -> None:
+        """Not needed."""
+
+    def flush(self) -> None:
+        """Forget it."""
+        self._path.unlink(missing_ok=True)
+
+
+# Kernels chosen by types
+
+
+def offer(stub: Callable[..., Any], choose: Callable[..., Any]) -> None:
+    """Have Numba call, for `stub`, the kernel that `choose` returns for the types; none is an error of types.
+
+    Numba's own `overload` would compile the kernel once more, and all of it to machine code.
+    """
+    compiled: dict[Any, Any] = {}
+
+    class Chosen(AbstractTemplate):
+        key = stub
+
+        def generic(self, asked: Any, named: Any) -> Any:
+            kernel = choose(*asked, **named)
+            if kernel is None:
+                return None
+            kind = types.Dispatcher(kernel.dispatcher)
+            found = kind.get_call_type(self.context, asked, named)
+            if found is not None:
+                compiled[found.args] = kind.get_impl_key(found)
+            return found
+
+        def get_impl_key(self, found: Any) -> Any:
+            return compiled[found.args]
+
+    infer_global(stub)(Chosen)
+
+
+# Threads
+
+_WORD, _SMALL, _MEMORY = llvm_ir.IntType(64), llvm_ir.IntType(32), llvm_ir.IntType(8).as_pointer()
+_BODY = llvm_ir.FunctionType(_MEMORY, [_MEMORY])
+#: the system's threads: `pthread_create(name, attributes, body, argument)`, `pthread_join(name, result)`
+_CREATE = llvm_ir.FunctionType(_SMALL, [_WORD.as_pointer(), _MEMORY, _BODY.as_pointer(), _MEMORY])
+_JOIN = llvm_ir.FunctionType(_SMALL, [_WORD, _MEMORY.as_pointer()])
+
+
+def enter_threads(shared: Callable[..., Any] = threads.shared, taken: Callable[..., Any] = threads.taken) -> None:
+    """Tell Numba what `threads.shared` and `threads.taken` do, or functions in their place."""
+
+    class TakenTyped(AbstractTemplate):
+        key = taken
+
+        def generic(self, asked: Any, _named: Any) -> Any:
+            return signature(types.int64, *asked)
+
+    class SharedTyped(AbstractTemplate):
+        key = shared
+
+        def generic(self, asked: Any, _named: Any) -> Any:
+            kernel, _, job = asked
+            kernel.get_call_type(self.context, tuple(job.types), {})  # compiles it
+            return signature(types.none, kernel, types.int64, job)
+
+    infer_global(taken)(TakenTyped)
+    infer_global(shared)(SharedTyped)
+    lower_builtin(taken, types.Array)(_taken)
+    lower_builtin(shared, types.Dispatcher, types.int64, types.BaseTuple)(_shared)
+
+
+def _taken(context: Any, build: Any, sig: Any, arguments: Any) -> Any:
+    place = context.make_array(sig.args[0])(context, build, arguments[0]).data
+    return build.atomic_rmw("add", place, llvm_ir.Constant(_WORD, 1), "monotonic")
+
+
+def _shared(context: Any, build: Any, sig: Any, arguments: Any) -> Any:
+    kernel, _, job = sig.args
+    compiled = kernel.dispatcher.overloads[tuple(job.types)]
+    context.active_code_library.add_linking_library(compiled.library)
+    called = signature(types.none, *job.types)
+    values = cgutils.unpack_tuple(build, arguments[2], len(job.types))
+    wrapped = llvm_ir.LiteralStructType([value.type for value in values])
+    held = cgutils.alloca_once(build, wrapped)
+    for k, value in enumerate(values):
+        build.store(value, cgutils.gep_inbounds(build, held, 0, k))
+    crew = None
+    if os.name == "posix":
+        body = _body(context, build.module, compiled.fndesc, called, wrapped)
+        crew = _Crew(build, arguments[1], body, build.bitcast(held, _MEMORY))
+    status, _ = context.call_internal_no_propagate(build, compiled.fndesc, called, values)
+    if crew is not None:
+        failed = crew.ended()
+        with cgutils.if_unlikely(build, build.icmp_unsigned("!=", failed, llvm_ir.Constant(_WORD, 0))):
+            context.call_conv.return_user_exc(build, RuntimeError, ("a thread of a pass over the members failed",))
+    with cgutils.if_unlikely(build, status.is_error):
+        context.call_conv.return_status_propagate(build, status)
+    return context.get_dummy_value()
+
+
+def _body(context: Any, module: Any, kernel: Any, called: Any, wrapped: Any) -> Any:
+    """What a thread runs: the kernel with the wrapped arguments; not null where it has failed."""
+    function = llvm_ir.Function(module, _BODY, module.get_unique_name("mdstopo_thread"))
+    function.linkage = "internal"
+    build = llvm_ir.IRBuilder(function.append_basic_block())
+    given = build.bitcast(function.args[0], wrapped.as_pointer())
+    values = [build.load(cgutils.gep_inbounds(build, given, 0, k)) for k in range(len(wrapped.elements))]
+    status, _ = context.call_internal_no_propagate(build, kernel, called, values)
+    build.ret(build.inttoptr(build.zext(status.is_error, _WORD), _MEMORY))
+    return function
+
+
+class _Crew:
+    """Threads beside this one: made at once, joined by `ended`."""
+
+    def __init__(self, build: Any, wanted: Any, body: Any, argument: Any) -> None:
+        self._build = build
+        most = llvm_ir.Constant(_WORD, threads.MOST)
+        fits = build.icmp_signed("<", wanted, most)
+        self._count = build.sub(build.select(fits, wanted, most), llvm_ir.Constant(_WORD, 1))
+        self._names = cgutils.alloca_once(build, _WORD, threads.MOST)
+        self._refused = cgutils.alloca_once(build, _SMALL, threads.MOST)
+        create = cgutils.get_or_insert_function(build.module, _CREATE, "pthread_create")
+        with cgutils.for_range(build, self._count) as loop:
+            name = build.gep(self._names, [loop.index])
+            refused = build.call(create, [name, _MEMORY(None), body, argument])
+            build.store(refused, build.gep(self._refused, [loop.index]))
+
+    def ended(self) -> Any:
+        """Wait for all; not zero where one has failed."""
+        build = self._build
+        failed = cgutils.alloca_once_value(build, llvm_ir.Constant(_WORD, 0))
+        result = cgutils.alloca_once(build, _MEMORY)
+        join = cgutils.get_or_insert_function(build.module, _JOIN, "pthread_join")
+        with cgutils.for_range(build, self._count) as loop:
+            refused = build.load(build.gep(self._refused, [loop.index]))
+            with build.if_then(build.icmp_unsigned("==", refused, llvm_ir.Constant(_SMALL, 0))):
+                build.call(join, [build.load(build.gep(self._names, [loop.index])), result])
+                code = build.ptrtoint(build.load(result), _WORD)
+                build.store(build.or_(build.load(failed), code), failed)
+        return build.load(failed)
+
+
+# What Numba is spared
+# It asks again and again what the sum of two floats is, trying dozens of candidates each time; and it makes machine
+# code of every little function of its own that a kernel calls, though a kernel holds a copy of what it calls.
+
+
+#: what `spare` has changed, as functions that change it back
+_UNSPARE: list[Callable[[], None]] = []
+
+
+def spare() -> None:
+    """Change Numba for the rest of this process, or until `unspare`."""
+    if not _UNSPARE:
+        _remember_signatures()
+        _leave_overloads()
+
+
+def unspare() -> None:
+    """Have Numba as it was."""
+    while _UNSPARE:
+        _UNSPARE.pop()()
+
+
+_LASTING = (types.Number, types.Boolean, types.Literal, types.Array, types.BaseTuple)
+
+
+def _remember_signatures() -> None:
+    """What operators give for numbers, arrays and tuples of them is looked for once."""
+    function: Any = types.Function
+    ask = function.get_call_type
+    known: dict[Any, Any] = {}
+
+    def get_call_type(self: Any, context: Any, asked: Any, named: Any) -> Any:
+        lasting = getattr(self.typing_key, "__module__", None) == "_operator"
+        if not lasting or named or not all(isinstance(each, _LASTING) for each in asked):
+            return ask(self, context, asked, named)
+        key = self, context, asked if isinstance(asked, tuple) else tuple(asked)
+        found = known.get(key)
+        if found is None:
+            found = known[key] = ask(self, context, asked, named)
+        return found
+
+    function.get_call_type = get_call_type
+    _UNSPARE.append(lambda: setattr(function, "get_call_type", ask))
+
+
+def _leave_overloads() -> None:
+    """Functions of Numba's own get no machine code where kernels call them."""
+    target = get_local_target(cpu_target.typing_context)
+    jit = jit_registry[target]
+
+    def left(*given: Any, **options: Any) -> Any:
+        return jit(*given, **{"no_cfunc_wrapper": True, "pipeline_class": _LEFT, **options})
+
+    dict.__setitem__(jit_registry, target, left)
+    _UNSPARE.append(lambda: dict.__setitem__(jit_registry, target, jit))
+
+
+# Run time
+# What compiled code expects of Numba's run time: memory that counts who holds it, and the shapes of views.
+#
+# Numba's own is reached by importing Numba. These few functions do the same on the memory of C, and are kept with the
+# code. An allocation begins with Numba's header (count, destructor, its information, data, size, allocator), of which
+# the code itself reads the count and the place of the data.
+
+#: what `add_runtime` defines
+PROVIDED = frozenset(
+    {
+        "NRT_Allocate",
+        "NRT_Free",
+        "NRT_MemInfo_alloc",
+        "NRT_MemInfo_alloc_aligned",
+        "NRT_MemInfo_alloc_dtor",
+        "NRT_MemInfo_call_dtor",
+        "NRT_MemInfo_new_varsize_dtor",
+        "NRT_MemInfo_varsize_realloc",
+        "numba_attempt_nocopy_reshape",
+    }
+)
+_HEADER = 48
+
+
+def add_runtime(module: Any) -> None:
+    """Define `PROVIDED` in a module of llvmlite.code."""
+    byte, word, small = llvm_ir.IntType(8), llvm_ir.IntType(64), llvm_ir.IntType(32)
+    memory = byte.as_pointer()
+    nothing = llvm_ir.VoidType()
+    malloc = llvm_ir.Function(module, llvm_ir.FunctionType(memory, [word]), "malloc")
+    realloc = llvm_ir.Function(module, llvm_ir.FunctionType(memory, [memory, word]), "realloc")
+    free = llvm_ir.Function(module, llvm_ir.FunctionType(nothing, [memory]), "free")
+    destructor = llvm_ir.FunctionType(nothing, [memory, word, memory]).as_pointer()
+
+    def define(name: str, result: Any, arguments: list[Any]) -> tuple[Any, Any]:
+        function = llvm_ir.Function(module, llvm_ir.FunctionType(result, arguments), name)
+        return function, llvm_ir.IRBuilder(function.append_basic_block())
+
+    def field(build: Any, header: Any, k: int, kind: Any) -> Any:
+        return build.bitcast(build.gep(header, [word(8 * k)]), kind.as_pointer())
+
+    def checked(build: Any, address: Any) -> Any:
+        """An address; null ends the function with null: there is no memory."""
+        with build.if_then(build.icmp_unsigned("==", address, memory(None))):
+            build.ret(memory(None))
+        return address
+
+    def enter(build: Any, header: Any, data: Any, size: Any, made_by: Any) -> None:
+        values = word(1), made_by, memory(None), data, size, memory(None)
+        for k, value in enumerate(values):
+            build.store(value, field(build, header, k, value.type))
+
+    def allocate(build: Any, size: Any, align: Any, made_by: Any) -> None:
+        """Header and data in one piece, the data at a multiple of `align`."""
+        header = checked(build, build.call(malloc, [build.add(size, build.add(align, word(_HEADER)))]))
+        least = build.add(build.ptrtoint(header, word), word(_HEADER))
+        data = build.and_(build.add(least, build.sub(align, word(1))), build.neg(align))
+        enter(build, header, build.inttoptr(data, memory), size, made_by)
+        build.ret(header)
+
+    function, build = define("NRT_Allocate", memory, [word])
+    build.ret(build.call(malloc, [function.args[0]]))
+
+    function, build = define("NRT_Free", nothing, [memory])
+    build.call(free, [function.args[0]])
+    build.ret_void()
+
+    function, build = define("NRT_MemInfo_alloc", memory, [word])
+    allocate(build, function.args[0], word(16), destructor(None))
+
+    function, build = define("NRT_MemInfo_alloc_aligned", memory, [word, small])
+    allocate(build, function.args[0], build.zext(function.args[1], word), destructor(None))
+
+    function, build = define("NRT_MemInfo_alloc_dtor", memory, [word, destructor])
+    allocate(build, function.args[0], word(16), function.args[1])
+
+    # a list: its data apart from the header, where it can grow
+    loose, build = define("mdstopo_free_list", nothing, [memory, word, memory])
+    of_items = llvm_ir.FunctionType(nothing, [memory]).as_pointer()
+    with build.if_then(build.icmp_unsigned("!=", loose.args[2], memory(None))):
+        build.call(build.bitcast(loose.args[2], of_items), [loose.args[0]])
+    build.call(free, [loose.args[0]])
+    build.ret_void()
+
+    function, build = define("NRT_MemInfo_new_varsize_dtor", memory, [word, memory])
+    data = checked(build, build.call(malloc, [function.args[0]]))
+    header = checked(build, build.call(malloc, [word(_HEADER)]))
+    enter(build, header, data, function.args[0], loose)
+    build.store(function.args[1], field(build, header, 2, memory))
+    build.ret(header)
+
+    function, build = define("NRT_MemInfo_varsize_realloc", memory, [memory, word])
+    header, size = function.args
+    data = checked(build, build.call(realloc, [build.load(field(build, header, 3, memory)), size]))
+    build.store(data, field(build, header, 3, memory))
+    build.store(size, field(build, header, 4, word))
+    build.ret(data)
+
+    function, build = define("NRT_MemInfo_call_dtor", nothing, [memory])
+    header = function.args[0]
+    called = build.load(field(build, header, 1, destructor))
+    with build.if_then(build.icmp_unsigned("!=", called, destructor(None))):
+        parts = [(3, memory), (4, word), (2, memory)]
+        build.call(called, [build.load(field(build, header, k, kind)) for k, kind in parts])
+    build.call(free, [header])
+    build.ret_void()
+
+    _reshape(*define(
+        "numba_attempt_nocopy_reshape",
+        small,
+        [word, word.as_pointer(), word.as_pointer(), word, word.as_pointer(), word.as_pointer(), word, small],
+    ))  # fmt: skip
+
+
+def _reshape(function: Any, build: Any) -> None:
+    """Strides of a view in C order of another shape; 0 where the array does not lie in C order, or has another size."""
+    word, small = llvm_ir.IntType(64), llvm_ir.IntType(32)
+    n, shape, strides, n_new, shape_new, strides_new, item, fortran = function.args
+    with build.if_then(build.icmp_signed("!=", fortran, small(0))):
+        build.ret(small(0))
+
+    def from_last(count: Any, visit: Any) -> Any:
+        """Run through the dimensions from the last; `visit(k, stride)` sees each; the size in bytes comes out."""
+        place, stride = build.alloca(word), build.alloca(word)
+        build.store(count, place)
+        build.store(item, stride)
+        head, body, after = (build.append_basic_block() for _ in range(3))
+        build.branch(head)
+        build.position_at_end(head)
+        build.cbranch(build.icmp_signed(">", build.load(place), word(0)), body, after)
+        build.position_at_end(body)
+        k = build.sub(build.load(place), word(1))
+        build.store(k, place)
+        build.store(build.mul(build.load(stride), visit(k, build.load(stride))), stride)
+        build.branch(head)
+        build.position_at_end(after)
+        return build.load(stride)
+
+    def length(k: Any, stride: Any) -> Any:
+        return build.load(build.gep(shape, [k]))
+
+    def checked(k: Any, stride: Any) -> Any:
+        size = build.load(build.gep(shape, [k]))
+        other = build.icmp_signed("!=", build.load(build.gep(strides, [k])), stride)
+        with build.if_then(build.and_(other, build.icmp_signed("!=", size, word(1)))):
+            build.ret(small(0))
+        return size
+
+    def entered(k: Any, stride: Any) -> Any:
+        build.store(stride, build.gep(strides_new, [k]))
+        return build.load(build.gep(shape_new, [k]))
+
+    full = build.icmp_signed("!=", from_last(n, length), word(0))
+    with build.if_then(full):  # an array without elements lies in any order
+        from_last(n, checked)
+    same = build.icmp_signed("==", from_last(n, length), from_last(n_new, entered))
+    build.ret(build.zext(same, small))
+
+
+# An entry's machine code
+# An entry compiled by Numba, as machine code that needs neither Numba nor Python's interface.
+#
+# Numba's function takes each array as seven or more arguments. `_glue` writes the function that unfolds the block of
+# numbers which `compiler.call` fills into those, and what the code expects of Numba's run time (`runtime`).
+
+
+def build(dispatcher: Any, letters: str) -> Code | None:
+    """Machine code of a function for these types (`compiler.entry.types_of`).
+
+    Nothing where the code would need more of Numba's run time than is provided.
+    """
+    arguments = tuple(map(numba_type, letters.split()))
+    dispatcher.compile(arguments)
+    compiled = dispatcher.overloads[arguments]
+    result = _result(compiled.signature.return_type)
+    library = compiled.library
+    if result is None or _missing(library._final_module):
+        return None
+    context = dispatcher.targetctx
+    form = context.call_conv.get_function_type(compiled.signature.return_type, arguments)
+    module = llvm_ir.Module("mdstopo")
+    module.triple = library._final_module.triple
+    module.data_layout = library._final_module.data_layout
+    function = llvm_ir.Function(module, form, compiled.fndesc.llvm_func_name)
+    for name in (CALL, PREPARED):
+        _glue(module, function, letters.split(), result, name)
+    add_runtime(module)
+    checked = llvm.parse_assembly(str(module))
+    checked.verify()
+    machine = library._codegen._tm
+    return Code(machine.emit_object(library._final_module), machine.emit_object(checked), result)
+
+
+def _result(kind: Any) -> str | None:
+    """What a function returns, in the letters of `compiler.store.Code`; nothing where there is no letter for it."""
+    letters = {types.boolean: "b", types.int64: "i", types.float64: "f"}
+    if kind is types.none:
+        return "()"
+    if isinstance(kind, types.BaseTuple):
+        parts = [letters.get(part) for part in kind.types]  # type: ignore[attr-defined]
+        return None if None in parts else f"({''.join(part for part in parts if part)})"
+    return letters.get(kind)
+
+
+def _missing(module: Any) -> list[str]:
+    """Functions that the code calls and that neither the process nor `runtime` has."""
+    process = ctypes.CDLL(None)
+    names = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
+    return [name for name in names if name not in PROVIDED and not hasattr(process, name)]
+
+
+def _glue(module: Any, function: Any, kinds: list[str], result: str, name: str) -> None:
+    """`int32 name(block)`: unfold the block, call the function, put what it returns and what it raises behind.
+
+    An array is in the block of `CALL` as the place of its object, in that of `PREPARED` as address and lengths: to ask
+    some forty objects for theirs takes a microsecond, which is much where a call is made again and again.
+
+    Numba unfolds an array into two pointers to its owner, the number of items, their size, the address, lengths and
+    strides.
+    """
+
+    word = llvm_ir.IntType(64)
+    call = llvm_ir.Function(module, llvm_ir.FunctionType(llvm_ir.IntType(32), [word.as_pointer()]), name)
+    build = llvm_ir.IRBuilder(call.append_basic_block())
+    block = call.args[0]
+    wanted = list(function.function_type.args)
+    following = iter(wanted[2:])
+    at = 0
+
+    def slot(place: int) -> Any:
+        return build.gep(block, [word(place)])
+
+    def given() -> Any:
+        nonlocal at
+        at += 1
+        return build.load(slot(at - 1))
+
+    def cast(value: Any) -> Any:
+        """A word as the next argument."""
+        kind = next(following)
+        if isinstance(kind, llvm_ir.PointerType):
+            return build.inttoptr(value, kind)
+        if isinstance(kind, llvm_ir.DoubleType):
+            return build.bitcast(value, kind)
+        return value if kind == word else build.trunc(value, kind)
+
+    held = build.alloca(wanted[0].pointee)
+    passed: list[Any] = []
+    for kind in kinds:
+        if kind[0] in "dq?":
+            dimensions = range(int(kind[1:]))
+            if name == CALL:
+                start = build.inttoptr(given(), word.as_pointer())
+                address, lengths_at = (build.load(build.gep(start, [word(k)])) for k in (NUMBERS, LENGTHS))
+                where = build.inttoptr(lengths_at, word.as_pointer())
+                lengths = [build.load(build.gep(where, [word(k)])) for k in dimensions]
+            else:
+                address, lengths = given(), [given() for _ in dimensions]
+            size = word(1 if kind[0] == "?" else 8)
+            items, strides = word(1), [size]
+            for length in lengths:
+                items = build.mul(items, length)
+            for length in reversed(lengths[1:]):
+                strides.insert(0, build.mul(strides[0], length))
+            unfolded = word(0), word(0), items, size, address, *lengths, *(strides if lengths else ())
+            passed += [cast(value) for value in unfolded]
+        else:
+            passed += [cast(given()) for _ in range(int(kind[1:]) if kind[0] == "t" else 1)]
+    letters = result.strip("()")
+    behind = at + len(letters)
+    build.store(word(0), slot(behind))
+    excuse = build.bitcast(slot(behind), wanted[1])
+    status = build.call(function, [held, excuse, *passed])
+    for k, letter in enumerate(letters):
+        place = [llvm_ir.IntType(32)(0), llvm_ir.IntType(32)(k)] if result.startswith("(") else []
+        value = build.load(build.gep(held, place) if place else held)
+        if letter == "f":
+            value = build.bitcast(value, word)
+        elif value.type != word:
+            value = build.zext(value, word)
+        build.store(value, slot(at + k))
+    _tell(build, [slot(behind + k) for k in range(EXCUSE)])
+    build.ret(status)
+
+
+def _tell(build: Any, slots: list[Any]) -> None:
+    """Put what was raised in place of where Numba's record of it is, unless nothing was.
+
+    The record: where the pickle is, its size (32 bits), its hash, how arguments known only then are made, and their
+    number (32 bits).
+    """
+    word = llvm_ir.IntType(64)
+    record = build.load(slots[0])
+    for each in slots[1:]:
+        build.store(word(0), each)
+    with build.if_then(build.icmp_unsigned("!=", record, word(0)), likely=False):
+        start = build.inttoptr(record, word.as_pointer())
+        for k, (place, bits) in zip(range(EXCUSE), ((0, -1), (1, 0xFFFF_FFFF), (4, 0xFFFF_FFFF)), strict=True):
+            build.store(build.and_(build.load(build.gep(start, [word(place)])), word(bits)), slots[k])
+
+
+# The check
+
+
+def check(alone: bool) -> None:
+    """Compile a function that uses what is private, and call it. Raises UnexpectedError where something is wrong.
+
+    Once for these sources and versions on this machine. alone: nobody else uses Numba in this process, which from here
+    on is spared work.
+    """
+    if _LEAN and alone:
+        spare()
+    passed = cache_folder() / "numba.checked"
+    if passed.exists():
+        return
+    try:
+        _check_header()
+        _check_code(_probe())
+    except BaseException:
+        unspare()
+        raise
+    write_checked(passed, b"")
+
+
+def _expect(clause: str, found: Any, expected: Any) -> None:
+    if found != expected:
+        raise UnexpectedError(f"{clause}: {found!r}, not {expected!r}")
+
+
+def _check_header() -> None:
+    """Whether an allocation of Numba's begins as one by `add_runtime` does."""
+    size = 40
+    address = _nrt_python.meminfo_alloc(size)
+    held = MemInfo(address)
+    words = (ctypes.c_int64 * (_HEADER // 8)).from_address(address)
+    found = words[0], words[3], words[4]
+    _expect("the header of an allocation holds count, data, size as", found, (1, held.data, size))
+
+
+def _probe_inner(x: Any, k: int) -> Any:
+    made = np.zeros((3, x.shape[0]))
+    for i in range(x.shape[0]):
+        made[1, i] = k * x[i]
+        made[-1, -i] = made[1][i] + 1.0
+    return made[1]
+
+
+def _probe_pass(counter: Any, done: Any) -> None:
+    k = _probe_taken(counter)
+    while k < done.size:
+        done[k] += k
+        k = _probe_taken(counter)
+
+
+def _probe_taken(counter: Any) -> int:
+    raise NotImplementedError
+
+
+def _probe_shared(kernel: Any, count: int, job: Any) -> None:
+    raise NotImplementedError
+
+
+def _probe_chosen(x: Any, k: int) -> Any:
+    raise NotImplementedError
+
+
+class _Chosen:
+    """What `offer` takes for a kernel."""
+
+    def __init__(self, dispatcher: Any) -> None:
+        self.dispatcher = dispatcher
+
+
+def _probe() -> Any:
+    """Numba's object for a function with all that our kernels have in them."""
+    chosen = _Chosen(_made(_probe_inner, _LEFT, frozenset(), False))
+    shared_pass = _made(_probe_pass, _OPTIMISED, frozenset({"nsz"}), False)
+    offer(_probe_chosen, lambda _x, _k: chosen)
+    enter_threads(_probe_shared, _probe_taken)
+
+    def probe(tag, x, table, yes, counter, done, how):  # type: ignore[no-untyped-def]
+        row = _probe_chosen(x, 2)
+        if how == 1:
+            raise ValueError("asked for")
+        _probe_shared(shared_pass, 2, (counter, done))
+        listed = [x[1:].copy()]
+        for _ in range(tag[1]):
+            listed.append(row.copy())  # noqa: PERF401  (one after another, so that it grows)
+        table.reshape(table.size)[1] = listed[-1].sum()
+        return table[0, -1], len(listed) + done.sum(), yes and row[0] < 1.0
+
+    return outer(probe, frozenset())
+
+
+def _check_code(dispatcher: Any) -> None:
+    """Whether that function's machine code does what is written."""
+    from mdstopo.compiler.call import Native
+
+    kinds = "t2 d1 d2 b q1 q1 i"
+    made = build(dispatcher, kinds)
+    if made is None:
+        raise UnexpectedError("machine code asks for functions that it did not ask for before")
+    native = Native("probe", made, kinds)
+    x, table, counter, done = np.arange(4.0), np.zeros((2, 2)), np.zeros(1, np.int64), np.zeros(9, np.int64)
+    given = (0, 50), x, table, True, counter, done
+    _expect("a compiled function returned", native(*given, 0), (12.0, 51 + 36, True))
+    _expect("and wrote", (done.tolist(), table.tolist()), (list(range(9)), [[0.0, 12.0], [0.0, 0.0]]))
+    _expect("called once more, it returned", native.prepare(*given, 0)(), (12.0, 51 + 36, True))
+    try:
+        native(*given, 1)
+    except ValueError as error:
+        _expect("it raised", str(error), "asked for")
+    else:
+        raise UnexpectedError("what a compiled function raises does not arrive")
