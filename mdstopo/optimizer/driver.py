@@ -26,7 +26,7 @@ from mdstopo.optimizer.interior import Optimum
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.optimizer.projection import project
-from mdstopo.optimizer.rows import NOTHING, FeasibleSet
+from mdstopo.optimizer.rows import NOTHING, DenseModel, FeasibleSet
 from mdstopo.optimizer.safeguards import (
     CUT_SHRINK,
     PRICE_CEILING,
@@ -53,6 +53,7 @@ from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import History, RowDetails, State, Step
 from mdstopo.optimizer.subproblem import solve
 from mdstopo.optimizer.wide import WIDE, Measures, ShiftRule, Space, is_wide, next_wide_shift, propose, ranges
+from mdstopo.optimizer.wide_rows import WideModel
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]
@@ -85,11 +86,16 @@ class Gsao:
         self.trusted = settings.flag("trust_region")
         #: whether rows compete from the start; else the separable model begins
         self.competes = bool(getattr(problem, "competes", False))
-        feasible = FeasibleSet(self.lower, self.upper, problem.linear, self.range)
-        few = len(self.lower) < WIDE and settings.flag("bundle")
-        self.bundle = BundleMethod(feasible, settings) if few else None
         self._rule = ShiftRule.of(settings)
         self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
+        self.bundle = self._bundle_method() if settings.flag("bundle") else None
+
+    def _bundle_method(self) -> BundleMethod | None:
+        """That of the problem's size; of very many variables only where rows compete from the start."""
+        feasible = FeasibleSet(self.lower, self.upper, self.problem.linear, self.range)
+        if len(self.lower) < WIDE:
+            return BundleMethod(DenseModel(feasible), self.settings)
+        return BundleMethod(WideModel(feasible, self._measures), self.settings) if self.competes else None
 
     def start(self, initial: Floats | None = None) -> State:
         """Evaluate the (projected) initial design and propose a first step."""

@@ -1,0 +1,329 @@
+"""The subproblem of very many variables and few rows that are lines, solved as exactly as one of few variables.
+
+    minimise   e_0 + sum_j price_j e_j + sum_i h_i d_i^2 / 2 - w' M^-1 w / 2
+    subject to f_k + Q_k d <= e_g,  e_j >= 0;   A d <= b or A d = b;   w = Z d;   d in the box
+
+An interior point over all variables goes through them some thirty times. But only the rows' multipliers couple the
+variables: with them known, each goes to an end of its box or to -r_i/h_i. So
+
+1. a sample of the variables, each standing for its neighbours, gives multipliers that are nearly right;
+2. one pass over all finds those that they leave in doubt, a few per cent; what the others add is summed up. Of those
+   that are surely inside their boxes, whose steps are linear in the multipliers, a matrix of the size of the rows is
+   kept, and stands for them as that many variables without bounds;
+3. where those in doubt are many, a sample of them narrows the doubt to few;
+4. these few and the matrix are a program of some thousand variables (`wide_interior`), whose multipliers are those of
+   the whole;
+5. one pass computes all steps from them. Who does not do what was assumed joins the few, and the last steps are
+   repeated.
+
+So what is found solves the whole program to the tolerance of the small one.
+"""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mdstopo.optimizer.problem import Bools, Floats, Ints, largest_of_groups
+from mdstopo.optimizer.wide_numbers import stride, threads_for
+from mdstopo.optimizer.wide_classes import DOUBT, H, LONGEST, SCALED, TRUST, finish, sort
+from mdstopo.optimizer.wide_interior import AWAY, CURVED, LIMIT, LINE, NOTHING, interior
+from mdstopo.optimizer.wide_passes import PIECE
+
+#: variables of a sample, and up to which all in doubt are solved for at once
+SAMPLE, FEW = 768, 3_000
+#: mean product and residual of a solution of the small program, in its own scale; what counts as one; and of a sample
+EXACT, ENOUGH, ROUGH = (1e-14, 1e-11), (1e-8, 1e-8), (1e-7, 1e-7)
+MAX_STEPS = 100.0
+#: the doubt that a sample of n leaves, times the root of n; how often those who were taken for decided are added, or
+#: all are sorted again where they are more than this share of all
+DOUBTFUL, ROUNDS, AGAIN = 2.5, 12, 0.1
+#: by what the doubt grows where the program of those in doubt has no solution
+WIDER = 4.0
+#: eigenvalues of the matrix of those inside their boxes that count, of the largest
+TINY = 1e-15
+#: M of a row of the curvature that is to weigh nothing
+WEIGHTLESS = 1e20
+
+
+class Region(NamedTuple):
+    """Where the step may end: x (N,), bounds and ranges (N,) or a few of them where all are alike, and `limits` of
+    `wide_classes` but the doubt."""
+
+    x: Floats
+    lower: Floats
+    upper: Floats
+    unit: Floats
+    limits: Floats
+
+    def box(self, places: Ints | slice) -> tuple[Floats, Floats, Floats]:
+        """The ends of the box, relative to x, and h of some variables."""
+        lower, upper, unit = (
+            each[places] if len(each) == len(self.x) else each[:1] for each in (self.lower, self.upper, self.unit)
+        )
+        at = self.x[places]
+        reach = np.minimum(self.limits[LONGEST], self.limits[TRUST] * unit)
+        low = np.minimum(np.maximum(lower, at - reach) - at, 0.0)
+        high = np.maximum(np.minimum(upper, at + reach) - at, 0.0)
+        own = self.limits[H] / (unit * unit if self.limits[SCALED] else 1.0)
+        return low, high, own + np.zeros(len(at))
+
+
+class Room(NamedTuple):
+    """Memory for one pass after another: classes (2, N), found (N,), counts (pieces,)."""
+
+    classes: Bools
+    found: Ints
+    counts: Ints
+
+    @classmethod
+    def of(cls, n: int) -> "Room":
+        """That of n variables."""
+        pieces = -(-n // PIECE)
+        return cls(np.zeros((2, n), dtype=np.bool_), np.zeros(n, dtype=np.int64), np.zeros(pieces, dtype=np.int64))
+
+    def listed(self) -> Ints:
+        """Those that the last pass has found, in order."""
+        counts = self.counts.tolist()
+        return np.concatenate([self.found[k * PIECE : k * PIECE + count] for k, count in enumerate(counts)])
+
+
+@dataclass(frozen=True, slots=True)
+class WideProgram:
+    """A program. pool (S, N): rows, of which `places` (R,) are lines, then linear rows, then rows Z of the curvature.
+
+    offset (R,): the value at d = 0 of a line, A x - b of a linear row, 0 of a row of the curvature; kind (R,) as
+    `wide_interior` has it, group (R,) of a line; price (J,); M (R, R), 0 but of rows of the curvature.
+    """
+
+    region: Region
+    pool: Floats
+    places: Ints
+    offset: Floats
+    kind: Ints
+    group: Ints
+    price: Floats
+    M: Floats
+
+    def columns(self, some: Ints | slice) -> Floats:
+        """The rows' entries (R, n) of some variables."""
+        return np.ascontiguousarray(
+            self.pool[self.places][:, some] if isinstance(some, slice) else self.pool[self.places[:, None], some]
+        )
+
+    def without_curvature(self) -> "WideProgram":
+        """The same with rows of the curvature that weigh next to nothing."""
+        return replace(self, M=np.diag(np.where(self.kind == CURVED, -WEIGHTLESS, 0.0)))
+
+
+class Few(NamedTuple):
+    """Some variables: which, their columns (R, n), ends and h (n,), how many variables each stands for."""
+
+    which: Ints
+    Q: Floats
+    low: Floats
+    high: Floats
+    h: Floats
+    weight: float
+
+
+class Found(NamedTuple):
+    """theta (R,); the steps (n,) of those in doubt; whether that is a solution."""
+
+    theta: Floats
+    d: Floats
+    solved: bool
+
+
+class WideSolution(NamedTuple):
+    """The trial (N,); multipliers (R,) of all rows; their changes Q d (R,); d'B d/2; those who were solved for in the
+    end; whether it is a solution."""
+
+    trial: Floats
+    theta: Floats
+    change: Floats
+    curved: float
+    few: Few
+    solved: bool
+
+
+def solve(program: WideProgram, room: Room) -> WideSolution:
+    """Solve a program; the same to the bit on any number of threads."""
+    region, n = program.region, len(program.region.x)
+    nothing = np.zeros(len(program.places))
+    sample = np.arange(0, n, stride(n, SAMPLE))
+    every = _some(program, sample, n / len(sample))
+    theta = _multipliers(program, every, nothing, np.zeros((len(nothing), 0)), nothing)
+    doubt = DOUBTFUL / np.sqrt(len(sample))
+    few, sums, inside = _doubtful(program, theta, doubt, room)
+    trial, change = np.empty(n), np.empty(len(theta))
+    for attempt in range(ROUNDS):
+        found = _solved(program, few, sums, inside, EXACT)
+        if not found.solved and attempt < ROUNDS - 1:
+            if len(few.which) == n:
+                break
+            # those in doubt cannot meet what the others leave: there have to be more
+            doubt *= WIDER
+            few, sums, inside = _doubtful(program, theta, doubt, room)
+            continue
+        trial[few.which] = _ends(region, few, found.d)
+        curved = finish(
+            program.pool, program.places, found.theta, *region[:4], region.limits, threads_for(n), room.classes, trial,
+            room.found, room.counts, change,
+        )  # fmt: skip
+        others = room.listed()
+        if not len(others) or attempt == ROUNDS - 1:
+            break
+        theta = found.theta
+        if len(others) > AGAIN * n:
+            few, sums, inside = _doubtful(program, theta, doubt, room)
+        else:
+            few, sums, inside = _joined(program, few, others, sums, inside, room)
+    w = change[program.kind == CURVED] @ found.theta[program.kind == CURVED]
+    return WideSolution(trial, found.theta, change, 0.5 * (curved + float(w)), few, found.solved and not len(others))
+
+
+def _some(program: WideProgram, which: Ints, weight: float = 1.0) -> Few:
+    return Few(which, program.columns(which), *program.region.box(which), weight)
+
+
+def _ends(region: Region, few: Few, d: Floats) -> Floats:
+    """Where the steps d (n,) of a few lead, ends of the box and bounds to the bit."""
+    lower, upper = (e[few.which] if len(e) == len(region.x) else e[:1] for e in (region.lower, region.upper))
+    return np.clip(region.x[few.which] + d, lower, upper)
+
+
+def _multipliers(program: WideProgram, few: Few, sums: Floats, inside: Floats, fallback: Floats) -> Floats:
+    """The multipliers (R,) of a program of a sample, beside what others add; the fallback where there are none."""
+    found = _solved(program, few, sums, inside, ROUGH)
+    if not found.solved and (program.kind == CURVED).any():  # a sample's curvature need not be positive
+        found = _solved(program.without_curvature(), few, sums, inside, ROUGH)
+    return found.theta if np.isfinite(found.theta).all() else fallback
+
+
+def _doubtful(program: WideProgram, theta: Floats, doubt: float, room: Room) -> tuple[Few, Floats, Floats]:
+    """Those that multipliers near theta (R,) leave in doubt, and what the others add: the sums (R,) of those at ends of
+    their boxes and the product (R, R) of those inside; `room.classes` say which they are."""
+    region = program.region
+    limits = region.limits.copy()
+    limits[DOUBT] = doubt
+    sums, inside = np.empty(len(theta)), np.empty((len(theta), len(theta)))
+    sort(
+        program.pool, program.places, theta, *region[:4], limits, threads_for(len(region.x)), room.classes,
+        room.found, room.counts, sums, inside,
+    )  # fmt: skip
+    few = _some(program, room.listed())
+    while len(few.which) > FEW:
+        n = len(few.which)
+        part = slice(None, None, stride(n, SAMPLE))
+        sample = Few(few.which[part], few.Q[:, part], *(each[part] for each in few[2:5]), n / len(few.which[part]))
+        theta = _multipliers(program, sample, sums, _factor(inside), theta)
+        doubt *= max(DOUBTFUL / np.sqrt(len(sample.which)), 2.0 * FEW / n)
+        few, sums, inside = _decided(few, theta, doubt, sums, inside, room)
+        if len(few.which) > 0.5 * n:
+            break
+    return few, sums, _factor(inside)
+
+
+def _decided(
+    few: Few, theta: Floats, doubt: float, sums: Floats, inside: Floats, room: Room
+) -> tuple[Few, Floats, Floats]:
+    """As `_doubtful`, of a few, beside what others add."""
+    r, size = theta @ few.Q, np.abs(theta) @ np.abs(few.Q)
+    least, most = r + few.h * few.low, r + few.h * few.high
+    low, high = least > doubt * size, most < -doubt * size
+    within = (least < -doubt * size) & (most > doubt * size)
+    rest = ~(low | high | within)
+    room.classes[0, few.which], room.classes[1, few.which] = within | rest, high | rest
+    sums = sums + few.Q[:, low] @ few.low[low] + few.Q[:, high] @ few.high[high]
+    inside = inside + (few.Q[:, within] / few.h[within]) @ few.Q[:, within].T
+    return Few(few.which[rest], np.ascontiguousarray(few.Q[:, rest]), *(e[rest] for e in few[2:5]), 1.0), sums, inside
+
+
+def _joined(
+    program: WideProgram, few: Few, others: Ints, sums: Floats, inside: Floats, room: Room
+) -> tuple[Few, Floats, Floats]:
+    """The few and others who were taken for decided, without what these were taken to add."""
+    more = _some(program, others)
+    within, beyond = room.classes[0, others], room.classes[1, others]
+    d = np.where(within, 0.0, np.where(beyond, more.high, more.low))
+    sums = sums - more.Q @ d
+    if within.any():
+        taken = (more.Q[:, within] / more.h[within]) @ more.Q[:, within].T
+        inside = _factor(inside @ inside.T - taken)
+    room.classes[:, others] = True
+    which = np.concatenate([few.which, others])
+    joined = Few(which, np.concatenate([few.Q, more.Q], axis=1),
+                 *(np.concatenate([one, other]) for one, other in zip(few[2:5], more[2:5], strict=True)), 1.0)  # fmt: skip
+    return joined, sums, inside
+
+
+def _factor(product: Floats) -> Floats:
+    """L (R, p) with L L' = product (R, R): the columns of as many variables without bounds, with h = 1."""
+    size = np.sqrt(np.maximum(np.diag(product), 0.0))
+    if not size.any() or not np.isfinite(size).all():
+        return np.zeros((len(size), 0))
+    unit = np.where(size > 0.0, size, 1.0)
+    values, vectors = np.linalg.eigh(product / unit[:, None] / unit)
+    used = values > TINY * values[-1]
+    return np.asarray(size[:, None] * vectors[:, used] * np.sqrt(values[used]))
+
+
+def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted: tuple[float, float]) -> Found:
+    """The small program: a few variables, those of `inside` (R, p) without bounds, and what others add."""
+    R, p, n = len(program.places), inside.shape[1], len(few.which)
+    line, group, kind = program.kind == LINE, program.group, program.kind
+    width = few.high - few.low
+    Q = np.empty((R, n + p))
+    np.multiply(few.Q, width * few.weight, out=Q[:, :n])
+    Q[:, n:] = inside
+    sizes = np.abs(Q)
+    steepest = sizes.max(axis=1, initial=0.0) / few.weight
+    of_group = largest_of_groups(steepest[line], group[line], len(program.price) + 1)
+    of_group = np.where(np.isfinite(of_group) & (of_group > 0.0), of_group, 1.0)
+    scale = np.where(line, of_group[group], np.where(steepest > 0.0, steepest, 1.0))
+    own = float(of_group[0])
+    Q /= scale[:, None]
+    at = np.zeros(n + p)
+    np.divide(-few.low, width, out=at[:n], where=width > 0.0)
+    # the objective's level is counted from the highest row
+    value, objective = program.offset + sums, line & (group == 0)
+    base = float(value[objective].max(initial=-np.inf)) if objective.any() else 0.0
+    f = (value - np.where(objective, base, 0.0)) / scale - Q @ at
+    frame = np.stack([at, np.full(n + p, 1.0 / own)])
+    frame[1, :n] = few.h * width**2 * few.weight / own
+    price = np.concatenate([[1.0 if objective.any() else 0.0], program.price * of_group[1:] / own])
+    v, bounds, rows, levels = _start(kind, group, Q, f, at, n, price)
+    size = np.maximum(1.0, sizes.sum(axis=1) / scale)
+    _, gap, worst = interior(
+        Q, f, kind, group, program.M * (own / (scale[:, None] * scale)), frame, n, price, size, v, bounds, rows, levels,
+        np.array([*wanted, MAX_STEPS]),
+    )  # fmt: skip
+    wl, wu, zl, zu = bounds[:, :n]
+    d = np.where(wl < wu, few.low + wl * width, few.high - wu * width)
+    d = np.where((zl > wl) & (wl < 1e-6), few.low, np.where((zu > wu) & (wu < 1e-6), few.high, d))
+    enough = np.maximum(wanted, ENOUGH)
+    return Found(rows[1] * own / scale, d, bool(gap <= enough[0] and worst <= enough[1] and np.isfinite(d).all()))
+
+
+def _start(
+    kind: Ints, group: Ints, Q: Floats, f: Floats, at: Floats, bounded: int, price: Floats
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """A point inside, as `wide_interior.interior` wants it: v, bounds, rows, levels."""
+    mu, line = 0.1, kind == LINE
+    v = at.copy()
+    v[:bounded] = np.clip(at[:bounded], 0.1, 0.9)
+    bounds = np.full((4, len(v)), mu)
+    bounds[0, :bounded], bounds[1, :bounded] = v[:bounded], 1.0 - v[:bounded]
+    bounds[:2, bounded:], bounds[2:, bounded:] = AWAY, NOTHING
+    row = Q @ v + f
+    e = largest_of_groups(row[line], group[line], len(price))
+    e = np.where(np.isfinite(e), e, 0.0)
+    e[1:] = np.maximum(e[1:], 0.0)
+    e += mu
+    counts = np.bincount(group[line], minlength=len(price))
+    top = np.concatenate([[1.0], np.minimum(0.5 * price[1:], 1.0)])
+    rows = np.zeros((2, len(f)))
+    rows[0] = np.where(line, e[group] - row, np.maximum(-row, mu))
+    rows[1] = np.where(line, (top / np.maximum(counts, 1))[group], np.where(kind == LIMIT, mu, 0.0))
+    return v, bounds, rows, np.stack([e, np.concatenate([[0.0], price[1:] - top[1:]])])
