@@ -52,7 +52,8 @@ from mdstopo.optimizer.safeguards import (
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import History, RowDetails, State, Step
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Measures, ShiftRule, Space, is_wide, next_wide_shift, propose, ranges
+from mdstopo.optimizer.wide import Measures, ShiftRule, Space, is_wide, next_wide_shift, propose, ranges
+from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.optimizer.wide_rows import WideModel
 from mdstopo.status import RunStatus
 

@@ -18,6 +18,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
+from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
 
@@ -70,7 +71,9 @@ class StructureProblem:
         )
         looked: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
         members = any(each.response.kind == "member_force" for each in looked)
-        few, many = Rows(*NEAR, cones=True), Rows(*ALL, cones=True)
+        # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
+        cones = len(self.initial) < WIDE
+        few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
         #: the peaks that an evaluation is asked for
         self.rows = (many if members else few) if self.competes else USUAL
         self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], self.space)
@@ -146,7 +149,7 @@ class StructureProblem:
         Every competing peak is a row (bound formulation); an equality makes two groups.
         """
         rows: list[float] = []
-        slopes: list[Floats] = []
+        slopes: list[tuple[Floats, float, float]] = []
         groups: list[int] = []
         shapes: list[tuple[Peak, float, float]] = []
         for i, row in self._responses:
@@ -161,8 +164,10 @@ class StructureProblem:
                     shapes.append((peak, 1.0 / scale if round_ else np.nan, row.bound / scale))
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
-                        slopes.append(sign * self._pull(peak.gradient) / scale)
-        matrix = np.array(slopes).reshape(len(slopes), len(self.initial))
+                        slopes.append((peak.gradient, sign, scale))
+        matrix = np.empty((len(slopes), len(self.initial)))
+        for slope, (gradient, sign, scale) in zip(matrix, slopes, strict=True):
+            np.divide(np.multiply(self._pull(gradient), sign, out=slope), scale, out=slope)
         return np.array(rows), matrix, np.array(groups, dtype=np.int64), Cones.of(shapes, self._pull)
 
 

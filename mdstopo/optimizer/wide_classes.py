@@ -2,7 +2,7 @@
 
 With multipliers theta (R,) of rows Q (R, N) the derivative by a variable's step d_i is r_i + h_i d_i, r = Q' theta: the
 step ends at the lower or the upper end of the box, or is -r_i / h_i. Multipliers that are not exact leave those in
-doubt whose derivative is near zero at an end, relative to sum_k |theta_k Q_ki|.
+doubt whose derivative is near zero at an end, relative to sum_k spread_k |Q_ki|.
 
 Rows are some of those of one matrix, `pool` (S, N). limits: the trust box, in ranges; the longest step; h, over the
 range's square if the next is not 0; the doubt, relative to that sum. Bounds and ranges whose numbers are all alike may
@@ -38,27 +38,29 @@ def _boxes(
 
 
 @member_kernel
-def _weighted(pool: Floats, rows: Ints, theta: Floats, start: int, stop: int, r: Floats, size: Floats) -> None:
-    """r = sum_k theta_k Q_k and the sum of the sizes of its terms."""
+def _weighted(
+    pool: Floats, rows: Ints, theta: Floats, spread: Floats, start: int, stop: int, r: Floats, size: Floats
+) -> None:  # fmt: skip
+    """r = sum_k theta_k Q_k, and the sum of spread_k |Q_k|."""
     for i in range(stop - start):
         r[i] = 0.0
         size[i] = 0.0
     for k in range(len(rows)):
-        weight = theta[k]
-        if weight != 0.0:
+        weight, wide = theta[k], spread[k]
+        if (weight != 0.0) | (wide != 0.0):
             row = pool[rows[k], start:stop]
             for i in range(len(row)):
-                term = weight * row[i]
-                r[i] += term
-                size[i] += abs(term)
+                r[i] += weight * row[i]
+                size[i] += wide * abs(row[i])
 
 
 @vector_entry
 def sort(
-    pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats,
-    threads: int, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
+    pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
+    limits: Floats, threads: int, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
-    """Say of all variables what they do; `classes` (2, N).
+    """Say of all variables what they do; `classes` (2, N). spread (R,): by how much multipliers are not known, times
+    1/doubt.
 
     found (N,): from each piece's place on those in doubt, counts (pieces,) how many. sums (R,): Q d over the variables
     at an end of their box; products (R, R): Q diag(1/h) Q' over those inside.
@@ -69,7 +71,8 @@ def sort(
     counter = np.zeros(1, np.int64)
     shared(
         _sorted, threads,
-        (counter, pool, rows, theta, x, lower, upper, unit, limits, classes, found, counts, every_sum, every_product),
+        (counter, pool, rows, theta, spread, x, lower, upper, unit, limits, classes, found, counts, every_sum,
+         every_product),
     )  # fmt: skip
     sums.fill(0.0)
     products.fill(0.0)
@@ -82,11 +85,12 @@ def sort(
 
 @kernel
 def _sorted(
-    counter: Ints, pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
-    limits: Floats, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
+    counter: Ints, pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats,
+    unit: Floats, limits: Floats, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
     N = len(x)
     low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    which, columns = np.empty(BLOCK, dtype=np.int64), np.empty((len(rows), BLOCK))
     piece = taken(counter)
     while piece < len(sums):
         place = piece * PIECE
@@ -97,7 +101,7 @@ def _sorted(
                 x[start:stop], part(lower, N, start, stop), part(upper, N, start, stop), part(unit, N, start, stop),
                 limits, low, high, h,
             )  # fmt: skip
-            _weighted(pool, rows, theta, start, stop, r, size)
+            _weighted(pool, rows, theta, spread, start, stop, r, size)
             inside = 0
             for i in range(n):
                 doubt = limits[DOUBT] * size[i]
@@ -120,15 +124,18 @@ def _sorted(
                     place += 1
                 classes[INSIDE, start + i] = within
                 classes[BEYOND, start + i] = beyond
-                inside += 1 if slack > 0.0 else 0
-                r[i], size[i] = step, slack
+                r[i] = step
+                if slack > 0.0:
+                    which[inside], size[inside] = i, slack
+                    inside += 1
             for a in range(len(rows)):
-                row = pool[rows[a], start:stop]
+                row, column = pool[rows[a], start:stop], columns[a, :inside]
                 sums[piece, a] += _dot(row, r[:n])
-                if inside > 0:
-                    for b in range(a + 1):
-                        products[piece, a, b] += _dot3(row, size[:n], pool[rows[b], start:stop])
-                        products[piece, b, a] = products[piece, a, b]
+                for k in range(inside):
+                    column[k] = row[which[k]]
+                for b in range(a + 1 if inside > 0 else 0):
+                    products[piece, a, b] += _dot3(column, size[:inside], columns[b, :inside])
+                    products[piece, b, a] = products[piece, a, b]
         counts[piece] = place - piece * PIECE
         piece = taken(counter)
 
@@ -165,6 +172,7 @@ def _finished(
 ) -> None:  # fmt: skip
     N, R = len(x), len(rows)
     low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    spread = np.abs(theta)
     piece = taken(counter)
     while piece < len(sums):
         place = piece * PIECE
@@ -174,7 +182,7 @@ def _finished(
             at, y = x[start:stop], trial[start:stop]
             first, last = part(lower, N, start, stop), part(upper, N, start, stop)
             _boxes(at, first, last, part(unit, N, start, stop), limits, low, high, h)
-            _weighted(pool, rows, theta, start, stop, r, size)
+            _weighted(pool, rows, theta, spread, start, stop, r, size)
             for i in range(n):
                 within, beyond = classes[INSIDE, start + i], classes[BEYOND, start + i]
                 if within and beyond:
@@ -183,8 +191,6 @@ def _finished(
                 least, most = r[i] + h[i] * low[i], r[i] + h[i] * high[i]
                 if low[i] == high[i]:
                     step = low[i]
-                elif size[i] == 0.0:
-                    step = 0.0
                 elif least >= 0.0:
                     step, other = low[i], within or beyond
                     found[place] = start + i
@@ -231,7 +237,7 @@ def _projected(
     while piece < len(most):
         for start in range(piece * PIECE, min((piece + 1) * PIECE, N), BLOCK):
             stop = min(start + BLOCK, (piece + 1) * PIECE, N)
-            _weighted(pool, rows, theta, start, stop, r, size)
+            _weighted(pool, rows, theta, theta, start, stop, r, size)
             first, last, at = part(lower, N, start, stop), part(upper, N, start, stop), x[start:stop]
             for i in range(stop - start):
                 moved = min(max(at[i] - r[i] * unit, first[i]), last[i])

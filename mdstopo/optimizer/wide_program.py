@@ -25,9 +25,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.optimizer.problem import Bools, Floats, Ints, largest_of_groups
-from mdstopo.optimizer.wide_numbers import stride, threads_for
-from mdstopo.optimizer.wide_classes import DOUBT, H, LONGEST, SCALED, TRUST, finish, sort
+from mdstopo.optimizer.wide_classes import DOUBT, LONGEST, SCALED, TRUST, H, finish, sort
+from mdstopo.optimizer.wide_curvature import compact
 from mdstopo.optimizer.wide_interior import AWAY, CURVED, LIMIT, LINE, NOTHING, interior
+from mdstopo.optimizer.wide_numbers import stride, threads_for
 from mdstopo.optimizer.wide_passes import PIECE
 
 #: variables of a sample, and up to which all in doubt are solved for at once
@@ -42,6 +43,10 @@ DOUBTFUL, ROUNDS, AGAIN = 2.5, 12, 0.1
 WIDER = 4.0
 #: eigenvalues of the matrix of those inside their boxes that count, of the largest
 TINY = 1e-15
+#: multipliers of lines below this, in mean products, are none
+NONE = 10.0
+#: how far below others a row is said to be at most, in what rows can change by; where variables have no bounds
+FAR, FARTHEST = 10.0, 1e3
 #: M of a row of the curvature that is to weigh nothing
 WEIGHTLESS = 1e20
 
@@ -93,7 +98,8 @@ class WideProgram:
     """A program. pool (S, N): rows, of which `places` (R,) are lines, then linear rows, then rows Z of the curvature.
 
     offset (R,): the value at d = 0 of a line, A x - b of a linear row, 0 of a row of the curvature; kind (R,) as
-    `wide_interior` has it, group (R,) of a line; price (J,); M (R, R), 0 but of rows of the curvature.
+    `wide_interior` has it, group (R,) of a line; price (J,); M (R, R), 0 but of rows of the curvature;
+    products (2 m, 2 m): of the latter, in ranges.
     """
 
     region: Region
@@ -104,12 +110,22 @@ class WideProgram:
     group: Ints
     price: Floats
     M: Floats
+    products: Floats
 
     def columns(self, some: Ints | slice) -> Floats:
         """The rows' entries (R, n) of some variables."""
         return np.ascontiguousarray(
             self.pool[self.places][:, some] if isinstance(some, slice) else self.pool[self.places[:, None], some]
         )
+
+    def with_products(self, products: Floats) -> "WideProgram":
+        """The same with the curvature that these products tell; that of a sample is positive only by its own."""
+        found = compact(products, len(products) // 2, float(self.region.limits[H]))
+        if found is None:
+            return self.without_curvature()
+        M, curved = np.zeros_like(self.M), self.kind == CURVED
+        M[np.ix_(curved, curved)] = found
+        return replace(self, M=M)
 
     def without_curvature(self) -> "WideProgram":
         """The same with rows of the curvature that weigh next to nothing."""
@@ -124,7 +140,30 @@ class Few(NamedTuple):
     low: Floats
     high: Floats
     h: Floats
-    weight: float
+    weight: float = 1.0
+
+    def some(self, part: slice | Bools, weight: float = 1.0) -> "Few":
+        """Some of them."""
+        Q = np.ascontiguousarray(self.Q[:, part])
+        return Few(self.which[part], Q, self.low[part], self.high[part], self.h[part], weight)
+
+    def joined(self, other: "Few") -> "Few":
+        """These and others."""
+        one, two = (np.stack([each.low, each.high, each.h]) for each in (self, other))
+        which, Q = np.concatenate([self.which, other.which]), np.concatenate([self.Q, other.Q], axis=1)
+        return Few(which, Q, *np.concatenate([one, two], axis=1))
+
+
+class Guess(NamedTuple):
+    """Multipliers theta (R,) that are nearly right; spread (R,), doubt: they are wrong by up to doubt times spread."""
+
+    theta: Floats
+    spread: Floats
+    doubt: float
+
+    def moved(self, theta: Floats, doubt: float) -> "Guess":
+        """That of other multipliers, where they are known to be no larger than the largest that were met."""
+        return Guess(theta, np.maximum(self.spread, np.abs(theta)), doubt)
 
 
 class Found(NamedTuple):
@@ -153,18 +192,16 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
     nothing = np.zeros(len(program.places))
     sample = np.arange(0, n, stride(n, SAMPLE))
     every = _some(program, sample, n / len(sample))
-    theta = _multipliers(program, every, nothing, np.zeros((len(nothing), 0)), nothing)
-    doubt = DOUBTFUL / np.sqrt(len(sample))
-    few, sums, inside = _doubtful(program, theta, doubt, room)
+    theta = _multipliers(program, every, None, nothing, np.zeros((len(nothing), 0)), nothing)
+    guess = Guess(theta, np.abs(theta), DOUBTFUL / np.sqrt(len(sample)))
+    few, sums, inside, guess = _doubtful(program, guess, room)
     trial, change = np.empty(n), np.empty(len(theta))
     for attempt in range(ROUNDS):
         found = _solved(program, few, sums, inside, EXACT)
-        if not found.solved and attempt < ROUNDS - 1:
-            if len(few.which) == n:
-                break
+        if not found.solved and attempt < ROUNDS - 1 and len(few.which) < n:
             # those in doubt cannot meet what the others leave: there have to be more
-            doubt *= WIDER
-            few, sums, inside = _doubtful(program, theta, doubt, room)
+            guess = guess._replace(doubt=WIDER * guess.doubt)
+            few, sums, inside, guess = _doubtful(program, guess, room)
             continue
         trial[few.which] = _ends(region, few, found.d)
         curved = finish(
@@ -172,11 +209,12 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
             room.found, room.counts, change,
         )  # fmt: skip
         others = room.listed()
-        if not len(others) or attempt == ROUNDS - 1:
+        if not len(others) or not found.solved:
             break
-        theta = found.theta
-        if len(others) > AGAIN * n:
-            few, sums, inside = _doubtful(program, theta, doubt, room)
+        if len(others) > AGAIN * n and attempt < ROUNDS // 2:
+            between = np.abs(found.theta - guess.theta) / guess.doubt
+            guess = guess.moved(found.theta, guess.doubt)
+            few, sums, inside, guess = _doubtful(program, guess._replace(spread=guess.spread + between), room)
         else:
             few, sums, inside = _joined(program, few, others, sums, inside, room)
     w = change[program.kind == CURVED] @ found.theta[program.kind == CURVED]
@@ -184,7 +222,8 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
 
 
 def _some(program: WideProgram, which: Ints, weight: float = 1.0) -> Few:
-    return Few(which, program.columns(which), *program.region.box(which), weight)
+    low, high, h = program.region.box(which)
+    return Few(which, program.columns(which), low, high, h, weight)
 
 
 def _ends(region: Region, few: Few, d: Floats) -> Floats:
@@ -193,51 +232,69 @@ def _ends(region: Region, few: Few, d: Floats) -> Floats:
     return np.clip(region.x[few.which] + d, lower, upper)
 
 
-def _multipliers(program: WideProgram, few: Few, sums: Floats, inside: Floats, fallback: Floats) -> Floats:
-    """The multipliers (R,) of a program of a sample, beside what others add; the fallback where there are none."""
-    found = _solved(program, few, sums, inside, ROUGH)
-    if not found.solved and (program.kind == CURVED).any():  # a sample's curvature need not be positive
-        found = _solved(program.without_curvature(), few, sums, inside, ROUGH)
+def _multipliers(
+    program: WideProgram, sample: Few, whole: Few | None, sums: Floats, inside: Floats, fallback: Floats
+) -> Floats:
+    """The multipliers (R,) of a program of a sample of some variables, or of all of them (None), beside what others
+    add; the fallback where there are none."""
+    nearly = program
+    if len(program.products):
+        products = _products(program, sample)
+        if whole is not None:
+            products += program.products - _products(program, whole)
+        nearly = program.with_products(products)
+    found = _solved(nearly, sample, sums, inside, ROUGH)
+    if not found.solved and len(program.products):
+        found = _solved(program.without_curvature(), sample, sums, inside, ROUGH)
     return found.theta if np.isfinite(found.theta).all() else fallback
 
 
-def _doubtful(program: WideProgram, theta: Floats, doubt: float, room: Room) -> tuple[Few, Floats, Floats]:
-    """Those that multipliers near theta (R,) leave in doubt, and what the others add: the sums (R,) of those at ends of
-    their boxes and the product (R, R) of those inside; `room.classes` say which they are."""
-    region = program.region
+def _products(program: WideProgram, few: Few) -> Floats:
+    """What some variables add to the products of the curvature's rows."""
+    unit = program.region.unit
+    wide = unit[few.which] if len(unit) == len(program.region.x) else unit[:1]
+    Z = few.Q[program.kind == CURVED]
+    return np.asarray(few.weight * (Z * wide**2) @ Z.T)
+
+
+def _doubtful(program: WideProgram, guess: Guess, room: Room) -> tuple[Few, Floats, Floats, Guess]:
+    """Those that multipliers leave in doubt, and what the others add: the sums (R,) of those at ends of their boxes, and
+    the columns (R, p) that stand for those inside; `room.classes` say which they are. And the guess, its doubt as it
+    was, with the largest multipliers that were met."""
+    region, first = program.region, guess
     limits = region.limits.copy()
-    limits[DOUBT] = doubt
-    sums, inside = np.empty(len(theta)), np.empty((len(theta), len(theta)))
+    limits[DOUBT] = guess.doubt
+    sums, inside = np.empty(len(guess.theta)), np.empty((len(guess.theta), len(guess.theta)))
     sort(
-        program.pool, program.places, theta, *region[:4], limits, threads_for(len(region.x)), room.classes,
-        room.found, room.counts, sums, inside,
+        program.pool, program.places, guess.theta, guess.spread, *region[:4], limits, threads_for(len(region.x)),
+        room.classes, room.found, room.counts, sums, inside,
     )  # fmt: skip
     few = _some(program, room.listed())
+    met = np.abs(guess.theta)
     while len(few.which) > FEW:
         n = len(few.which)
         part = slice(None, None, stride(n, SAMPLE))
-        sample = Few(few.which[part], few.Q[:, part], *(each[part] for each in few[2:5]), n / len(few.which[part]))
-        theta = _multipliers(program, sample, sums, _factor(inside), theta)
-        doubt *= max(DOUBTFUL / np.sqrt(len(sample.which)), 2.0 * FEW / n)
-        few, sums, inside = _decided(few, theta, doubt, sums, inside, room)
+        sample = few.some(part, n / len(few.which[part]))
+        theta = _multipliers(program, sample, few, sums, _factor(inside), guess.theta)
+        met = np.maximum(met, np.abs(theta))
+        guess = Guess(theta, met, guess.doubt * max(DOUBTFUL / np.sqrt(len(sample.which)), 2.0 * FEW / n))
+        few, sums, inside = _decided(few, guess, sums, inside, room)
         if len(few.which) > 0.5 * n:
             break
-    return few, sums, _factor(inside)
+    return few, sums, _factor(inside), guess.moved(guess.theta, first.doubt)
 
 
-def _decided(
-    few: Few, theta: Floats, doubt: float, sums: Floats, inside: Floats, room: Room
-) -> tuple[Few, Floats, Floats]:
+def _decided(few: Few, guess: Guess, sums: Floats, inside: Floats, room: Room) -> tuple[Few, Floats, Floats]:
     """As `_doubtful`, of a few, beside what others add."""
-    r, size = theta @ few.Q, np.abs(theta) @ np.abs(few.Q)
+    r, doubt = guess.theta @ few.Q, guess.doubt * (guess.spread @ np.abs(few.Q))
     least, most = r + few.h * few.low, r + few.h * few.high
-    low, high = least > doubt * size, most < -doubt * size
-    within = (least < -doubt * size) & (most > doubt * size)
+    low, high = least > doubt, most < -doubt
+    within = (least < -doubt) & (most > doubt)
     rest = ~(low | high | within)
     room.classes[0, few.which], room.classes[1, few.which] = within | rest, high | rest
     sums = sums + few.Q[:, low] @ few.low[low] + few.Q[:, high] @ few.high[high]
     inside = inside + (few.Q[:, within] / few.h[within]) @ few.Q[:, within].T
-    return Few(few.which[rest], np.ascontiguousarray(few.Q[:, rest]), *(e[rest] for e in few[2:5]), 1.0), sums, inside
+    return few.some(rest), sums, inside
 
 
 def _joined(
@@ -252,10 +309,7 @@ def _joined(
         taken = (more.Q[:, within] / more.h[within]) @ more.Q[:, within].T
         inside = _factor(inside @ inside.T - taken)
     room.classes[:, others] = True
-    which = np.concatenate([few.which, others])
-    joined = Few(which, np.concatenate([few.Q, more.Q], axis=1),
-                 *(np.concatenate([one, other]) for one, other in zip(few[2:5], more[2:5], strict=True)), 1.0)  # fmt: skip
-    return joined, sums, inside
+    return few.joined(more), sums, inside
 
 
 def _factor(product: Floats) -> Floats:
@@ -290,11 +344,13 @@ def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted
     value, objective = program.offset + sums, line & (group == 0)
     base = float(value[objective].max(initial=-np.inf)) if objective.any() else 0.0
     f = (value - np.where(objective, base, 0.0)) / scale - Q @ at
+    size = np.maximum(1.0, sizes.sum(axis=1) / scale)
+    # a row that cannot come up to others might else be farther off than what all products together are rounded to
+    f = np.where(line, np.maximum(f, -(FAR if p == 0 else FARTHEST) * float(size.max())), f)
     frame = np.stack([at, np.full(n + p, 1.0 / own)])
     frame[1, :n] = few.h * width**2 * few.weight / own
     price = np.concatenate([[1.0 if objective.any() else 0.0], program.price * of_group[1:] / own])
     v, bounds, rows, levels = _start(kind, group, Q, f, at, n, price)
-    size = np.maximum(1.0, sizes.sum(axis=1) / scale)
     _, gap, worst = interior(
         Q, f, kind, group, program.M * (own / (scale[:, None] * scale)), frame, n, price, size, v, bounds, rows, levels,
         np.array([*wanted, MAX_STEPS]),
@@ -303,7 +359,8 @@ def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted
     d = np.where(wl < wu, few.low + wl * width, few.high - wu * width)
     d = np.where((zl > wl) & (wl < 1e-6), few.low, np.where((zu > wu) & (wu < 1e-6), few.high, d))
     enough = np.maximum(wanted, ENOUGH)
-    return Found(rows[1] * own / scale, d, bool(gap <= enough[0] and worst <= enough[1] and np.isfinite(d).all()))
+    theta = np.where(line & (rows[1] <= NONE * wanted[0]), 0.0, rows[1]) * own / scale
+    return Found(theta, d, bool(gap <= enough[0] and worst <= enough[1] and np.isfinite(d).all()))
 
 
 def _start(

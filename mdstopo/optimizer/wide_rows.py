@@ -14,21 +14,22 @@ from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.rows import FLOOR, MATCH_COSINE, Around, FeasibleSet, Trial
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 from mdstopo.optimizer.wide import Measures
-from mdstopo.optimizer.wide_numbers import LIGHT, threads_for, total
 from mdstopo.optimizer.wide_classes import combined, gram, projected
+from mdstopo.optimizer.wide_curvature import compact, known_curvature
 from mdstopo.optimizer.wide_interior import CURVED, EQUAL, LIMIT, LINE
+from mdstopo.optimizer.wide_numbers import LIGHT, threads_for, total
 from mdstopo.optimizer.wide_program import Region, Room, WideProgram, WideSolution, solve
 
 #: rows that there is room for at first: those of a bundle, of the newest trial, of volume, of curvature
 ROWS = 20
 #: steps that curvature is learnt from
 PAIRS = 3
-#: the least share of B that a step's curvature is bent to (M. J. D. Powell's damping)
-DAMPING = 0.2
 #: how often what is left of linear rows is taken from variables inside their boxes
 REPAIRS = 5
 #: curvature of the subproblem of least violation, of the steepest limit
 NEXT_TO_NONE = 1e-6
+#: of no steps
+NOTHING = np.zeros((0, 0))
 #: of how many variables one tells how far a row reaches, where only rounding depends on it
 SPARSE = 64
 
@@ -92,17 +93,18 @@ class WideModel:
             half = len(pairs) // 2
             places = self.pool.places(pairs, self.unit)
             _, products = self._products(places)
-            learnt = _compact(products, half, FLOOR * steepest)
-            if learnt is not None:
-                return _WideAround(self, x, reach, learnt[0], pairs, learnt[1], scaled=True)
+            sigma = known_curvature(products, half, FLOOR * steepest)
+            M = compact(products, half, sigma)
+            if M is not None:
+                return _WideAround(self, x, reach, sigma, pairs, products, M, scaled=True)
             pairs = pairs[1:half] + pairs[half + 1 :]  # without the oldest
-        return _WideAround(self, x, reach, FLOOR * steepest, [], np.zeros((0, 0)), scaled=True)
+        return _WideAround(self, x, reach, FLOOR * steepest, [], NOTHING, NOTHING, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, price: Floats, steepest: float) -> float:
         """As of `RowModel`."""
         if steepest == 0.0:
             return 0.0
-        anywhere = _WideAround(self, x, (np.inf, np.inf), steepest, [], np.zeros((0, 0)), scaled=False)
+        anywhere = _WideAround(self, x, (np.inf, np.inf), steepest, [], NOTHING, NOTHING, scaled=False)
         program = anywhere.program(own, price)
         found = solve(program, self.room)
         K, linear = len(own), self.space.linear
@@ -162,20 +164,22 @@ class WideModel:
     def _products(self, places: Ints) -> tuple[Floats, Floats]:
         """Of rows of the pool: their products, and those with the ranges' squares."""
         plain, scaled = np.empty((2, len(places), len(places)))
-        gram(self.pool.rows, places, self.measures.space.unit, threads_for(self.pool.rows.shape[1], LIGHT), plain, scaled)
+        threads = threads_for(self.pool.rows.shape[1], LIGHT)
+        gram(self.pool.rows, places, self.measures.space.unit, threads, plain, scaled)
         return plain, scaled
 
 
 @dataclass(frozen=True, slots=True)
 class _WideAround:
     """As `rows.Around`. curvature: that of all variables, in ranges if `scaled`; learnt: steps and changes (2 m rows),
-    with M (2 m, 2 m) of B = curvature - Z' M^-1 Z."""
+    with their products and M (2 m, 2 m) of B = curvature - Z' M^-1 Z."""
 
     model: WideModel
     x: Floats
     reach_: tuple[float, float]
     curvature: float
     learnt: list[tuple[Floats, bool]]
+    products: Floats
     M: Floats
     scaled: bool
 
@@ -191,15 +195,15 @@ class _WideAround:
     def least_violation(self, rows: Bundle, constraints: int) -> Trial:
         only = rows.subset(rows.group > 0)
         steepest = float(only.steepest.max(initial=0.0))
-        return replace(self.flat(max(NEXT_TO_NONE * steepest, 1e-300)), scaled=True).solve(only, np.ones(constraints))
+        return self.flat(max(NEXT_TO_NONE * steepest, 1e-300)).solve(only, np.ones(constraints))
 
     def reach(self, rows: Bundle) -> Floats:
         unit = self.model.unit[:: SPARSE if len(self.model.unit) > 1 else 1]
         wide = np.minimum(2.0 * np.minimum(self.reach_[1], self.reach_[0] * unit), unit)
         return SPARSE * np.array([float((np.abs(row[::SPARSE]) * wide).sum()) for row in _stack(rows.slope).rows])
 
-    def flat(self, curvature: float) -> Around:
-        return replace(self, curvature=curvature, learnt=[], M=np.zeros((0, 0)))
+    def flat(self, curvature: float) -> "_WideAround":
+        return replace(self, curvature=curvature, learnt=[], products=NOTHING, M=NOTHING)
 
     def program(self, rows: Bundle, price: Floats) -> WideProgram:
         """The subproblem of rows, all of them lines."""
@@ -215,7 +219,7 @@ class _WideAround:
         limits = np.array([*self.reach_, max(self.curvature, 1e-200), float(self.scaled), 0.0])
         region = Region(self.x, space.lower, space.upper, space.unit, limits)
         offset = np.concatenate([rows.vector[:, 0], excess, np.zeros(c)])
-        return WideProgram(region, model.pool.rows, places, offset, kind, group, price, M)
+        return WideProgram(region, model.pool.rows, places, offset, kind, group, price, M, self.products)
 
     def _kept(self, found: WideSolution, program: WideProgram) -> tuple[Floats, Floats]:
         """The trial without the last rounding errors of the linear rows, and what the rows change by."""
@@ -246,36 +250,6 @@ class _WideAround:
         trial = repair(trial, self.x + low, self.x + high, linear)
         d = trial - self.x
         return trial, np.array([total(program.pool[k], d) for k in program.places.tolist()])
-
-
-def _compact(products: Floats, m: int, floor: float) -> tuple[float, Floats] | None:
-    """The curvature of directions that nothing is known of, and M (2 m, 2 m), of B = curvature - Z' M^-1 Z.
-
-    products (2 m, 2 m): of Z, in ranges: m steps, the oldest first, and the changes of the Lagrangian's gradient over
-    them. BFGS in compact form (R. H. Byrd, J. Nocedal, R. B. Schnabel, 1994), the changes damped as in `curvature`, all
-    in products: a vector is told by its components in Z. None where M is singular.
-    """
-    known = [j for j in range(m) if products[j, m + j] > 0.0]
-    sigma = max(floor, products[known[-1], m + known[-1]] / products[known[-1], known[-1]]) if known else floor
-    unit = np.eye(2 * m)
-    S, Y = np.zeros((2 * m, 0)), np.zeros((2 * m, 0))
-    M = np.zeros((0, 0))
-    try:
-        for j in range(m):
-            Z = np.concatenate([sigma * S, Y], axis=1)
-            Bs = sigma * unit[j] - Z @ np.linalg.solve(M, Z.T @ products[:, j])
-            sBs, sy = float(products[j] @ Bs), float(products[j, m + j])
-            share = 1.0 if sy >= DAMPING * sBs else (1.0 - DAMPING) * sBs / (sBs - sy)
-            S = np.column_stack([S, unit[j]])
-            Y = np.column_stack([Y, share * unit[m + j] + (1.0 - share) * Bs])
-            SY = S.T @ products @ Y
-            L, D = np.tril(SY, -1), np.diag(np.diag(SY))
-            M = np.block([[sigma * (S.T @ products @ S), L], [L.T, -D]])
-        back = np.linalg.inv(np.concatenate([sigma * S, Y], axis=1))
-        found = back.T @ M @ back
-    except np.linalg.LinAlgError:
-        return None
-    return (sigma, 0.5 * (found + found.T)) if np.isfinite(found).all() else None
 
 
 def _stack(slopes: Slopes) -> Stack:
