@@ -130,8 +130,9 @@ def interior(
 
     Q (R, n); f, kind, group (R,); M (R, R), 0 but of rows of the curvature; frame (2, n): c and h; price (J + 1,), that
     of the objective 1, or 0 where it has no rows; size (R,): what residuals of rows are relative to. bounds (4, n) as
-    in `kernels`, rows (2, R): slacks and multipliers, levels (2, J + 1): e and its multiplier. settings: mean product and residual to be reached,
-    most steps. Moves v, bounds, rows and levels to the best point. Returns steps, mean product and largest residual.
+    in `kernels`, rows (2, R): slacks and multipliers, levels (2, J + 1): e and its multiplier. settings: mean product
+    and residual to be reached, most steps. Moves v, bounds, rows and levels to the best point. Returns steps, mean
+    product and largest residual.
     """
     R, n = Q.shape
     G = levels.shape[1]

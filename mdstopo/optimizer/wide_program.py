@@ -258,9 +258,9 @@ def _products(program: WideProgram, few: Few) -> Floats:
 
 
 def _doubtful(program: WideProgram, guess: Guess, room: Room) -> tuple[Few, Floats, Floats, Guess]:
-    """Those that multipliers leave in doubt, and what the others add: the sums (R,) of those at ends of their boxes, and
-    the columns (R, p) that stand for those inside; `room.classes` say which they are. And the guess, its doubt as it
-    was, with the largest multipliers that were met."""
+    """Those that multipliers leave in doubt, and what the others add: the sums (R,) of those at ends of their boxes,
+    and the columns (R, p) that stand for those inside; `room.classes` say which they are. And the guess, its doubt as
+    it was, with the largest multipliers that were met."""
     region, first = program.region, guess
     limits = region.limits.copy()
     limits[DOUBT] = guess.doubt
