@@ -31,8 +31,9 @@ from mdstopo.optimizer.wide_interior import AWAY, CURVED, LIMIT, LINE, NOTHING, 
 from mdstopo.optimizer.wide_numbers import stride, threads_for
 from mdstopo.optimizer.wide_passes import PIECE
 
-#: variables of a sample, and up to which all in doubt are solved for at once
-SAMPLE, FEW = 768, 3_000
+#: variables of a sample, at least and at most, and every how many variables one more; of a sample of those in doubt the
+#: least. Variables up to which all in doubt are solved for at once
+SAMPLE, LARGEST, MORE, FEW = 768, 4_096, 256, 3_000
 #: mean product and residual of a solution of the small program, in its own scale; what counts as one; and of a sample
 EXACT, ENOUGH, ROUGH = (1e-14, 1e-11), (1e-8, 1e-8), (1e-7, 1e-7)
 MAX_STEPS = 100.0
@@ -190,7 +191,7 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
     """Solve a program; the same to the bit on any number of threads."""
     region, n = program.region, len(program.region.x)
     nothing = np.zeros(len(program.places))
-    sample = np.arange(0, n, stride(n, SAMPLE))
+    sample = np.arange(0, n, stride(n, min(LARGEST, max(SAMPLE, n // MORE))))
     every = _some(program, sample, n / len(sample))
     theta = _multipliers(program, every, None, nothing, np.zeros((len(nothing), 0)), nothing)
     guess = Guess(theta, np.abs(theta), DOUBTFUL / np.sqrt(len(sample)))

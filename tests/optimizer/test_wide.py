@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.jit import vector_entry
 from mdstopo.native.threads import VARIABLE
-from mdstopo.optimizer import driver, wide
+from mdstopo.optimizer import driver, wide, wide_numbers
 from mdstopo.optimizer.driver import Gsao
 from mdstopo.optimizer.powers import largest, powers, primitives
 from mdstopo.optimizer.presets import settings
@@ -242,8 +242,9 @@ def test_the_same_state_gives_the_same_bits():
 
 
 def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
-    monkeypatch.setattr(wide, "SHARED", 1)
-    monkeypatch.setattr(wide, "LIGHT", 1)
+    monkeypatch.setattr(wide_numbers, "SHARED", 1)
+    for module in (wide, wide_numbers):
+        monkeypatch.setattr(module, "LIGHT", 1)
     found = []
     for threads in (1, 2, 3):
         monkeypatch.setenv(VARIABLE, str(threads))
