@@ -35,7 +35,9 @@ from mdstopo.optimizer.wide_passes import PIECE
 #: least. Variables up to which all in doubt are solved for at once
 SAMPLE, LARGEST, MORE, FEW = 768, 4_096, 256, 3_000
 #: mean product and residual of a solution of the small program, in its own scale; what counts as one; and of a sample
-EXACT, ENOUGH, ROUGH = (1e-14, 1e-11), (1e-8, 1e-8), (1e-7, 1e-7)
+EXACT, ENOUGH, ROUGH = (1e-14, 1e-11), (1e-8, 1e-8), (1e-9, 1e-9)
+#: what counts of a sample, in what was to be reached
+SLACK = 1e3
 MAX_STEPS = 100.0
 #: the doubt that a sample of n leaves, times the root of n; how often those who were taken for decided are added, or
 #: all are sorted again where they are more than this share of all
@@ -44,6 +46,8 @@ DOUBTFUL, ROUNDS, AGAIN = 2.5, 12, 0.1
 WIDER = 4.0
 #: eigenvalues of the matrix of those inside their boxes that count, of the largest
 TINY = 1e-15
+#: what the product of a row's slack and its multiplier is at first, at most
+CENTRED = 1.0
 #: multipliers of lines below this, in mean products, are none
 NONE = 10.0
 #: how far below others a row is said to be at most, in what rows can change by; where variables have no bounds
@@ -193,7 +197,7 @@ def solve(program: WideProgram, room: Room) -> WideSolution:
     nothing = np.zeros(len(program.places))
     sample = np.arange(0, n, stride(n, min(LARGEST, max(SAMPLE, n // MORE))))
     every = _some(program, sample, n / len(sample))
-    theta = _multipliers(program, every, None, nothing, np.zeros((len(nothing), 0)), nothing)
+    theta, _ = _multipliers(program, every, None, nothing, np.zeros((len(nothing), 0)))
     guess = Guess(theta, np.abs(theta), DOUBTFUL / np.sqrt(len(sample)))
     few, sums, inside, guess = _doubtful(program, guess, room)
     trial, change = np.empty(n), np.empty(len(theta))
@@ -234,10 +238,10 @@ def _ends(region: Region, few: Few, d: Floats) -> Floats:
 
 
 def _multipliers(
-    program: WideProgram, sample: Few, whole: Few | None, sums: Floats, inside: Floats, fallback: Floats
-) -> Floats:
+    program: WideProgram, sample: Few, whole: Few | None, sums: Floats, inside: Floats
+) -> tuple[Floats, bool]:
     """The multipliers (R,) of a program of a sample of some variables, or of all of them (None), beside what others
-    add; the fallback where there are none."""
+    add; and whether they are those of a solution."""
     nearly = program
     if len(program.products):
         products = _products(program, sample)
@@ -247,7 +251,7 @@ def _multipliers(
     found = _solved(nearly, sample, sums, inside, ROUGH)
     if not found.solved and len(program.products):
         found = _solved(program.without_curvature(), sample, sums, inside, ROUGH)
-    return found.theta if np.isfinite(found.theta).all() else fallback
+    return np.where(np.isfinite(found.theta), found.theta, 0.0), found.solved
 
 
 def _products(program: WideProgram, few: Few) -> Floats:
@@ -276,7 +280,12 @@ def _doubtful(program: WideProgram, guess: Guess, room: Room) -> tuple[Few, Floa
         n = len(few.which)
         part = slice(None, None, stride(n, SAMPLE))
         sample = few.some(part, n / len(few.which[part]))
-        theta = _multipliers(program, sample, few, sums, _factor(inside), guess.theta)
+        theta, solved = _multipliers(program, sample, few, sums, _factor(inside))
+        if not solved:
+            # they cannot meet what the others leave: there have to be more of them
+            if n == len(region.x) or first.doubt > 1.0:
+                break
+            return _doubtful(program, first._replace(doubt=WIDER * first.doubt), room)
         met = np.maximum(met, np.abs(theta))
         guess = Guess(theta, met, guess.doubt * max(DOUBTFUL / np.sqrt(len(sample.which)), 2.0 * FEW / n))
         few, sums, inside = _decided(few, guess, sums, inside, room)
@@ -359,7 +368,7 @@ def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted
     wl, wu, zl, zu = bounds[:, :n]
     d = np.where(wl < wu, few.low + wl * width, few.high - wu * width)
     d = np.where((zl > wl) & (wl < 1e-6), few.low, np.where((zu > wu) & (wu < 1e-6), few.high, d))
-    enough = np.maximum(wanted, ENOUGH)
+    enough = np.maximum(SLACK * np.array(wanted), ENOUGH)
     theta = np.where(line & (rows[1] <= NONE * wanted[0]), 0.0, rows[1]) * own / scale
     return Found(theta, d, bool(gap <= enough[0] and worst <= enough[1] and np.isfinite(d).all()))
 
@@ -383,5 +392,8 @@ def _start(
     top = np.concatenate([[1.0], np.minimum(0.5 * price[1:], 1.0)])
     rows = np.zeros((2, len(f)))
     rows[0] = np.where(line, e[group] - row, np.maximum(-row, mu))
-    rows[1] = np.where(line, (top / np.maximum(counts, 1))[group], np.where(kind == LIMIT, mu, 0.0))
-    return v, bounds, rows, np.stack([e, np.concatenate([[0.0], price[1:] - top[1:]])])
+    # products of a slack and its multiplier that differ by orders of magnitude would make steps short
+    share = np.minimum((top / np.maximum(counts, 1))[group], CENTRED / rows[0])
+    rows[1] = np.where(line, share, np.where(kind == LIMIT, np.minimum(mu, CENTRED / rows[0]), 0.0))
+    carried = np.bincount(group[line], weights=share[line], minlength=len(price))
+    return v, bounds, rows, np.stack([e, np.concatenate([[0.0], (price - carried)[1:]])])
