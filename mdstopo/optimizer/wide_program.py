@@ -48,6 +48,8 @@ WIDER = 4.0
 TINY = 1e-15
 #: what the product of a row's slack and its multiplier is at first, at most
 CENTRED = 1.0
+#: what the multipliers of bounds are at first, in the largest derivative
+OUTWEIGH = 2.0
 #: multipliers of lines below this, in mean products, are none
 NONE = 10.0
 #: how far below others a row is said to be at most, in what rows can change by; where variables have no bounds
@@ -395,5 +397,7 @@ def _start(
     # products of a slack and its multiplier that differ by orders of magnitude would make steps short
     share = np.minimum((top / np.maximum(counts, 1))[group], CENTRED / rows[0])
     rows[1] = np.where(line, share, np.where(kind == LIMIT, np.minimum(mu, CENTRED / rows[0]), 0.0))
+    # multipliers of bounds that can outweigh any derivative, or the first steps would be short
+    bounds[2:, :bounded] = mu + OUTWEIGH * float(np.abs(rows[1] @ Q[:, :bounded]).max(initial=0.0))
     carried = np.bincount(group[line], weights=share[line], minlength=len(price))
     return v, bounds, rows, np.stack([e, np.concatenate([[0.0], (price - carried)[1:]])])
