@@ -1,23 +1,38 @@
-"""What many rows cost: peaks, and members that compete, pulled back in one sweep; and what finding them costs."""
+"""What many rows cost: peaks, and members that compete, pulled back in one sweep; what finding them costs; and what an
+iteration of the optimiser costs where very many members keep limits on responses."""
 
 import time
 from collections.abc import Callable, Iterator
+from statistics import median
 
 import numpy as np
 
 from mdstopo import load_case
-from mdstopo.bench.tables import Table, significant
+from mdstopo.bench.scaling import whole_run
+from mdstopo.bench.scenes import plate
+from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general.driver import GeneralDriver
 from mdstopo.general.extremes import FRACTION, STEP
 from mdstopo.general.landings import INTEGRALS
+from mdstopo.optimizer.problem import Floats, Problem, Sample
+from mdstopo.session.starts import make_optimizer
 
 ROWS = (1, 6, 30, 100)
 CASES = ("restraint", "lander")
 #: as many rows of each response as there are, from however far below the highest
 EVERY = Rows(window=1.0, most=100)
+
+#: members of the scene with two limits, iterations that are timed after the first, and those of a whole run
+MANY, TIMED, WHOLE = (10_000, 100_000, 1_000_000), 8, 5
+#: most that an iteration may take, in evaluations, from so many members on
+MOST, FROM = 1.25, 90_000
+LIMITS = """\
+  - {response: {displacement: {body: torso}}, over_time: max, limit: 0.14}
+  - {response: {acceleration: {body: torso}}, over_time: max, limit: 60}
+"""
 
 WIRES = """
 format: 1
@@ -36,7 +51,7 @@ solver: {tolerance: 1.0e-6}
 
 
 def rows() -> Iterator[Table]:
-    """Two tables: the sweep alone, and whole evaluations of the wires."""
+    """Three tables: the sweep alone, whole evaluations of the wires, and very many members with two limits."""
     wires = Evaluator(read_case(WIRES))
     lines = [["200 wires on one body", *_sweeps(wires, "default")]]
     for name in CASES:
@@ -62,6 +77,70 @@ def rows() -> Iterator[Table]:
         ["rows", "simulated, rows found", "with gradients"],
         found,
     )
+    limited = [_limited(members) for members in MANY]
+    worst = max(iteration for members, iteration, _ in limited if members >= FROM)
+    yield Table(
+        "Very many members with two limits on responses: CPU time, ms",
+        ["members", "objective", "rows", "all rows", "in objectives", "iteration", "in evaluations", "KKT residual",
+         "run, s", "peak, MB", "file, MB"],
+        [cells for *_, cells in limited],
+        ["Objective: energy and gradient, without limits. All rows: with the gradients of both limits' peaks. Each "
+         f"the median of {TIMED} designs of a run; an iteration is such an evaluation and the next design.",
+         f"A run is `mdstopo run` with {WHOLE} iterations in a process of its own, from YAML to HDF5.",
+         f"An iteration takes at most {MOST:g} evaluations from 1e5 members on: {verdict(worst <= MOST)}."],
+    )  # fmt: skip
+
+
+def _limited(members: int) -> tuple[int, float, list[str]]:
+    """Members, an iteration in evaluations, and the row of the table."""
+    text = plate(members)
+    alone = Evaluator(read_case(text))
+    evaluator = Evaluator(read_case(text + LIMITS))
+    timed = _Timed(evaluator.problem())
+    optimizer = make_optimizer(evaluator.case, timed)
+    state = optimizer.step(optimizer.start())
+    iterations, evaluations, objectives, count = [], [], [], []
+    alone.evaluate(alone.case.start)
+    for _ in range(TIMED):
+        if not state.running:
+            break
+        design = state.trial
+        began = time.process_time()
+        alone.evaluate(design)
+        objectives.append(time.process_time() - began)
+        began = time.process_time()
+        state = optimizer.step(state)
+        iterations.append(time.process_time() - began)
+        evaluations.append(timed.seconds)
+        count.append(timed.rows)
+    seconds, peak, file = whole_run(text + LIMITS, WHOLE)
+    objective, evaluation, iteration = (median(each) for each in (objectives, evaluations, iterations))
+    cells = [
+        f"{evaluator.case.n_design:,}", significant(1e3 * objective), f"{median(count):.0f}",
+        significant(1e3 * evaluation), f"{evaluation / objective:.1f}", significant(1e3 * iteration),
+        f"{iteration / evaluation:.2f}", f"{state.kkt:.0e}", significant(seconds), f"{peak / 1e6:.0f}",
+        f"{file / 1e6:.0f}",
+    ]  # fmt: skip
+    return evaluator.case.n_design, iteration / evaluation, cells
+
+
+class _Timed:
+    """A problem that keeps the CPU time of its last evaluation and its number of rows."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.initial, self.linear = problem.initial, problem.linear
+        self.lower, self.upper = problem.lower, problem.upper
+        self.competes = True
+        self._problem = problem
+        self.seconds, self.rows = 0.0, 0
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        """The problem's sample."""
+        began = time.process_time()
+        sample = self._problem.evaluate(x, gradient)
+        self.seconds = time.process_time() - began
+        self.rows = len(sample.rows) + len(sample.constraint_rows)
+        return sample
 
 
 def _sweeps(evaluator: Evaluator, load_case: str) -> list[str]:

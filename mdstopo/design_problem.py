@@ -18,6 +18,7 @@ from mdstopo.case.model import Objective, ResponseRow, VolumeRow
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
+from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.refusals import refusals
 from mdstopo.status import Status
 
@@ -30,8 +31,9 @@ SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
 #: because a design that lowers the largest raises others that are far below it
 NEAR, ALL = (0.3, 12), (0.6, 60)
 #: where the last row told is within this share of the largest, so many times as many are asked for, up to so many: in a
-#: good design most members share the largest force, and a step that knows nothing of one of them raises it
-TIED, GROWTH, MOST_ROWS = 0.1, 4, 960
+#: good design most members share the largest force, and a step that knows nothing of one of them raises it; as long as
+#: their gradients have room, in numbers
+TIED, GROWTH, MOST_ROWS, ROOM = 0.1, 4, 960, 2e7
 
 
 class DesignProblem:
@@ -76,7 +78,9 @@ class DesignProblem:
         )
         looked: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
         members = any(each.response.kind == "member_force" for each in looked)
-        few, many = Rows(*NEAR, cones=True), Rows(*ALL, cones=True)
+        # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
+        cones = len(self.initial) < WIDE
+        few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
         #: the peaks that an evaluation is asked for
         self.rows = (many if members else few) if self.competes else USUAL
         self.linear = _linear_rows([row for row in case.constraints if isinstance(row, VolumeRow)], self.space)
@@ -123,7 +127,9 @@ class DesignProblem:
         while True:
             evaluation = self._evaluator.evaluate(design, gradient, rows=rows)
             most = rows.most
-            if not gradient or most is None or most >= MOST_ROWS or not _is_cut_off(evaluation, most):
+            if not gradient or most is None or not _is_cut_off(evaluation, most):
+                return evaluation
+            if GROWTH * most > min(MOST_ROWS, ROOM / len(self.initial)):
                 return evaluation
             rows = rows._replace(most=GROWTH * most)
 
@@ -170,7 +176,7 @@ class DesignProblem:
         Every competing peak is a row (bound formulation); an equality makes two groups.
         """
         rows: list[float] = []
-        slopes: list[Floats] = []
+        slopes: list[tuple[Floats, float, float]] = []
         groups: list[int] = []
         shapes: list[tuple[Peak, float, float]] = []
         for i, row in self._responses:
@@ -185,8 +191,10 @@ class DesignProblem:
                     shapes.append((peak, 1.0 / scale if round_ else np.nan, row.bound / scale))
                     rows.append(sign * (peak.value - row.bound) / scale)
                     if peak.gradient is not None:
-                        slopes.append(sign * self._pull(peak.gradient) / scale)
-        matrix = np.array(slopes).reshape(len(slopes), len(self.initial))
+                        slopes.append((peak.gradient, sign, scale))
+        matrix = np.empty((len(slopes), len(self.initial)))
+        for slope, (gradient, sign, scale) in zip(matrix, slopes, strict=True):
+            np.divide(np.multiply(self._pull(gradient), sign, out=slope), scale, out=slope)
         return np.array(rows), matrix, np.array(groups, dtype=np.int64), Cones.of(shapes, self._pull)
 
 

@@ -375,7 +375,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             relative_pose(pair, ends[0], ends[1], rel)
             motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
-            error = _error(table[2], s, h, longest, a, weight)
+            # beside a singular pose velocities are what joints leave of them, and the step has to reach that pose
+            lasting = longest if sigma >= CLOSE * largest else 0.0
+            error = _error(table[2], s, h, lasting, a, weight)
             if crosses(h, way):
                 error = error_along(model, desk, table[2], s, h, a, weight, error, sigma_end)
             if rubbing:

@@ -13,8 +13,10 @@ import numpy as np
 
 from mdstopo.optimizer.conic import Lines, Norms
 from mdstopo.optimizer.problem import Bools, Floats, Ints, Sample, largest_of_groups
+from mdstopo.optimizer.stack import Slopes, Stack, alike, joined, slopes_of, steepest_of
+from mdstopo.optimizer.wide_numbers import WIDE
 
-#: numbers that the rows may take, and rows that are kept at least and at most
+#: numbers that the rows may take, and rows that are kept at least and at most; of very many variables the least
 ROOM, LEAST, MOST = 2e7, 8, 160
 #: a row within this of another of its group, in slope and in value relative to the steepest, is the same
 SAME = 1e-9
@@ -28,13 +30,16 @@ class Bundle:
     from where it was seen to the iterate, in ranges."""
 
     vector: Floats
-    slope: Floats
+    slope: Slopes
     across: Floats
     offset: Floats
     group: Ints
     own: Bools
     age: Ints
     distance: Floats
+
+    def __post_init__(self) -> None:
+        self.slope = slopes_of(self.slope)
 
     @classmethod
     def empty(cls, n: int) -> "Bundle":
@@ -48,11 +53,13 @@ class Bundle:
         """The rows of a sample, seen from there: of the objective those at the places `rows`, of constraints all."""
         n, many = sample.gradients.shape[1], len(sample.constraint_rows)
         value = np.concatenate([sample.rows[rows], sample.constraint_rows])
-        slope = np.concatenate([sample.gradients[rows], sample.constraint_gradients.reshape(-1, n)])
+        every, wide = len(rows) == len(sample.rows), n >= WIDE
+        chosen = sample.gradients if every else sample.gradients[rows]
+        slope = (Stack.of if wide else _stacked)(chosen, sample.constraint_gradients.reshape(-1, n))
         lines = np.full(len(sample.rows), np.nan), np.full(many, np.nan)
         offset = np.concatenate(
-            [(sample.offset if len(sample.offset) else lines[0])[rows],
-             sample.constraint_offset if len(sample.constraint_offset) else lines[1]]
+            [(sample.offset if len(sample.offset) and not wide else lines[0])[rows],
+             sample.constraint_offset if len(sample.constraint_offset) and not wide else lines[1]]
         )  # fmt: skip
         norm = ~np.isnan(offset)
         across = np.zeros((len(value), n if norm.any() else 0))
@@ -68,6 +75,11 @@ class Bundle:
 
     def __len__(self) -> int:
         return len(self.group)
+
+    @property
+    def steepest(self) -> Floats:
+        """The largest size of an entry of each row's slope, (K,)."""
+        return steepest_of(self.slope)
 
     @property
     def norm(self) -> Bools:
@@ -92,6 +104,8 @@ class Bundle:
 
     def slopes_at(self, d: Floats) -> Floats:
         """The rows' gradients (K, N) after a step d (N,)."""
+        if isinstance(self.slope, Stack):
+            return np.array(self.slope)
         if not self.across.shape[1]:
             return self.slope
         vector = self.vectors_at(d)
@@ -127,18 +141,19 @@ class Bundle:
         width = max(self.across.shape[1], other.across.shape[1])
         wide = [np.zeros((len(b), width)) if b.across.shape[1] < width else b.across for b in (self, other)]
         columns = [np.concatenate([getattr(self, f.name), getattr(other, f.name)]) for f in fields(Bundle)
-                   if f.name != "across"]  # fmt: skip
-        vector, slope, offset, group, own, age, distance = columns
+                   if f.name not in ("across", "slope")]  # fmt: skip
+        vector, offset, group, own, age, distance = columns
+        slope = joined(self.slope, other.slope)
         return Bundle(vector, slope, np.concatenate(wide), offset, group, own, age, distance)
 
     def without_repeats(self) -> "Bundle":
         """The last one of rows that are the same within SAME."""
         if len(self) < 2:
             return self
-        steepest = np.abs(self.slope).max(axis=1)
+        steepest = self.steepest
         values, kept = self.values(), np.ones(len(self), dtype=np.bool_)
         # slopes that are the same have nearly the same sum: most pairs need no look at all their entries
-        total = np.einsum("rn->r", self.slope)
+        total = np.zeros(len(self)) if isinstance(self.slope, Stack) else np.einsum("rn->r", self.slope)
         apart = 2.0 * SAME * self.slope.shape[1] * steepest
         for i in range(len(self) - 1):
             near = np.flatnonzero(
@@ -147,7 +162,7 @@ class Bundle:
                 & (np.abs(total[i + 1 :] - total[i]) <= apart[i])
             )
             for k in (near + i + 1).tolist():
-                if np.abs(self.slope[k] - self.slope[i]).max() <= SAME * steepest[i]:
+                if alike(self.slope, k, i, SAME * steepest[i]):
                     kept[i] = False
                     break
         return self if kept.all() else self.subset(kept)
@@ -155,7 +170,7 @@ class Bundle:
     def thinned(self) -> "Bundle":
         """At most as many rows as there is room for: the iterate's own, those that were used last, the newest."""
         n = max(self.slope.shape[1], 1)
-        most = int(min(max(ROOM / n, LEAST), MOST))
+        most = LEAST if n >= WIDE else int(min(max(ROOM / n, LEAST), MOST))
         if len(self) <= most:
             return self
         order = np.lexsort((-np.arange(len(self)), self.age, ~self.own))
@@ -167,17 +182,23 @@ class Bundle:
 
     def lines(self) -> tuple[Ints, Lines]:
         """The rows that are lines: their places and themselves."""
-        at = np.flatnonzero(~self.norm)
-        return at, Lines(self.vector[at, 0], self.slope[at], self.group[at])
+        at, slope = np.flatnonzero(~self.norm), self.slope
+        assert not isinstance(slope, Stack)
+        return at, Lines(self.vector[at, 0], slope[at], self.group[at])
 
     def norms(self) -> tuple[Ints, Norms]:
         """The rows that are norms: their places and themselves."""
-        at = np.flatnonzero(self.norm)
-        across = self.across[at] if self.across.shape[1] else np.zeros((len(at), self.slope.shape[1]))
-        return at, Norms(self.vector[at], self.slope[at], across, self.offset[at], self.group[at])
+        at, slope = np.flatnonzero(self.norm), self.slope
+        assert not isinstance(slope, Stack)
+        across = self.across[at] if self.across.shape[1] else np.zeros((len(at), slope.shape[1]))
+        return at, Norms(self.vector[at], slope[at], across, self.offset[at], self.group[at])
 
-    def _with(self, **columns: Floats | Ints | Bools) -> "Bundle":
+    def _with(self, **columns: Floats | Ints | Bools | Stack) -> "Bundle":
         return Bundle(*(columns.get(f.name, getattr(self, f.name)) for f in fields(Bundle)))
+
+
+def _stacked(one: Floats, other: Floats) -> Slopes:
+    return np.concatenate([one, other])
 
 
 def _values(vector: Floats, offset: Floats) -> Floats:

@@ -3,16 +3,12 @@
 Everything between two steps is in `State`. What is solved, and how, is in `rows`.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.curvature import FEW, Curvature
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
 from mdstopo.optimizer.rows import (
-    FEW_STEPS,
     FLOOR,
     MARGIN,
     NOTHING,
@@ -20,14 +16,9 @@ from mdstopo.optimizer.rows import (
     RAISE,
     RAISES,
     STEER,
-    STEPS,
-    FeasibleSet,
+    Around,
+    RowModel,
     Trial,
-    curvature_of,
-    gradient_change,
-    least_violation,
-    residual,
-    subproblem,
 )
 from mdstopo.optimizer.safeguards import is_least, merit, plain_violation, residual_unit, scaled_violation
 from mdstopo.optimizer.state import State
@@ -67,12 +58,12 @@ BOUND, CARRIED = 1e3, 1e-6
 class BundleMethod:
     """Begin, judge and propose for one problem.
 
-    space: bounds, linear rows and ranges; settings: from `presets.settings`. Each method changes the state that it is
+    model: how subproblems are solved; settings: from `presets.settings`. Each method changes the state that it is
     given; the driver copies it first.
     """
 
-    def __init__(self, space: FeasibleSet, settings: Settings) -> None:
-        self.space = space
+    def __init__(self, model: RowModel, settings: Settings) -> None:
+        self.model = model
         self.settings = settings
 
     def begin(self, state: State) -> None:
@@ -143,7 +134,7 @@ class BundleMethod:
     def first_penalty(self, rows: Bundle) -> Floats:
         """The penalty of each constraint (J,): its gradient then weighs as much as the objective's."""
         groups = int(rows.group.max(initial=0)) + 1
-        steepest = largest_of_groups(np.abs(rows.slope).max(axis=1, initial=0.0), rows.group, groups)
+        steepest = largest_of_groups(rows.steepest, rows.group, groups)
         steepest = np.where(np.isfinite(steepest) & (steepest > 0.0), steepest, 1.0)
         return np.asarray(MARGIN * steepest[0] / steepest[1:])
 
@@ -154,7 +145,7 @@ class BundleMethod:
 
         Adapts the trust box, the curvature's steps, the concavity, and the counts of steps without decrease.
         """
-        settings, space = self.settings, self.space
+        settings = self.settings
         new = self._bundle(sample, state.restoring)
         groups = len(state.penalty) + 1
         here, there = state.bundle.subset(state.bundle.own).levels(groups), new.levels(groups)
@@ -162,8 +153,7 @@ class BundleMethod:
         ratio = actual / state.predicted if state.predicted > 0.0 else -1.0
         d = state.trial - state.alpha
         self._learn_curvature(state, new, d)
-        scaled = d / space.range
-        size, length = float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
+        size, length = self.model.lengths(d)
         seen, moved = new.moved(-d, length), state.bundle.moved(d, length)
         self._learn_concavity(state, seen, here, moved, there)
         negligible = settings.number("decrease_tolerance") * abs(here[0])
@@ -188,27 +178,21 @@ class BundleMethod:
 
     def propose(self, state: State) -> None:
         """Solve the model and set the next trial, what it promises, and the KKT residual."""
-        space = self.space
         own = state.bundle.subset(state.bundle.own)
-        steepest = float(np.abs(own.slope[own.group == 0]).max(initial=0.0))
+        steepest = float(own.steepest[own.group == 0].max(initial=0.0))
         if np.isnan(state.kkt):
             penalty = np.maximum(state.penalty, self.first_penalty(own) if len(state.penalty) else 0.0) * BOUND
             unit = steepest if state.restoring else residual_unit(state, steepest)
-            state.kkt = residual(own, state.alpha, space, penalty, unit)
-        B = curvature_of(state.steps, state.changes, max(steepest, 1e-300), space.range)
-        box = self._box(state)
+            state.kkt = self.model.residual(own, state.alpha, penalty, unit)
+        reach = state.trust, self.settings.number("move_limit")
+        around = self.model.around(state.alpha, reach, state.steps, state.changes, max(steepest, 1e-300))
 
         here = own.levels(len(state.penalty) + 1)
         rows = state.bundle.lowered(here, state.concavity)
-
-        def solved(penalty: Floats) -> Trial:
-            return subproblem(rows, state.alpha, space, box, penalty, B)
-
-        trial = self._steer(state, rows, solved(state.penalty), here, box, solved)
+        trial = self._steer(state, rows, around, here)
         if not trial.solved:
             state.bundle = rows = own
-            B = Curvature.diagonal_of(np.full(len(state.alpha), FLOOR * steepest) / space.range**2)
-            trial = self._steer(state, rows, solved(state.penalty), here, box, solved)
+            trial = self._steer(state, rows, around.flat(FLOOR * steepest), here)
         promised = merit(trial.levels[0] + trial.curved, trial.levels[1:], state.penalty)
         state.predicted = merit(here[0], here[1:], state.penalty) - promised
         state.trial = trial.x
@@ -243,39 +227,29 @@ class BundleMethod:
 
     def _learn_curvature(self, state: State, new: Bundle, d: Floats) -> None:
         """Keep the step d (N,) and the change of the Lagrangian's gradient over it, where that can be told."""
-        change = gradient_change(state.bundle, new, d, state.multipliers)
-        if change is None or not float(np.abs(d).max(initial=0.0)) > 0.0:
+        change = self.model.gradient_change(state.bundle, new, d, state.multipliers)
+        if change is None or not self.model.lengths(d)[0] > 0.0:
             return
-        most = STEPS if len(d) <= FEW else FEW_STEPS
-        state.steps = np.concatenate([state.steps, d[None]])[-most:]
-        state.changes = np.concatenate([state.changes, change[None]])[-most:]
+        state.steps = self.model.learnt(state.steps, d)
+        state.changes = self.model.learnt(state.changes, change)
 
-    def _box(self, state: State) -> tuple[Floats, Floats]:
-        """The lowest and the highest x (N,) of the next step: bounds, move limit and trust box."""
-        space = self.space
-        reach = np.minimum(self.settings.number("move_limit"), state.trust * space.range)
-        return np.maximum(space.lower, state.alpha - reach), np.minimum(space.upper, state.alpha + reach)
-
-    def _steer(
-        self, state: State, rows: Bundle, trial: Trial, here: Floats, box: tuple[Floats, Floats],
-        solved: Callable[[Floats], Trial],
-    ) -> Trial:  # fmt: skip
+    def _steer(self, state: State, rows: Bundle, around: Around, here: Floats) -> Trial:
         """The trial, at penalties that make it take away enough of the violation that can go in the box.
 
         Raises `state.penalty` until it does, and else lets it follow the multipliers. here (J + 1,): the groups' levels
-        at the iterate; solved: the trial at given penalties.
+        at the iterate.
         """
+        trial = around.solve(rows, state.penalty)
         if not len(state.penalty):
             return trial
-        limits = rows.group > 0
-        reach = np.abs(rows.slope[limits]) @ (box[1] - box[0])
+        reach = around.reach(rows.subset(rows.group > 0))
         tiny = max(NOTHING * self.settings.tolerance, ROUNDING * float(reach.max(initial=0.0)))
 
         def violation(levels: Floats) -> float:
             return float(np.maximum(levels[1:], 0.0).sum())
 
         if violation(trial.levels) > tiny:
-            least = least_violation(rows, state.alpha, self.space, box, np.ones(len(state.penalty)))
+            least = around.least_violation(rows, len(state.penalty))
             low = violation(least.levels)
             enough = low + (1.0 - STEER) * max(violation(here) - low, 0.0) + tiny
             for _ in range(RAISES):
@@ -283,7 +257,7 @@ class BundleMethod:
                     break
                 violated = trial.levels[1:] > tiny / len(state.penalty)
                 state.penalty = np.where(violated, RAISE * state.penalty, state.penalty)
-                trial = solved(state.penalty)
+                trial = around.solve(rows, state.penalty)
         carried = np.bincount(rows.group, weights=trial.multipliers, minlength=len(here))[1:]
         state.penalty = np.where(
             trial.levels[1:] > tiny,

@@ -1,6 +1,6 @@
 """The subproblem of rows that are lines or norms of two-vectors, solved by a primal-dual interior point.
 
-    minimise   e_0 + sum_j price_j e_j + d'B d/2              j = 1 ... J
+    minimise   e_0 + sum_j penalty_j e_j + d'B d/2              j = 1 ... J
     subject to f_r + g_r.d <= e_j                             a line of group j
                |(u_r + g_r.d, v_r + p_r.d)| <= e_j + c_r      a norm of group j
                e_j >= 0 (j >= 1),  A d <= b or A d = b,  lower <= d <= upper
@@ -56,13 +56,13 @@ class Norms:
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """A subproblem; lower <= 0 <= upper and lower < upper (N,), price (J,), `linear` with b for the step d."""
+    """A subproblem; lower <= 0 <= upper and lower < upper (N,), penalty (J,), `linear` with b for the step d."""
 
     lower: Floats
     upper: Floats
     lines: Lines
     norms: Norms
-    price: Floats
+    penalty: Floats
     linear: LinearRows
     curvature: Curvature
 
@@ -220,7 +220,7 @@ class _Interior:
         self.program = program
         lines, norms, linear = program.lines, program.norms, program.linear
         self.width = program.upper - program.lower
-        self.n, self.groups = len(self.width), len(program.price) + 1
+        self.n, self.groups = len(self.width), len(program.penalty) + 1
         self.group = np.concatenate([lines.group, norms.group])
         line_slope, norm_slope, across = (x * self.width for x in (lines.slope, norms.slope, norms.across))
         of_line, along, beside = (np.abs(x).max(axis=1, initial=0.0) for x in (line_slope, norm_slope, across))
@@ -239,7 +239,7 @@ class _Interior:
         self.f_line = (lines.value - self.base[lines.group]) / scale[lines.group] - self.g_line @ at
         self.u_norm = norms.vector / by[:, None] - np.stack([self.g_norm @ at, self.p_norm @ at], axis=1)
         self.c_norm = (norms.excess + self.base[norms.group]) / by
-        self.price = program.price * scale[1:] / scale[0]
+        self.penalty = program.penalty * scale[1:] / scale[0]
         row = np.abs(linear.A * self.width).max(axis=1, initial=0.0)
         self.row_scale = np.where(row > 0.0, row, 1.0)
         self.A = linear.A * self.width / self.row_scale[:, None]
@@ -292,7 +292,7 @@ class _Interior:
         s_norm = np.concatenate([(e[self.program.norms.group] + self.c_norm)[:, None], vector], axis=1)
         s_norm[:, 0] = np.maximum(s_norm[:, 0], size + mu)
         counts = np.bincount(self.group, minlength=self.groups)
-        top = np.concatenate([[1.0], np.minimum(0.5 * self.price, 1.0)]) / np.maximum(counts, 1)
+        top = np.concatenate([[1.0], np.minimum(0.5 * self.penalty, 1.0)]) / np.maximum(counts, 1)
         y_norm = np.zeros_like(s_norm)
         y_norm[:, 0] = top[self.program.norms.group]
         limit = self.b - self.A @ v
@@ -309,7 +309,7 @@ class _Interior:
             y_limit=np.where(self.equal, 0.0, mu),
             z_lower=z,
             z_upper=z.copy(),
-            z_elastic=self.price - np.minimum(0.5 * self.price, 1.0),
+            z_elastic=self.penalty - np.minimum(0.5 * self.penalty, 1.0),
         )
 
     def _residuals(self, x: _Point) -> tuple[Floats, ...]:
@@ -317,7 +317,7 @@ class _Interior:
         lines, norms = self.program.lines.group, self.program.norms.group
         gradient = self.P.times(x.v - self.at) + self.g_line.T @ x.y_line + self.A.T @ x.y_limit
         gradient -= self.g_norm.T @ x.y_norm[:, 1] + self.p_norm.T @ x.y_norm[:, 2] + x.z_lower - x.z_upper
-        by_level = np.concatenate([[1.0], self.price - x.z_elastic])
+        by_level = np.concatenate([[1.0], self.penalty - x.z_elastic])
         np.subtract.at(by_level, lines, x.y_line)
         np.subtract.at(by_level, norms, x.y_norm[:, 0])
         line = x.e[lines] - self.f_line - self.g_line @ x.v - x.s_line

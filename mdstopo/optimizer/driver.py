@@ -15,12 +15,14 @@ from mdstopo.optimizer.bundle_method import RESET_TRUST, BundleMethod
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.optimizer.projection import project
-from mdstopo.optimizer.rows import FeasibleSet
+from mdstopo.optimizer.rows import DenseModel, FeasibleSet
 from mdstopo.optimizer.safeguards import better, failure, no_cuts, plain_violation, scaled_violation, verdict
 from mdstopo.optimizer.separable import SeparableMethod
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import History, RowDetails, State, Step
-from mdstopo.optimizer.wide import WIDE, Measures, Space, ranges
+from mdstopo.optimizer.wide import Measures, Space, ranges
+from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide_rows import WideModel
 from mdstopo.status import RunStatus
 
 # Share of U by which a design may be better than the iterate that has converged, by what it breaks limits within their
@@ -65,10 +67,15 @@ class Gsao:
         space = FeasibleSet(self.lower, self.upper, problem.linear, ranges(self.lower, self.upper))
         self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
         self.separable = SeparableMethod(space, self._measures, settings, getattr(problem, "competitors", None))
-        few = len(self.lower) < WIDE and settings.flag("bundle")
-        self.bundle = BundleMethod(space, settings) if few else None
         #: whether rows compete from the start; else the separable model begins
         self.competes = bool(getattr(problem, "competes", False))
+        self.bundle = self._bundle_method(space) if settings.flag("bundle") else None
+
+    def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
+        """That of the problem's size; of very many variables only where rows compete from the start."""
+        if len(self.lower) < WIDE:
+            return BundleMethod(DenseModel(space), self.settings)
+        return BundleMethod(WideModel(space, self._measures), self.settings) if self.competes else None
 
     def start(self, initial: Floats | None = None) -> State:
         """Evaluate the (projected) initial design and propose a first step."""

@@ -1,6 +1,6 @@
 """The subproblem with several rows, solved by a primal-dual interior point.
 
-    minimise   z + sum_j price_j e_j + Q(v)
+    minimise   z + sum_j penalty_j e_j + Q(v)
     subject to f_r(v) - z <= 0        objective rows (the bound formulation)
                c_j(v) - e_j <= 0      constraint rows, made elastic: e >= 0
                A v <= b or A v = b,   0 <= v <= 1
@@ -37,10 +37,10 @@ class Optimum:
     converged: bool
 
 
-def interior_point(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, price: Floats) -> Optimum:
+def interior_point(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, penalty: Floats) -> Optimum:
     """Solve the subproblem in the box lower <= x <= upper, lower < upper throughout.
 
-    price: (C,) of the constraint rows. Some x in the box must satisfy the linear rows, no one of which may be
+    penalty: (C,) of the constraint rows. Some x in the box must satisfy the linear rows, no one of which may be
     zero.
     """
     width = upper - lower
@@ -69,9 +69,9 @@ def interior_point(model: Approximation, lower: Floats, upper: Floats, linear: L
     mu = max(0.1 * float(sums[:R].mean()) / len(width) if R else 0.1, 1e-6)
     rows = np.zeros((6, R + m))
     rows[5] = np.maximum(1.0, sums)
-    y, prices = rows[1], rows[4]
-    prices[n_obj:R] = price * row_scale[n_obj:R] / scale
-    y[:] = np.minimum(0.5 * prices, 1.0)
+    y, penalties = rows[1], rows[4]
+    penalties[n_obj:R] = penalty * row_scale[n_obj:R] / scale
+    y[:] = np.minimum(0.5 * penalties, 1.0)
     y[:n_obj] = 1.0 / max(n_obj, 1)
     y[R:] = np.where(linear.equal, 0.0, mu)
     frame = np.empty((4, len(width)))

@@ -7,7 +7,7 @@ Arrays that the passes share:
                    the step of the variables; for each bound the target of its complementarity,
                    then the step of its multiplier
     B (K, N)       Jacobian of the function rows (first R) over that of the linear rows
-    rows (6, K)    slack, multiplier, elastic variable and its multiplier, price; the size that
+    rows (6, K)    slack, multiplier, elastic variable and its multiplier, penalty; the size that
                    residuals are relative to
     aims (4, K)    target of slack times multiplier; target of the elastic pair, then the step of its
                    multiplier; steps of the slack and of the elastic variable
@@ -308,7 +308,7 @@ def _rows_direct(kind: Ints, change: Floats, rows: Floats, aims: Floats) -> tupl
         wdz += s * dy
         dwdz += ds * dy
         if kind[a] == ELASTIC:
-            # y + ze = price holds from the start: the difference would be all rounding where ze is small.
+            # y + ze = penalty holds from the start: the difference would be all rounding where ze is small.
             e, ze = rows[2, a], rows[3, a]
             de = e / ze * (dy + aims[1, a])
             dze = -dy
@@ -351,7 +351,7 @@ def interior_loop(
     S, system = np.empty((K, K)), np.empty((K + 1, K + 1))
     rhs, right, change = np.empty(K), np.empty(K + 1), np.empty(K + 1)
     values, miss, aims = np.empty(K), np.empty(K), np.empty((4, K))
-    s, y, e, ze, price, size = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
+    s, y, e, ze, penalty, size = rows[0], rows[1], rows[2], rows[3], rows[4], rows[5]
     z = 0.0
     count = 2 * N
     for a in range(K):
@@ -366,7 +366,7 @@ def interior_loop(
                 if kind[a] == OBJECTIVE:
                     z = f + mu if a == 0 else max(z, f + mu)
                 e[a] = max(f, 0.0) + mu
-                ze[a] = price[a] - y[a]
+                ze[a] = penalty[a] - y[a]
             for a in range(K):
                 f = values[a] + offsets[a]
                 top = z if kind[a] == OBJECTIVE else (e[a] if kind[a] == ELASTIC else 0.0)

@@ -14,14 +14,16 @@ optimality conditions say that nothing near keeps them.
 """
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.conic import Program, Solution, solve
-from mdstopo.optimizer.curvature import Curvature, learnt
+from mdstopo.optimizer.curvature import FEW, Curvature, learnt
 from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
 from mdstopo.optimizer.projection import repair
+from mdstopo.optimizer.stack import Slopes, Stack, joined
 
 #: what violations cost, in multipliers; the least share of the violation that could go which has to go; the factor on
 #: penalties until it does, and how often
@@ -59,6 +61,102 @@ class FeasibleSet:
     upper: Floats
     linear: LinearRows
     range: Floats
+
+
+class Around(Protocol):
+    """The subproblems around one iterate, in its box."""
+
+    def solve(self, rows: Bundle, penalty: Floats) -> Trial:
+        """That of rows, where violations of the constraints cost penalty (J,)."""
+
+    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
+        """The step to the least sum of violations of so many constraints."""
+
+    def reach(self, rows: Bundle) -> Floats:
+        """By how much rows can change in the box, at most, (K,)."""
+
+    def flat(self, curvature: float) -> "Around":
+        """The same with one curvature of all variables, in ranges, and none that was learnt."""
+
+
+class RowModel(Protocol):
+    """What a problem's size decides of the bundle method: how subproblems are solved and steps are measured."""
+
+    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
+        """The subproblems at x (N,), in a box of so many ranges and so far; steps, changes: as of `State`."""
+
+    def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
+        """As `residual`."""
+
+    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+        """As `gradient_change`."""
+
+    def lengths(self, d: Floats) -> tuple[float, float]:
+        """The largest change of a variable and the length of a step d (N,), in ranges."""
+
+    def learnt(self, known: Slopes, more: Floats) -> Slopes:
+        """The last steps, or changes, that curvature is learnt from, and one (N,) more."""
+
+
+class DenseModel:
+    """Problems whose rows are matrices: everything is computed of all variables."""
+
+    def __init__(self, space: FeasibleSet) -> None:
+        self.space = space
+
+    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
+        """As of `RowModel`."""
+        assert isinstance(steps, np.ndarray)
+        assert isinstance(changes, np.ndarray)
+        space = self.space
+        far = np.minimum(reach[1], reach[0] * space.range)
+        box = np.maximum(space.lower, x - far), np.minimum(space.upper, x + far)
+        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range))
+
+    def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
+        """As of `RowModel`."""
+        return residual(own, x, self.space, penalty, steepest)
+
+    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+        """As of `RowModel`."""
+        return gradient_change(bundle, new, d, multipliers)
+
+    def lengths(self, d: Floats) -> tuple[float, float]:
+        """As of `RowModel`."""
+        scaled = d / self.space.range
+        return float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
+
+    def learnt(self, known: Slopes, more: Floats) -> Slopes:
+        """As of `RowModel`."""
+        return joined(known, more[None])[-(STEPS if len(more) <= FEW else FEW_STEPS) :]
+
+
+@dataclass(frozen=True, slots=True)
+class _DenseAround:
+    """As `Around`: the iterate x, the box's ends (N,), B."""
+
+    x: Floats
+    space: FeasibleSet
+    box: tuple[Floats, Floats]
+    curvature: Curvature
+
+    def solve(self, rows: Bundle, penalty: Floats) -> Trial:
+        return subproblem(rows, self.x, self.space, self.box, penalty, self.curvature)
+
+    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
+        return least_violation(rows, self.x, self.space, self.box, np.ones(constraints))
+
+    def reach(self, rows: Bundle) -> Floats:
+        return np.asarray(np.abs(_matrix(rows)) @ (self.box[1] - self.box[0]))
+
+    def flat(self, curvature: float) -> Around:
+        flat = Curvature.diagonal_of(np.full(len(self.x), curvature) / self.space.range**2)
+        return replace(self, curvature=flat)
+
+
+def _matrix(rows: Bundle) -> Floats:
+    assert not isinstance(rows.slope, Stack)
+    return rows.slope
 
 
 def subproblem(
@@ -102,7 +200,7 @@ def least_violation(bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Fl
         np.zeros((1, 2)), np.zeros((1, len(x))), np.zeros((1, only.across.shape[1])), np.array([np.nan]),
         np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.int64), np.zeros(1),
     )  # fmt: skip
-    steepest = float((weight[only.group - 1] * np.abs(only.slope).max(axis=1, initial=0.0)).max(initial=0.0))
+    steepest = float((weight[only.group - 1] * only.steepest).max(initial=0.0))
     flat = Curvature.diagonal_of(np.maximum(1e-6 * steepest, 1e-300) / space.range)
     return subproblem(nothing.joined(only), x, space, box, weight, flat)
 
@@ -168,7 +266,7 @@ def residual_of(
     lines: Bundle, multipliers: Floats, linear: Floats, x: Floats, space: FeasibleSet, steepest: float
 ) -> float:
     """The residual with given multipliers of the rows (K,) and the linear rows (m,); see `residual`."""
-    gradient = (multipliers @ lines.slope + linear @ space.linear.A) / steepest
+    gradient = (multipliers @ _matrix(lines) + linear @ space.linear.A) / steepest
     moved = float(np.abs(x - np.clip(x - gradient, space.lower, space.upper)).max(initial=0.0))
     values = lines.values()
     objective = lines.group == 0

@@ -14,7 +14,7 @@ import numpy as np
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Sample
 from mdstopo.optimizer.state import State, Step
-from mdstopo.optimizer.wide import finite
+from mdstopo.optimizer.wide_numbers import finite, steepest
 from mdstopo.status import RunStatus, Status
 
 # Least and largest weight of the convex term, relative to the largest gradient entry over the range.
@@ -68,8 +68,8 @@ def scaled_violation(sample: Sample) -> float:
     whichever is larger."""
     if not len(sample.constraint_rows):
         return 0.0
-    steepest = np.abs(sample.constraint_gradients).max(axis=1)
-    unit = np.where(steepest > 0.0, np.minimum(steepest, 1.0), 1.0)
+    slope = steepest(sample.constraint_gradients)
+    unit = np.where(slope > 0.0, np.minimum(slope, 1.0), 1.0)
     return float(np.max(np.maximum(sample.constraint_rows, 0.0) / unit))
 
 
@@ -132,9 +132,9 @@ def first_penalty(sample: Sample, settings: Settings) -> Floats:
     """The penalty of each constraint, (J,): its gradient then weighs `elastic` times as much as the objective's."""
     if not len(sample.constraint_rows):
         return np.zeros(0)
-    steepest = sample.levels_of(np.abs(sample.constraint_gradients).max(axis=1))
-    slope = float(np.abs(sample.gradients).max())
-    return settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(steepest > 0.0, steepest, 1.0)
+    limits = sample.levels_of(steepest(sample.constraint_gradients))
+    slope = float(steepest(sample.gradients).max())
+    return settings.number("elastic") * (slope if slope > 0.0 else 1.0) / np.where(limits > 0.0, limits, 1.0)
 
 
 def plain_violation(sample: Sample) -> float:
@@ -233,7 +233,7 @@ def is_least(state: State, tolerance: float) -> bool:
     """Whether the largest violation is stationary: its residual is small, also beside the violation itself, which where
     it is tiny could vanish within the residual."""
     rows, slopes = state.constraint_rows, state.constraint_gradients
-    left = state.kkt * float(np.abs(slopes).max(initial=0.0))
+    left = state.kkt * float(steepest(slopes).max(initial=0.0))
     return bool(state.kkt <= tolerance and left <= RESIDUAL_SHARE * float(rows.max(initial=0.0)))
 
 

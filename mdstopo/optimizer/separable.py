@@ -34,7 +34,8 @@ from mdstopo.optimizer.safeguards import (
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.subproblem import solve
-from mdstopo.optimizer.wide import WIDE, Measures, ShiftRule, is_wide, next_wide_shift, propose
+from mdstopo.optimizer.wide import Measures, ShiftRule, is_wide, next_wide_shift, propose
+from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.problem import Floats, Ints, Sample
 from mdstopo.optimizer.shifts import Shifts
+from mdstopo.optimizer.stack import Slopes, Stack, slopes_of
 from mdstopo.status import RunStatus, Status
 
 Array = NDArray[Any]
@@ -189,8 +190,8 @@ class State:
     row_details: RowDetails
     bundle: Bundle
     multipliers: Floats
-    steps: Floats
-    changes: Floats
+    steps: Slopes
+    changes: Slopes
     uses_bundle: bool
     restoring: bool
     resets: int
@@ -253,7 +254,8 @@ class State:
             if isinstance(value, History):
                 out |= {f"history/{name}": column for name, column in value.to_arrays().items()}
             elif isinstance(value, (Bundle, RowDetails)):
-                out |= {f"{f.name}/{part.name}": getattr(value, part.name) for part in fields(value)}
+                parts = {part.name: getattr(value, part.name) for part in fields(value)}
+                out |= {f"{f.name}/{name}": np.array(x) if isinstance(x, Stack) else x for name, x in parts.items()}
             elif isinstance(value, (Step, Shifts)):
                 out[f.name] = value.array().copy()
             elif isinstance(value, str):
@@ -279,7 +281,9 @@ class State:
                 values[f.name] = kind(*(np.array(arrays[f"{f.name}/{part.name}"]) for part in fields(kind)))
                 continue
             array = np.asarray(arrays[f.name])
-            if f.name in ("status", "reason"):
+            if f.name in ("steps", "changes"):
+                values[f.name] = slopes_of(np.array(array))
+            elif f.name in ("status", "reason"):
                 text = array.tobytes().decode()
                 values[f.name] = RunStatus(text) if f.name == "status" else text
             elif f.name == "shift":

@@ -14,8 +14,8 @@ from mdstopo.optimizer.problem import Floats, LinearRows
 from mdstopo.optimizer.projection import repair
 
 
-def solve(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, price: Floats) -> Optimum:
-    """Minimise the model in the box under the linear rows; price (C,) of violating each constraint row.
+def solve(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, penalty: Floats) -> Optimum:
+    """Minimise the model in the box under the linear rows; penalty (C,) of violating each constraint row.
 
     The iterate model.x must lie in the box and satisfy the linear rows. The solution does so too; it is the
     iterate itself, unconverged, where no solution could be computed.
@@ -41,7 +41,7 @@ def solve(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows
     if closed_form(part, rest):
         found = solve_dual(part, low, high, rest)
     else:
-        found = interior_point(part, low, high, rest, price)
+        found = interior_point(part, low, high, rest, penalty)
     finite = bool(np.isfinite(found.x).all() and np.isfinite(found.multipliers).all())
     if not finite:
         return Optimum(x, multipliers, row_multipliers, found.steps, False)

@@ -13,7 +13,7 @@ rows lie below it there and the limits hold.
 
 from collections.abc import Callable
 from functools import cache
-from math import gcd, inf, isfinite
+from math import inf, isfinite
 from mmap import mmap
 from operator import is_
 from typing import Generic, NamedTuple, TypeVar
@@ -21,22 +21,14 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.compiler.threads import allowed
 from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
 from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
-from mdstopo.optimizer.wide_passes import (
-    PIECE,
-    wide_change,
-    wide_largest,
-    wide_look,
-    wide_shift,
-    wide_shift_few,
-    wide_sum,
-)
+from mdstopo.optimizer.wide_numbers import LIGHT, WIDE, steepest, stride, threads_for, total
+from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_look, wide_shift, wide_shift_few
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
 
 Indices = NDArray[np.intp]
@@ -44,17 +36,9 @@ T = TypeVar("T")
 
 #: variables from which on this way is taken
 MANY = 256
-#: and from which on memory counts: single passes are compiled too, no cuts are kept, what is alike is not read again
-WIDE = 10_000
-#: and from which on threads share them
-SHARED = 200_000
-#: where a pass does little, so that making threads would cost as much
-LIGHT = 400_000
 _LEAST_SAMPLE = 256
 #: the part of the slots from which on their memory is not kept
 MUCH = 16
-#: and up to which Python is faster with numbers than NumPy
-FEW = 8
 
 
 class Proposal(NamedTuple):
@@ -165,7 +149,7 @@ class Measures:
         """Find `steepest` of the gradients (R, N) and `excess` of x at once, where one pass can."""
         rows = self.space.rows
         if len(x) >= WIDE and gradients.shape == (1, len(x)) and gradients.flags.c_contiguous and len(rows) == 1:
-            most, total = wide_look(gradients[0], rows[0], x, _threads(len(x), LIGHT))
+            most, total = wide_look(gradients[0], rows[0], x, threads_for(len(x), LIGHT))
             self.steepest.tell(np.array([most]), gradients)
             self.excess.tell(total - self.space.linear.b, x)
 
@@ -204,7 +188,7 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
     trial, (slots, place, found, counts, x) = np.empty(n), room.of(n)
     multiplier, miss, size, change, residual, plain, scaled, count = wide_minimum(
         alpha, slope, cost, state.shift.array(), lower, upper, limits, bound, left + bound, bool(linear.equal[0]), own,
-        _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), _threads(n), trial, slots, place, found, counts, x,
+        _stride(n), 1e-12 * (2.0 * abs(bound) + abs(left)), threads_for(n), trial, slots, place, found, counts, x,
     )  # fmt: skip
     room.used(count)
     if not (isfinite(change) and isfinite(multiplier)) or (abs(miss) > SOLVED * size and multiplier != 0.0):
@@ -264,7 +248,7 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
     else:
         array, places, before = np.empty(n), np.empty(0, dtype=np.int64), np.empty(0)
         shifts, count = Shifts(array, rule.within), np.zeros(1, dtype=np.int64)
-        threads = _threads(n, LIGHT)
+        threads = threads_for(n, LIGHT)
         wide_shift(shift.array(), last.to, last.origin, step.to, step.origin, rule.numbers, threads, array)
     room.signed = None
     if made:
@@ -277,7 +261,7 @@ def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room
 def largest_change(x: Floats, y: Floats, unit: Floats) -> tuple[float, float]:
     """max |x - y|, and the largest in its unit."""
     if len(x) >= WIDE:
-        plain, scaled = wide_change(x, y, unit, _threads(len(x), LIGHT))
+        plain, scaled = wide_change(x, y, unit, threads_for(len(x), LIGHT))
         return plain, scaled
     change = np.abs(x - y)
     return float(change.max(initial=0.0)), float((change / unit).max(initial=0.0))
@@ -287,28 +271,7 @@ def excess(space: Space, x: Floats) -> Floats:
     """A x - b, (m,)."""
     if len(x) < WIDE:
         return space.linear.excess(x)
-    return np.array([wide_sum(row, x, _threads(len(x), LIGHT)) for row in space.rows]) - space.linear.b
-
-
-def steepest(gradients: Floats) -> Floats:
-    """The largest size of an entry of each row (R,) of gradients (R, N); NaN where one is NaN."""
-    if gradients.shape[1] < WIDE:
-        return np.asarray(np.abs(gradients).max(axis=1, initial=0.0))
-    return np.array([_largest(np.ascontiguousarray(row)) for row in gradients])
-
-
-def finite(numbers: Floats) -> bool:
-    """Whether all are."""
-    if numbers.size <= FEW:
-        return all(map(isfinite, numbers.ravel().tolist()))
-    if numbers.size < WIDE or not numbers.flags.c_contiguous:
-        return bool(np.isfinite(numbers).all())
-    return isfinite(_largest(numbers.reshape(-1)))
-
-
-def _largest(x: Floats) -> float:
-    """max |x| of very many; NaN where one is NaN."""
-    return wide_largest(x, _threads(len(x), LIGHT))
+    return np.array([total(row, x) for row in space.rows]) - space.linear.b
 
 
 def _touched_up(trial: Floats, slots: Floats, place: Ints, measures: Measures, rounding: float) -> Floats:
@@ -332,12 +295,5 @@ def _touched_up(trial: Floats, slots: Floats, place: Ints, measures: Measures, r
 
 @cache
 def _stride(n: int) -> int:
-    """Every how many variables one is in the sample; with no common factor, so that no grid's rhythm is met."""
-    stride = max(1, n // min(SAMPLE, max(_LEAST_SAMPLE, n // 64)))
-    while gcd(stride, n) != 1:
-        stride += 1
-    return stride
-
-
-def _threads(n: int, enough: int | None = None) -> int:
-    return allowed() if n >= (SHARED if enough is None else max(enough, SHARED)) else 1
+    """Every how many variables one is in the sample."""
+    return stride(n, min(SAMPLE, max(_LEAST_SAMPLE, n // 64)))

@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, part
 from mdstopo.integrators.contract import point_of, steps_of
+from mdstopo.integrators.gauss import TAG as GAUSS
 from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, deflection, solved_to, step_at
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
@@ -65,7 +66,7 @@ def look(  # type: ignore[no-untyped-def]
     for i in range(pose.shape[0]):
         relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], pose[i])
     find_meeting(model, strength, steps, count, pose, settings, meeting)
-    find_unresolved(model, strength, steps, count, pose, max(VISIBLE, settings[0]), meeting)
+    find_unresolved(model, strength, steps, count, pose, len(tag) == len(GAUSS), max(VISIBLE, settings[0]), meeting)
     accuracy = solved_to(settings[0], settings[2])
     for j in range(reductions.shape[0]):
         found[j] = energy_rows(
@@ -151,20 +152,23 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):  # typ
 
 
 @part
-def find_unresolved(model, strength, steps, count, pose, visible, meeting):  # type: ignore[no-untyped-def]
+def find_unresolved(model, strength, steps, count, pose, collocated, visible, meeting):  # type: ignore[no-untyped-def]
     """meeting[2]: the member by which rounding leaves the largest stored energy no digits to speak of, or -1.
 
     A length is known to u X where coordinates have the size X, u = 2.2e-16; an energy k Delta^2/2 then to k Delta u X.
     By Cauchy and Schwarz the sum of these is at most u X sqrt(2 sum(k) E), which needs no pass over the members and
     nearly always is small enough.
 
-    pose (S, n_pair, POSE): of the stages; visible: share of the energy that is too much.
+    pose (S, n_pair, POSE): of the stages; collocated: whether all stages lie on the motion, as those of windows do, or
+    only the first of each step; visible: share of the energy that is too much.
     """
     meeting[2] = -1
     best = steps.index[0, 0]
-    for step in range(1, count):  # the first stage of each: of explicit steps the only one that lies on the motion
-        if steps.scalar[steps.index[step, 0], ENERGY] > steps.scalar[best, ENERGY]:
-            best = steps.index[step, 0]
+    for step in range(count):
+        first = steps.index[step, 0]
+        for i in range(first, steps.index[step + 1, 0] if collocated else first + 1):
+            if steps.scalar[i, ENERGY] > steps.scalar[best, ENERGY]:
+                best = i
     energy = steps.scalar[best, ENERGY]
     if not energy > 0.0:
         return

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.children import command, end_with_parent
 from mdstopo.optimizer.problem import LinearRows, Problem, Sample
-from mdstopo.optimizer.wide import MANY, WIDE
+from mdstopo.optimizer.wide import MANY
+from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.family import beyond_springs
 from mdstopo.session.engine import Engine, compiling
 from mdstopo.session.starts import first_design, make_optimizer
@@ -80,7 +81,7 @@ def get_ready(
     case. Raises CaseError where no design keeps the rows.
     """
     for size in [_FEW, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
-        _meet(case, size)
+        _meet(case, size, size >= WIDE and bool(getattr(problem, "competes", False)))
     stated, begin = first_design(case, problem, initial)
     before = motions(case, engine, case.space.expand(begin))
     if case.n_members <= _SMALL:
@@ -88,9 +89,9 @@ def get_ready(
     return stated, begin, before
 
 
-def _meet(case: Case, size: int) -> None:
-    """Load the kernels that the optimiser calls where there are so many variables."""
-    optimizer = make_optimizer(case, _Toy(size))
+def _meet(case: Case, size: int, competes: bool = False) -> None:
+    """Load the kernels that the optimiser calls where there are so many variables, and where their rows compete."""
+    optimizer = make_optimizer(case, _Toy(size, competes))
     state = optimizer.start()
     if state.running:
         optimizer.step(state)
@@ -111,7 +112,8 @@ def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
 class _Toy:
     """A problem of two rows, both of which decide, or of many variables the higher: enough to meet every kernel."""
 
-    def __init__(self, size: int) -> None:
+    def __init__(self, size: int, competes: bool) -> None:
+        self.competes = competes
         self.initial = np.full(size, 0.5)
         self.lower = np.full(size, 0.001)
         self.upper = np.ones(size)

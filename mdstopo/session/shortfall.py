@@ -54,7 +54,7 @@ def holders(case: Case, state: State) -> list[str]:
     rows = state.bundle
     if not state.uses_bundle or state.restoring or not len(rows) or len(rows) != len(state.multipliers):
         return []
-    weights = state.multipliers * np.abs(rows.slope).max(axis=1, initial=0.0)
+    weights = state.multipliers * rows.steepest
     whose = [-1]
     for index, row in enumerate(case.constraints):
         if isinstance(row, ResponseRow):

@@ -90,9 +90,9 @@ def test_the_solution_meets_its_optimality_conditions(n, lines, norms, groups, d
         top = max(level[mine].max(initial=-np.inf), 0.0 if j else -np.inf)
         assert np.abs(multiplier[mine] * (level[mine] - top)).sum() < 1e-6 * size
         if j:
-            assert multiplier[mine].sum() <= p.price[j - 1] * (1.0 + 1e-6)
+            assert multiplier[mine].sum() <= p.penalty[j - 1] * (1.0 + 1e-6)
             if top > 1e-6:
-                assert multiplier[mine].sum() == pytest.approx(p.price[j - 1], rel=1e-4)
+                assert multiplier[mine].sum() == pytest.approx(p.penalty[j - 1], rel=1e-4)
 
 
 @pytest.mark.parametrize("dense", [False, True])
@@ -111,7 +111,7 @@ def test_the_least_norm_is_found_where_it_vanishes():
 
 
 def test_a_limit_that_cannot_be_kept_costs_its_price():
-    """Minimise 0 under 1 + d <= e at d >= -0.4: the violation left is 0.6, its multiplier the price."""
+    """Minimise 0 under 1 + d <= e at d >= -0.4: the violation left is 0.6, its multiplier the penalty."""
     lines = Lines(np.array([0.0, 1.0]), np.array([[0.0], [1.0]]), np.array([0, 1]))
     flat = Curvature.diagonal_of(np.full(1, 1e-9))
     found = solve(

@@ -38,7 +38,7 @@ def jacobian(model, x):
     return np.where(model.slopes < 0, model.slopes * falling, model.slopes * rising)
 
 
-def residuals(model, lower, upper, linear, price, found):
+def residuals(model, lower, upper, linear, penalty, found):
     """Projected stationarity, row complementarity and multiplier sums, relative to the largest slope."""
     x, y, lam = found.x, found.multipliers, found.linear_multipliers
     n_obj = model.n_objective
@@ -49,7 +49,7 @@ def residuals(model, lower, upper, linear, price, found):
     rows = model.rows(x)
     gap = np.abs(y[:n_obj] * (rows[:n_obj].max() - rows[:n_obj])).max(initial=0.0) / size
     c = rows[n_obj:]
-    held = np.abs(np.where(c < 0, y[n_obj:] * c, np.minimum(c, price - y[n_obj:]))).max(initial=0.0) / size
+    held = np.abs(np.where(c < 0, y[n_obj:] * c, np.minimum(c, penalty - y[n_obj:]))).max(initial=0.0) / size
     slack = np.abs(np.where(linear.equal, 0, lam * linear.excess(x))).max(initial=0.0) / size
     return {
         "stationarity": stationarity,
@@ -71,8 +71,8 @@ def test_optimality_conditions_hold_to_rounding(power, n_obj, n_con, m, kappa):
     lower, upper = np.maximum(model.x - 0.3, 0.05), np.minimum(model.x + 0.3, 1.0)
     A = rng.uniform(0.0, 1.0, (m, n))
     linear = LinearRows(A, A @ model.x + np.r_[0.0, rng.uniform(0, 0.3, m - 1)], np.arange(m) == 0)
-    price = np.full(n_con, 3.0)
-    found = solve(model, lower, upper, linear, price)
+    penalty = np.full(n_con, 3.0)
+    found = solve(model, lower, upper, linear, penalty)
     assert found.converged
     assert np.all(found.x >= lower)
     assert np.all(found.x <= upper)
@@ -82,8 +82,8 @@ def test_optimality_conditions_hold_to_rounding(power, n_obj, n_con, m, kappa):
     assert np.all(found.multipliers >= 0)
     assert np.all(found.linear_multipliers[1:] >= 0)
     if n_con:
-        assert np.all(found.multipliers[n_obj:] <= price * (1 + 1e-9))
-    for name, value in residuals(model, lower, upper, linear, price, found).items():
+        assert np.all(found.multipliers[n_obj:] <= penalty * (1 + 1e-9))
+    for name, value in residuals(model, lower, upper, linear, penalty, found).items():
         assert value < 2e-8, name
 
 

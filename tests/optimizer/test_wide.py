@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.compiler.jit import vector_entry
 from mdstopo.compiler.threads import VARIABLE
-from mdstopo.optimizer import driver, separable, wide
+from mdstopo.optimizer import driver, separable, wide, wide_numbers
 from mdstopo.optimizer.driver import Gsao
 from mdstopo.optimizer.powers import largest, powers, primitives
 from mdstopo.optimizer.presets import settings
@@ -45,7 +45,7 @@ class Many:
 def states(problem, steps, monkeypatch=None, **options):
     if monkeypatch is not None:
         monkeypatch.setattr(wide, "MANY", 10**9)
-        for module in (driver, separable, wide):
+        for module in (driver, separable, wide, wide_numbers):
             monkeypatch.setattr(module, "WIDE", 10**9)
     optimizer = Gsao(problem, settings("default", options, max_iterations=100))
     found = [optimizer.start()]
@@ -242,8 +242,9 @@ def test_the_same_state_gives_the_same_bits():
 
 
 def test_any_number_of_threads_gives_the_same_bits(monkeypatch):
-    monkeypatch.setattr(wide, "SHARED", 1)
-    monkeypatch.setattr(wide, "LIGHT", 1)
+    monkeypatch.setattr(wide_numbers, "SHARED", 1)
+    for module in (wide, wide_numbers):
+        monkeypatch.setattr(module, "LIGHT", 1)
     found = []
     for threads in (1, 2, 3):
         monkeypatch.setenv(VARIABLE, str(threads))

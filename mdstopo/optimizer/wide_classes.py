@@ -1,0 +1,337 @@
+"""Compiled passes over very many variables for the subproblem of `wide_rows`: where the rows' multipliers send each.
+
+With multipliers theta (R,) of rows Q (R, N) the derivative by a variable's step d_i is r_i + h_i d_i, r = Q' theta: the
+step ends at the lower or the upper end of the box, or is -r_i / h_i. Multipliers that are not exact leave those in
+doubt whose derivative is near zero at an end, relative to sum_k spread_k |Q_ki|.
+
+Rows are some of those of one matrix, `pool` (S, N). limits: the trust box, in ranges; the longest step; h, over the
+range's square if the next is not 0; the doubt, relative to that sum. Bounds and ranges whose numbers are all alike may
+be given as the first few of them (`wide_passes`). Threads share pieces of variables; sums of the pieces are added in
+order, so that results do not depend on the number of threads.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, member_kernel, vector_entry
+from mdstopo.compiler.threads import shared, taken
+from mdstopo.optimizer.kernels import _add, _dot, _dot3
+from mdstopo.optimizer.problem import Bools, Floats, Ints
+from mdstopo.optimizer.wide_passes import PIECE, part, pieces
+
+BLOCK = 1024
+TRUST, LONGEST, H, SCALED, DOUBT = range(5)
+#: what a variable does, in two truths: it is inside its box or in doubt; it is at the upper end, or in doubt
+INSIDE, BEYOND = 0, 1
+
+
+@member_kernel
+def _boxes(
+    x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats, low: Floats, high: Floats, h: Floats
+) -> None:
+    """The box's ends, relative to x, and h."""
+    trust, longest, own, scaled = limits[TRUST], limits[LONGEST], limits[H], limits[SCALED]
+    for i in range(len(x)):
+        reach = min(longest, trust * unit[i])
+        low[i] = min(max(lower[i], x[i] - reach) - x[i], 0.0)
+        high[i] = max(min(upper[i], x[i] + reach) - x[i], 0.0)
+        h[i] = own / (unit[i] * unit[i]) if scaled != 0.0 else own
+
+
+@member_kernel
+def _weighted(
+    pool: Floats, rows: Ints, theta: Floats, spread: Floats, start: int, stop: int, r: Floats, size: Floats
+) -> None:  # fmt: skip
+    """r = sum_k theta_k Q_k, and the sum of spread_k |Q_k|."""
+    for i in range(stop - start):
+        r[i] = 0.0
+        size[i] = 0.0
+    for k in range(len(rows)):
+        weight, wide = theta[k], spread[k]
+        if (weight != 0.0) | (wide != 0.0):
+            row = pool[rows[k], start:stop]
+            for i in range(len(row)):
+                r[i] += weight * row[i]
+                size[i] += wide * abs(row[i])
+
+
+@vector_entry
+def sort(
+    pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
+    limits: Floats, threads: int, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
+) -> None:  # fmt: skip
+    """Say of all variables what they do; `classes` (2, N). spread (R,): by how much multipliers are not known, times
+    1/doubt.
+
+    found (N,): from each piece's place on those in doubt, counts (pieces,) how many. sums (R,): Q d over the variables
+    at an end of their box; products (R, R): Q diag(1/h) Q' over those inside.
+    """
+    R = len(rows)
+    count = pieces(len(x))
+    every_sum, every_product = np.zeros((count, R)), np.zeros((count, R, R))
+    counter = np.zeros(1, np.int64)
+    shared(
+        _sorted, threads,
+        (counter, pool, rows, theta, spread, x, lower, upper, unit, limits, classes, found, counts, every_sum,
+         every_product),
+    )  # fmt: skip
+    sums.fill(0.0)
+    products.fill(0.0)
+    for piece in range(count):
+        for a in range(R):
+            sums[a] += every_sum[piece, a]
+            for b in range(R):
+                products[a, b] += every_product[piece, a, b]
+
+
+@kernel
+def _sorted(
+    counter: Ints, pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats,
+    unit: Floats, limits: Floats, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
+) -> None:  # fmt: skip
+    N = len(x)
+    low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    which, columns = np.empty(BLOCK, dtype=np.int64), np.empty((len(rows), BLOCK))
+    piece = taken(counter)
+    while piece < len(sums):
+        place = piece * PIECE
+        for start in range(piece * PIECE, min((piece + 1) * PIECE, N), BLOCK):
+            stop = min(start + BLOCK, (piece + 1) * PIECE, N)
+            n = stop - start
+            _boxes(
+                x[start:stop], part(lower, N, start, stop), part(upper, N, start, stop), part(unit, N, start, stop),
+                limits, low, high, h,
+            )  # fmt: skip
+            _weighted(pool, rows, theta, spread, start, stop, r, size)
+            inside = 0
+            for i in range(n):
+                doubt = limits[DOUBT] * size[i]
+                least, most = r[i] + h[i] * low[i], r[i] + h[i] * high[i]
+                step, slack, within, beyond = 0.0, 0.0, False, False
+                if low[i] == high[i]:
+                    step = low[i]
+                elif size[i] == 0.0:  # nothing pushes: it stays
+                    slack, within = (1.0 / h[i], True) if low[i] < 0.0 < high[i] else (0.0, False)
+                    beyond = low[i] < 0.0 and high[i] <= 0.0
+                elif least > doubt:
+                    step = low[i]
+                elif most < -doubt:
+                    step, beyond = high[i], True
+                elif least < -doubt and most > doubt:
+                    slack, within = 1.0 / h[i], True
+                else:
+                    within, beyond = True, True
+                    found[place] = start + i
+                    place += 1
+                classes[INSIDE, start + i] = within
+                classes[BEYOND, start + i] = beyond
+                r[i] = step
+                if slack > 0.0:
+                    which[inside], size[inside] = i, slack
+                    inside += 1
+            for a in range(len(rows)):
+                row, column = pool[rows[a], start:stop], columns[a, :inside]
+                sums[piece, a] += _dot(row, r[:n])
+                for k in range(inside):
+                    column[k] = row[which[k]]
+                for b in range(a + 1 if inside > 0 else 0):
+                    products[piece, a, b] += _dot3(column, size[:inside], columns[b, :inside])
+                    products[piece, b, a] = products[piece, a, b]
+        counts[piece] = place - piece * PIECE
+        piece = taken(counter)
+
+
+@vector_entry
+def finish(
+    pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats,
+    threads: int, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
+) -> float:  # fmt: skip
+    """Where all variables go, into `trial`, which has those in doubt already; sums (R,): Q d.
+
+    found, counts: as of `sort`, of those whose class is another than `classes` say. Returns sum_i h_i d_i^2.
+    """
+    count = pieces(len(x))
+    every = np.zeros((count, len(rows) + 1))
+    counter = np.zeros(1, np.int64)
+    shared(
+        _finished, threads,
+        (counter, pool, rows, theta, x, lower, upper, unit, limits, classes, trial, found, counts, every),
+    )  # fmt: skip
+    sums.fill(0.0)
+    curved = 0.0
+    for piece in range(count):
+        for a in range(len(rows)):
+            sums[a] += every[piece, a]
+        curved += every[piece, len(rows)]
+    return curved
+
+
+@kernel
+def _finished(
+    counter: Ints, pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
+    limits: Floats, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
+) -> None:  # fmt: skip
+    N, R = len(x), len(rows)
+    low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
+    spread = np.abs(theta)
+    piece = taken(counter)
+    while piece < len(sums):
+        place = piece * PIECE
+        for start in range(piece * PIECE, min((piece + 1) * PIECE, N), BLOCK):
+            stop = min(start + BLOCK, (piece + 1) * PIECE, N)
+            n = stop - start
+            at, y = x[start:stop], trial[start:stop]
+            first, last = part(lower, N, start, stop), part(upper, N, start, stop)
+            _boxes(at, first, last, part(unit, N, start, stop), limits, low, high, h)
+            _weighted(pool, rows, theta, spread, start, stop, r, size)
+            for i in range(n):
+                within, beyond = classes[INSIDE, start + i], classes[BEYOND, start + i]
+                if within and beyond:
+                    r[i] = y[i] - at[i]
+                    continue
+                least, most = r[i] + h[i] * low[i], r[i] + h[i] * high[i]
+                if low[i] == high[i]:
+                    step = low[i]
+                elif least >= 0.0:
+                    step, other = low[i], within or beyond
+                    found[place] = start + i
+                    place += 1 if other else 0
+                elif most <= 0.0:
+                    step, other = high[i], within or not beyond
+                    found[place] = start + i
+                    place += 1 if other else 0
+                else:
+                    step = -r[i] / h[i]
+                    found[place] = start + i
+                    place += 0 if within else 1
+                y[i] = min(max(at[i] + step, first[i]), last[i])
+                r[i] = step
+            for a in range(R):
+                sums[piece, a] += _dot(pool[rows[a], start:stop], r[:n])
+            sums[piece, R] += _dot3(h[:n], r[:n], r[:n])
+        counts[piece] = place - piece * PIECE
+        piece = taken(counter)
+
+
+@vector_entry
+def projected(
+    pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, steepest: float, threads: int
+) -> float:
+    """max |x - clip(x - Q' theta / steepest)|: what a step along the Lagrangian's negative gradient moves."""
+    most = np.zeros(pieces(len(x)))
+    counter = np.zeros(1, np.int64)
+    shared(_projected, threads, (counter, pool, rows, theta, x, lower, upper, 1.0 / steepest, most))
+    found = 0.0
+    for piece in range(len(most)):
+        found = max(found, most[piece])
+    return found
+
+
+@kernel
+def _projected(
+    counter: Ints, pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: float,
+    most: Floats,
+) -> None:  # fmt: skip
+    N = len(x)
+    r, size = np.empty(BLOCK), np.empty(BLOCK)
+    piece = taken(counter)
+    while piece < len(most):
+        for start in range(piece * PIECE, min((piece + 1) * PIECE, N), BLOCK):
+            stop = min(start + BLOCK, (piece + 1) * PIECE, N)
+            _weighted(pool, rows, theta, theta, start, stop, r, size)
+            first, last, at = part(lower, N, start, stop), part(upper, N, start, stop), x[start:stop]
+            for i in range(stop - start):
+                moved = min(max(at[i] - r[i] * unit, first[i]), last[i])
+                most[piece] = max(most[piece], abs(at[i] - moved))
+        piece = taken(counter)
+
+
+@vector_entry
+def gram(pool: Floats, rows: Ints, unit: Floats, threads: int, plain: Floats, scaled: Floats) -> None:
+    """The products (R, R) of rows: plain, and weighted with the ranges' squares."""
+    R = len(rows)
+    count = pieces(pool.shape[1])
+    every = np.zeros((count, 2, R, R))
+    counter = np.zeros(1, np.int64)
+    shared(_grams, threads, (counter, pool, rows, unit, every))
+    plain.fill(0.0)
+    scaled.fill(0.0)
+    for piece in range(count):
+        for a in range(R):
+            for b in range(R):
+                plain[a, b] += every[piece, 0, a, b]
+                scaled[a, b] += every[piece, 1, a, b]
+
+
+@kernel
+def _grams(counter: Ints, pool: Floats, rows: Ints, unit: Floats, products: Floats) -> None:
+    N = pool.shape[1]
+    weight = np.empty(BLOCK)
+    piece = taken(counter)
+    while piece < len(products):
+        for start in range(piece * PIECE, min((piece + 1) * PIECE, N), BLOCK):
+            stop = min(start + BLOCK, (piece + 1) * PIECE, N)
+            wide = part(unit, N, start, stop)
+            for i in range(stop - start):
+                weight[i] = wide[i] * wide[i]
+            for a in range(len(rows)):
+                one = pool[rows[a], start:stop]
+                for b in range(a + 1):
+                    other = pool[rows[b], start:stop]
+                    products[piece, 0, a, b] += _dot(one, other)
+                    products[piece, 1, a, b] += _dot3(one, other, weight[: stop - start])
+                    products[piece, 0, b, a] = products[piece, 0, a, b]
+                    products[piece, 1, b, a] = products[piece, 1, a, b]
+        piece = taken(counter)
+
+
+@vector_entry
+def combined(pool: Floats, rows: Ints, theta: Floats, threads: int, out: Floats) -> None:
+    """out = sum_k theta_k Q_k."""
+    counter = np.zeros(1, np.int64)
+    shared(_combined, threads, (counter, pool, rows, theta, out))
+
+
+@kernel
+def _combined(counter: Ints, pool: Floats, rows: Ints, theta: Floats, out: Floats) -> None:
+    N = len(out)
+    piece = taken(counter)
+    while piece * PIECE < N:
+        for start in range(piece * PIECE, min((piece + 1) * PIECE, N), BLOCK):
+            stop = min(start + BLOCK, (piece + 1) * PIECE, N)
+            out[start:stop] = 0.0
+            for k in range(len(rows)):
+                _add(out[start:stop], theta[k], pool[rows[k], start:stop])
+        piece = taken(counter)
+
+
+@vector_entry
+def lengths(x: Floats, y: Floats, unit: Floats, threads: int, step: Floats, over: Floats) -> tuple[float, float]:
+    """step = y - x and step over the range's square; its largest size in ranges, and its length in ranges."""
+    count = pieces(len(x))
+    every = np.zeros((count, 2))
+    counter = np.zeros(1, np.int64)
+    shared(_lengths, threads, (counter, x, y, unit, step, over, every))
+    most, square = 0.0, 0.0
+    for piece in range(count):
+        most = max(most, every[piece, 0])
+        square += every[piece, 1]
+    return most, np.sqrt(square)
+
+
+@kernel
+def _lengths(counter: Ints, x: Floats, y: Floats, unit: Floats, step: Floats, over: Floats, every: Floats) -> None:
+    N = len(x)
+    piece = taken(counter)
+    while piece < len(every):
+        start, stop = piece * PIECE, min((piece + 1) * PIECE, N)
+        wide = part(unit, N, start, stop)
+        most, square = 0.0, 0.0
+        for i in range(stop - start):
+            moved = y[start + i] - x[start + i]
+            scaled = moved / wide[i]
+            step[start + i] = moved
+            over[start + i] = scaled / wide[i]
+            most = max(most, abs(scaled))
+            square += scaled * scaled
+        every[piece, 0], every[piece, 1] = most, square
+        piece = taken(counter)

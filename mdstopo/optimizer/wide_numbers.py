@@ -1,0 +1,58 @@
+"""Single passes over very many variables, as Python calls them; NumPy's where the variables are few."""
+
+from math import gcd, isfinite
+
+import numpy as np
+
+from mdstopo.compiler.threads import allowed
+from mdstopo.optimizer.problem import Floats
+from mdstopo.optimizer.wide_passes import wide_largest, wide_sum
+
+#: variables from which on memory counts: single passes are compiled too, no cuts are kept, what is alike is not read
+#: again
+WIDE = 10_000
+#: and from which on threads share them
+SHARED = 200_000
+#: where a pass does little, so that making threads would cost as much
+LIGHT = 400_000
+#: up to which Python is faster with numbers than NumPy
+FEW = 8
+
+
+def steepest(gradients: Floats) -> Floats:
+    """The largest size of an entry of each row (R,) of gradients (R, N); NaN where one is NaN."""
+    if gradients.shape[1] < WIDE:
+        return np.asarray(np.abs(gradients).max(axis=1, initial=0.0))
+    return np.array([_largest(np.ascontiguousarray(row)) for row in gradients])
+
+
+def finite(numbers: Floats) -> bool:
+    """Whether all are."""
+    if numbers.size <= FEW:
+        return all(map(isfinite, numbers.ravel().tolist()))
+    if numbers.size < WIDE or not numbers.flags.c_contiguous:
+        return bool(np.isfinite(numbers).all())
+    return isfinite(_largest(numbers.reshape(-1)))
+
+
+def _largest(x: Floats) -> float:
+    """max |x| of very many; NaN where one is NaN."""
+    return wide_largest(x, threads_for(len(x), LIGHT))
+
+
+def total(a: Floats, x: Floats) -> float:
+    """a x of very many variables, summed in a fixed order."""
+    return wide_sum(a, x, threads_for(len(x), LIGHT))
+
+
+def stride(n: int, sample: int) -> int:
+    """Every how many of n variables one is in a sample of about so many; no common factor: no grid's rhythm is met."""
+    found = max(1, n // sample)
+    while gcd(found, n) != 1:
+        found += 1
+    return found
+
+
+def threads_for(n: int, enough: int | None = None) -> int:
+    """How many threads share a pass over n variables, where sharing pays from `enough` on."""
+    return allowed() if n >= (SHARED if enough is None else max(enough, SHARED)) else 1
