@@ -256,6 +256,7 @@ class _Interior:
         """The best point of the iteration, which ends at rounding, after MAX_STEPS or where no step is possible."""
         point = self._start()
         best: tuple[float, _Point, float, float] | None = None
+        good = False
         step = lately = 0
         while True:
             residuals = self._residuals(point)
@@ -266,9 +267,9 @@ class _Interior:
                 break
             if best is None or score < 0.5 * best[0]:
                 lately = step
-            if best is None or score < best[0]:
-                best = (score, _copied(point), gap, worst)
-            good = best[2] <= ENOUGH_GAP and best[3] <= ENOUGH_RESIDUAL
+            enough = gap <= ENOUGH_GAP and worst <= ENOUGH_RESIDUAL
+            if best is None or (score < best[0] and enough >= good):  # rounding may undo what was solved
+                best, good = (score, _copied(point), gap, worst), enough
             if score <= 1.0 or step == MAX_STEPS or step - lately >= (PATIENCE if good else 5 * PATIENCE):
                 break
             step += 1
@@ -276,8 +277,7 @@ class _Interior:
                 break
         assert best is not None
         _, point, gap, worst = best
-        solved = gap <= ENOUGH_GAP and worst <= ENOUGH_RESIDUAL
-        return self._solution(point, step, solved, gap, worst)
+        return self._solution(point, step, good, gap, worst)
 
     def _start(self) -> _Point:
         """A point inside all cones: near the iterate, levels above all rows."""

@@ -139,3 +139,9 @@ def test_curvature_stays_positive_where_the_function_bends_down(n):
     steps = rng.normal(size=(5, n))
     B = learnt(steps, -2.0 * steps, 1e-3)
     assert np.linalg.eigvalsh(B.dense()).min() > -1e-12
+
+
+def test_a_point_that_counts_as_solved_is_kept_where_rounding_undoes_it() -> None:
+    p = program(1, 1, 4, 4, False, False, 4)
+    p.lines.group[0] = 0
+    assert solve(p).solved
