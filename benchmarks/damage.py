@@ -101,9 +101,9 @@ def apart(work: Callable[[], object], log: Path, after: float | None = None) -> 
 def ready(folder: Path) -> None:
     """Import and load here what the forked processes need, so that they are killed in their work."""
     import mdstopo.cli.show
-    import mdstopo.front.session  # noqa: F401
+    import mdstopo.front.run_front  # noqa: F401
     from mdstopo.case.reader import load_case
-    from mdstopo.session.run import run_session
+    from mdstopo.session.run_session import run_session
 
     run_session(load_case(folder / "case.yaml"))
 
@@ -112,8 +112,8 @@ def _go_on(path: Path, front: bool) -> int:
     """Resume a run or a front, saved after nearly every iteration."""
     import mdstopo.store.checkpoint as checkpoint
     from mdstopo.case.reader import load_case
-    from mdstopo.front.session import Ask, run_front
-    from mdstopo.session.run import run_session
+    from mdstopo.front.run_front import Ask, run_front
+    from mdstopo.session.run_session import run_session
 
     checkpoint.INTERVAL, checkpoint._COST_FACTOR = 0.01, 0.0
     case = load_case(path.parent / "case.yaml")
@@ -169,8 +169,8 @@ def _counts(found: "Counter[str]") -> list[str]:
 
 def _look(path: Path, whole: Path, reached: int, found: "Counter[str]") -> int:
     """What a file holds after a kill: evaluations so far. A finished one is compared, and begun anew."""
-    from mdstopo.store.errors import StoreError
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
+    from mdstopo.store.store_errors import StoreError
 
     if not path.exists():
         found["lost"] += reached > 0
@@ -194,7 +194,7 @@ def _look(path: Path, whole: Path, reached: int, found: "Counter[str]") -> int:
 
 def same(one: Path, other: Path) -> bool:
     """Whether two results hold the same to the bit, wall times aside."""
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
 
     first, second = read_result(one), read_result(other)
     return first.texts == second.texts and _numbers(first.arrays) == _numbers(second.arrays)
@@ -232,7 +232,8 @@ def _commands(folder: Path, count: int, rng: np.random.Generator) -> "Counter[st
             process.kill()
             _, said = process.communicate()
             found["tracebacks"] += 1
-        found["tracebacks"] += "Traceback" in said
+        # a signal may come while Python itself begins, before anything of this package is imported
+        found["tracebacks"] += "Traceback" in said and "Fatal Python error: init_" not in said
         done = _evaluations(path, found)
         found["lost"] += done < found[f"reached {what}"]
         found[f"reached {what}"] = 0 if ended else done
@@ -244,8 +245,8 @@ def _commands(folder: Path, count: int, rng: np.random.Generator) -> "Counter[st
 
 
 def _evaluations(path: Path, found: "Counter[str]") -> int:
-    from mdstopo.store.errors import StoreError
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
+    from mdstopo.store.store_errors import StoreError
 
     try:
         view = read_result(path)
@@ -365,8 +366,8 @@ def _damaged_codes(folder: Path, cache: Path, count: int, rng: np.random.Generat
 
 
 def _damaged_locks(folder: Path, count: int, rng: np.random.Generator) -> "Counter[str]":
-    from mdstopo.store.errors import StoreError
     from mdstopo.store.lock import Lock
+    from mdstopo.store.store_errors import StoreError
 
     found: Counter[str] = Counter()
     result, log, precious = folder / "locked.h5", folder / "log", folder / "precious"

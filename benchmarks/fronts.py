@@ -12,8 +12,8 @@ from benchmarks.scenes import BEST_KNOWN, CASES, IDEAL, NADIR
 from mdstopo import Case, load_case
 from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.measures import REFERENCE, dominated, hypervolume, neighbour_gaps, scaled
-from mdstopo.front.session import Ask, FrontOutcome, run_front
+from mdstopo.front.run_front import Ask, FrontOutcome, run_front
+from mdstopo.plan.front_measures import REFERENCE, dominated, hypervolume, neighbour_gaps, scaled
 
 Floats = NDArray[np.float64]
 

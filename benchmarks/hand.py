@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from mdstopo import Case
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.gsao import Gsao, run
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.scalarisation import Scalarisation
+from mdstopo.settings.optimizer_presets import settings
 
 Floats = NDArray[np.float64]
 #: ends P and Q of one member, in m, global axes, at the start

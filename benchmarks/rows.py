@@ -18,7 +18,7 @@ from mdstopo.general.driver import GeneralDriver
 from mdstopo.general.extremes import FRACTION, STEP
 from mdstopo.general.landings import INTEGRALS
 from mdstopo.optimizer.problem import Floats, Problem, Sample
-from mdstopo.session.starts import make_optimizer
+from mdstopo.starts.single_start import make_optimizer
 
 ROWS = (1, 6, 30, 100)
 CASES = ("restraint", "lander")

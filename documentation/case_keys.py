@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Text, Version, Word
+from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record, Tagged, Vector
-from mdstopo.case.rows import FILE, FileName, Rows, Signals
-from mdstopo.case.schema import FORMAT
+from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
 
 #: where the page tells of tables of time and of rows from files

@@ -20,7 +20,7 @@ if str(ROOT) not in sys.path:  # mkdocs loads this file alone
     sys.path.insert(0, str(ROOT))
 
 from documentation import case_keys, command_pages, maths  # noqa: E402
-from mdstopo.case.schema import json_schema  # noqa: E402
+from mdstopo.case.schema_case import json_schema  # noqa: E402
 
 _MARK = re.compile(r"^<!-- (keys|commands|exit statuses)(?:: (\w+))? -->$", re.MULTILINE)
 

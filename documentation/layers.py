@@ -55,7 +55,13 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
             Box(("front",), "fronts and sweeps", 0.6, 0.4),
         ),
     ),
-    ("a run", (Box(("session",), "start, iterate, save, resume; starts, stages, workers"),)),
+    (
+        "a run",
+        (
+            Box(("session",), "start, iterate, save, resume; stages", 0.0, 0.5),
+            Box(("plan",), "what a front has to solve, in rounds", 0.5, 0.5),
+        ),
+    ),
     (
         "uncertainty",
         (
@@ -63,11 +69,13 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
             Box(("robust",), "samples, measures over them", 0.4, 0.6),
         ),
     ),
+    ("a start", (Box(("starts",), "one start of the optimiser: kernels ready, where it begins, which go on"),)),
     (
         "an evaluation",
         (
-            Box(("engine",), "the evaluator of a case", 0.0, 0.6),
-            Box(("warm",), "the first compilation", 0.6, 0.4),
+            Box(("compile_looking",), "run in another process", 0.0, 0.3),
+            Box(("engine",), "the evaluator of a case", 0.3, 0.4),
+            Box(("warm",), "the first compilation", 0.7, 0.3),
         ),
     ),
     (
@@ -91,7 +99,13 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
     ("motion", (Box(("integrators",), "gauss, runge_kutta, generalized_alpha", 0.0, 0.66, "3", _SPRINGS),)),
     ("forces", (Box(("mechanics",), "relative poses, laws of members, joints, sums over members"),)),
     ("arrays", (Box(("scene",), "a load case as arrays", station="2"),)),
-    ("results", (Box(("store",), "the file: written whole, sealed, read back", station="7"),)),
+    (
+        "results",
+        (
+            Box(("store",), "the file: written whole, sealed, read back", 0.0, 0.55, "7"),
+            Box(("workers",), "the worker pool", 0.55, 0.45),
+        ),
+    ),
     ("optimiser", (Box(("optimizer",), "GSAO and the bundle method; knows no mechanics", station="6"),)),
     ("case", (Box(("case",), "the format: keys, mistakes with their places, immutable objects", station="1"),)),
     (
@@ -102,7 +116,8 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
         "records",
         (
             Box(("evaluation",), "what an evaluation gives back", 0.0, 0.46),
-            Box(("status", "children", "installed", "_version"), "", 0.46, 0.54),
+            Box(("settings",), "the optimiser's options", 0.46, 0.24),
+            Box(("status", "children", "installed", "_version"), "", 0.7, 0.3),
         ),
     ),
 )

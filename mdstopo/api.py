@@ -154,7 +154,7 @@ def optimize(
     resume: go on where the unfinished run in the file stopped; overwrite: replace it.
     Raises CaseError where the case is no optimisation that the engine can do, StoreError for an unusable file.
     """
-    from mdstopo.session.run import run_session
+    from mdstopo.session.run_session import run_session
 
     return run_session(
         case,

@@ -8,6 +8,7 @@ simulation.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -271,13 +272,16 @@ class Evaluator:
 
     def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
         """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
-        if self.beyond:
-            from mdstopo.general.vibration import natural_frequencies
+        scene = self.scenes[load_case]
+        if isinstance(scene, Scene):
+            from mdstopo.mechanics.start_frequencies import natural_frequencies
 
-            driver = self.driver(load_case)
-            assert not isinstance(driver, Driver)
-            return natural_frequencies(driver, self.design(alpha))
-        return self._culprit(load_case).natural_frequencies(self.design(alpha))
+            return natural_frequencies(self._near, scene, self.design(alpha))
+        from mdstopo.general.vibration import natural_frequencies as of_general
+
+        driver = self.driver(load_case)
+        assert not isinstance(driver, Driver)
+        return of_general(driver, self.design(alpha))
 
     # -- how
 
@@ -308,7 +312,9 @@ class Evaluator:
                 reductions = np.array([REDUCTIONS[each.over_time] for each in looked], dtype=np.int64)
                 alpha = self._design.values
                 integrated = any(each.over_time in INTEGRALS for each in looked)
-                driver = Driver(scene, self._method, tolerance, step, reductions, alpha, self._beside, integrated)
+                driver = Driver(
+                    scene, self._method, _looks, tolerance, step, reductions, alpha, self._beside, integrated
+                )
             else:
                 from mdstopo.general.driver import GeneralDriver
 
@@ -412,6 +418,13 @@ def _total(counts: list[list[int]]) -> list[int]:
 
 def _of_motion(tolerance: float) -> float:
     return min(tolerance, max(LOOSEST, 0.5 * tolerance))
+
+
+def _looks() -> ModuleType:
+    """The compiled entries that look at the steps of springs between free bodies."""
+    from mdstopo.sensitivity import look
+
+    return look
 
 
 def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:

@@ -7,19 +7,18 @@ what is missing is compiled here when it is called.
 """
 
 import contextlib
-import gc
-import importlib
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from mdstopo.children import command, end_with_parent
+from mdstopo.case.model import Case
+from mdstopo.case.reader import read_case
+from mdstopo.children import command
 from mdstopo.compiler.store import cache_folder
+from mdstopo.scene.family import beyond_springs
 
-if TYPE_CHECKING:
-    from mdstopo.case.model import Case
+#: what the other process runs: it stands above the engine, which begins it
+PROGRAM = "mdstopo.compile_looking"
 
 _CASE = """
 format: 1
@@ -48,6 +47,18 @@ def mark_compiled(integrator: str) -> None:
         _marker(integrator).touch()
 
 
+def compiling(case: Case) -> str:
+    """What is said before the kernels for such a case are compiled for the first time."""
+    how_long = "some two minutes" if beyond_springs(case) else "up to half a minute"
+    return f"compiling the kernels, once for this version: {how_long}"
+
+
+def compilation_due(case: Case) -> bool:
+    """Whether the kernels of this version have never been compiled here for such a case."""
+    pattern = "mdstopo.general.*" if beyond_springs(case) else "mdstopo.integrators.*"
+    return next(cache_folder().glob(pattern), None) is None
+
+
 class Beside:
     """Another process that compiles what looks at an integrator's steps, if that has never been compiled here.
 
@@ -61,7 +72,7 @@ class Beside:
         if self.due:
             with contextlib.suppress(OSError):
                 self._child = subprocess.Popen(
-                    command("mdstopo.warm", integrator, *share),
+                    command(PROGRAM, integrator, *share),
                     stdin=subprocess.PIPE,  # its end is how the other process knows of ours
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,
@@ -101,26 +112,6 @@ def _let_go(child: "subprocess.Popen[bytes]") -> None:
         child.stdin.close()
 
 
-def compile_looking(integrator: str) -> None:
-    """Compile here what looks at the steps of an integrator: the work of the other process."""
-    from mdstopo.engine import Evaluator
-    from mdstopo.integrators.driver import Driver
-
-    driver = Evaluator(tiny(integrator), beside=False).driver("default")
-    assert isinstance(driver, Driver)
-    driver.compile_looking()
-
-
-def tiny(integrator: str) -> "Case":
-    from mdstopo.case.reader import read_case
-
+def tiny(integrator: str) -> Case:
+    """A body on a spring: the smallest case that needs all kernels of an integrator."""
     return read_case(_CASE.format(integrator=integrator))
-
-
-if __name__ == "__main__":
-    end_with_parent(sys.stdin.buffer)
-    gc.disable()  # as in `session.ready`
-    for module in sys.argv[2:]:
-        importlib.import_module(module).compile_share()
-    compile_looking(sys.argv[1])
-    gc.freeze()  # it would be looked through at the end as well

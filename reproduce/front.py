@@ -7,9 +7,9 @@ import numpy as np
 from benchmarks.scenes import BEST_KNOWN, IDEAL, NADIR
 from mdstopo import load_case
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.measures import REFERENCE, dominated, hypervolume, scaled
-from mdstopo.front.session import Ask, run_front
-from mdstopo.plots import design, front, layout
+from mdstopo.front.run_front import Ask, run_front
+from mdstopo.plan.front_measures import REFERENCE, dominated, hypervolume, scaled
+from mdstopo.plots import design_plot, front_plot, layout_plot
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import save, styled
 from reproduce.desk import CASES, Desk, Numbers
@@ -32,7 +32,7 @@ def figure_7(desk: Desk) -> Numbers:
         volume = hypervolume(scaled(good, IDEAL, NADIR), np.full(2, REFERENCE)) / BEST_KNOWN
         numbers[name] = {"hypervolume": volume, "middle": points[MIDDLE].tolist(), "on the front": len(good)}
         with styled() as module:
-            save(front.draw(module, Source(path), marked=MIDDLE), desk.path(f"fig7-{name}.png"))
+            save(front_plot.draw(module, Source(path), marked=MIDDLE), desk.path(f"fig7-{name}.png"))
     numbers["apart"] = float(np.abs(found["direct"] / found["iterative"] - 1.0).max())
     return numbers
 
@@ -62,8 +62,8 @@ def figure_8(desk: Desk) -> Numbers:
     """The design of weights 0.5 and 0.5: its variables, and what it looks like."""
     source = Source(desk.path("fig7-direct.h5"), MIDDLE)
     with styled() as module:
-        save(design.draw(module, source), desk.path("fig8.png"))
-        save(layout.draw(module, source), desk.path("fig8-layout.png"))
+        save(design_plot.draw(module, source), desk.path("fig8.png"))
+        save(layout_plot.draw(module, source), desk.path("fig8-layout.png"))
     alpha = source.alpha
     return {
         "volume": float(alpha.sum()),

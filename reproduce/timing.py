@@ -5,7 +5,7 @@ import time
 from statistics import median
 
 from mdstopo import evaluate, load_case
-from mdstopo.session.starts import make_optimizer
+from mdstopo.starts.single_start import make_optimizer
 from reproduce.desk import CASES, Desk, Numbers
 
 #: seconds an iteration that the paper reports (3.2 GHz Xeon, 8 GB)

@@ -7,8 +7,8 @@ import numpy as np
 from benchmarks.scenes import CASES
 from mdstopo import load_case, optimize
 from mdstopo.bench.tables import Table
-from mdstopo.optimizer.starts import Family, design_of_family
-from mdstopo.session.engine import make_engine
+from mdstopo.evaluators import make_engine
+from mdstopo.optimizer.start_families import Family, design_of_family
 
 #: scenes whose stated design leads to an optimum that is not the best; draws of each family
 SCENES, DRAWS = ("fig6", "fig7-g2"), 8

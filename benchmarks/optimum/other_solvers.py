@@ -20,7 +20,7 @@ from benchmarks.optimum.kkt import SIGNS, competing, gradient_of, volume_rows
 from benchmarks.optimum.measure import excess, value_of
 from mdstopo import Case, evaluate
 from mdstopo.case.model import ResponseRow
-from mdstopo.optimizer.projection import project
+from mdstopo.optimizer.nearest_feasible import project
 
 Floats = NDArray[np.float64]
 

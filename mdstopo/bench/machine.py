@@ -4,6 +4,8 @@ import os
 import platform
 from pathlib import Path
 
+from mdstopo._version import __version__
+
 
 def description() -> str:
     """One sentence: `system`, and how busy the machine was."""
@@ -14,8 +16,6 @@ def system() -> str:
     """Processor, cores, operating system, versions."""
     import numba
     import numpy
-
-    from mdstopo import __version__
 
     return (
         f"{_processor()}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}; "

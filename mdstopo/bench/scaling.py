@@ -15,6 +15,8 @@ import numpy as np
 from mdstopo.bench.scenes import STEPS, chain, plate
 from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.starts.single_start import make_optimizer
 
 if TYPE_CHECKING:
     from mdstopo.optimizer.problem import Floats, Problem, Sample
@@ -76,9 +78,6 @@ def _members(n: int) -> Size:
     began = time.perf_counter()
     case = read_case(text)
     read = time.perf_counter() - began
-    from mdstopo.engine import Evaluator
-    from mdstopo.session.starts import make_optimizer
-
     began = time.perf_counter()
     evaluator = Evaluator(case)
     problem = evaluator.problem()
@@ -198,8 +197,6 @@ def _bars(found: Sequence[Size]) -> list[str]:
 
 def _bodies(n: int) -> tuple[float, float, float]:
     """Seconds of reading, of an evaluation without and of one with gradient, of a chain."""
-    from mdstopo.engine import Evaluator
-
     began = time.perf_counter()
     case = read_case(chain(n))
     read = time.perf_counter() - began

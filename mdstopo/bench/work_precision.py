@@ -18,6 +18,7 @@ from mdstopo.bench.timing import interleaved
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.plots.style import COLOURS, MARKERS, new_figure, save, styled
 from mdstopo.scene.family import beyond_springs
 
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
@@ -125,8 +126,6 @@ def draw(case: Case, points: Sequence[Point], path: Path) -> None:
 
     Raises StoreError where matplotlib is missing or the picture cannot be written.
     """
-    from mdstopo.plots.style import COLOURS, MARKERS, new_figure, save, styled
-
     with styled() as module:
         figure, axes = new_figure(module, 2)
         lines: dict[tuple[str, str], list[Point]] = {}

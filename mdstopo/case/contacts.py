@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.geometry import Frames, in_range
 from mdstopo.case.model import Contact, PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, shown
 
 

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, FrozenDict
-from mdstopo.case.geometry import Frames
+from mdstopo.case.design_variables import prices
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.schema import SENSES
+from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
-from mdstopo.case.variables import prices
+from mdstopo.case.start_geometry import Frames
 from mdstopo.case.volume import check_feasible
 from mdstopo.case.words import inside, listed, number_text, shown
 

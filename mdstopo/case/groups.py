@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray, Table
-from mdstopo.case.geometry import Frames
 from mdstopo.case.memory import BYTES_PER_MEMBER, total_memory
 from mdstopo.case.model import GROUND, LAWS, CurveLaw, Law, MemberGroup, PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import count_text, inside, number_text
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.geometry import Frames, in_range
 from mdstopo.case.model import (
     GROUND,
     Bushing,
@@ -22,6 +21,7 @@ from mdstopo.case.model import (
     RevoluteJoint,
 )
 from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, listed, shown
 
 

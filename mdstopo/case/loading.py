@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Signal, Table
-from mdstopo.case.geometry import Frames
 from mdstopo.case.model import GROUND, Body, Load, LoadCase, Motion, Pair
 from mdstopo.case.motions import Start
 from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside, number_text
 
 DEFAULT = "default"

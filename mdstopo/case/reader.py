@@ -13,8 +13,8 @@ from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.contacts import build_contacts
+from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.errors import CaseError, Mistake
-from mdstopo.case.geometry import Frames, build_body, build_points
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
 from mdstopo.case.links import build_bushings, build_joints, declare_joints
@@ -24,9 +24,9 @@ from mdstopo.case.motions import build_motions, merged, resolve_starts, start_an
 from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reading import BAD, Fields, Reading, found
-from mdstopo.case.schema import FORMAT
+from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
-from mdstopo.case.variables import build_shared, build_variables
+from mdstopo.case.start_geometry import Frames, build_body, build_points
 from mdstopo.case.words import inside
 
 _SECTIONS = {

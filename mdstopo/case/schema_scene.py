@@ -1,10 +1,10 @@
-"""Format 1 of the case file: bodies, joints, motions, points, members, loads. See `mdstopo.case.schema`."""
+"""Format 1 of the case file: bodies, joints, motions, points, members, loads. See `mdstopo.case.schema_case`."""
 
 from __future__ import annotations
 
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Word, explained
+from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Record, Tagged, Vector
-from mdstopo.case.rows import Rows, Signals
 
 NUMBER = Number()
 POSITIVE = Number(above=0)

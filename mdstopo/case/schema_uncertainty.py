@@ -1,4 +1,4 @@
-"""Format 1 of the case file: the section `uncertainty`. See `mdstopo.case.schema`."""
+"""Format 1 of the case file: the section `uncertainty`. See `mdstopo.case.schema_case`."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ from typing import Any
 
 from mdstopo.case.kinds import Kind, Number, Schema, explained
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node
+from mdstopo.case.number_rows import Rows
 from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.records import ByName, Key, Named, Record
-from mdstopo.case.rows import Rows
 from mdstopo.case.schema_scene import NOT_NEGATIVE, NUMBER, POSITIVE
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside

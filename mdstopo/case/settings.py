@@ -10,7 +10,7 @@ from mdstopo.case.loading import Window
 from mdstopo.case.model import OptimizerSettings, SolverSettings
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.words import count_text, inside, number_text
-from mdstopo.optimizer.options import OPTIONS
+from mdstopo.settings.optimizer_options import OPTIONS
 
 MOST_STEPS = 10**8
 """Fixed steps in one load case; more would neither end nor fit in memory."""

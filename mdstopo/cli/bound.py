@@ -12,7 +12,7 @@ from mdstopo.cli.output import Output, number
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
     from mdstopo.limiting.compare import Compared
-    from mdstopo.store.reader import ResultView
+    from mdstopo.store.result_reader import ResultView
 
 
 @click.command("bound")
@@ -31,7 +31,7 @@ def command(case_path: Path, result_file: Path | None, overrides: dict[str, str]
     """
     from mdstopo.case.reader import load_case
     from mdstopo.limiting.compare import compared
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
 
     output = Output(json=as_json, quiet=quiet)
     case = load_case(case_path, overrides)

@@ -7,7 +7,7 @@ import click
 
 from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
 from mdstopo.cli.output import Output, number
-from mdstopo.cli.uncertain import say_sample
+from mdstopo.cli.uncertain_numbers import say_sample
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case

@@ -22,9 +22,9 @@ def command(result_path: Path, kind: str | None, out: Path | None, quiet: bool) 
         raise click.UsageError("say --csv or --json")
     from mdstopo.store.admit import made_from
     from mdstopo.store.atomic import replace_file
-    from mdstopo.store.errors import StoreError
-    from mdstopo.store.export import as_csv, as_json, tables
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.export_tables import as_csv, as_json, tables
+    from mdstopo.store.result_reader import read_result
+    from mdstopo.store.store_errors import StoreError
     from mdstopo.store.stored_case import case_of
 
     output = Output(json=False, quiet=quiet)

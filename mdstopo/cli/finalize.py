@@ -15,7 +15,7 @@ from mdstopo.cli.progress import display
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
-    from mdstopo.finalize.session import Finalized
+    from mdstopo.finalize.finalize_design import Finalized
 
 _SIGNS = {"limit": "<=", "equals": "=", "at_least": ">="}
 
@@ -49,10 +49,10 @@ def command(
         raise click.UsageError("say --keep or --threshold, one of them")
     if threshold is not None and not math.isfinite(threshold):
         raise click.BadParameter(f"{threshold} is no alpha", param_hint="--threshold")
-    from mdstopo.finalize.session import finalize, opened, ready, tied
+    from mdstopo.finalize.finalize_design import finalize, opened, ready, tied
     from mdstopo.store.atomic import replace_file
-    from mdstopo.store.errors import StoreError
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
+    from mdstopo.store.store_errors import StoreError
 
     output = Output(json=as_json, quiet=quiet)
     interrupts = Interrupts(quiet)

@@ -9,7 +9,7 @@ from mdstopo.cli.output import duration, number
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from mdstopo.front.session import Snapshot
+    from mdstopo.front.run_front import Snapshot
 
 _ROWS = 25  # points that a table shows at once
 

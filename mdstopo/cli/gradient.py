@@ -87,7 +87,7 @@ def command(
 
     The first method is the reference; differences are relative to its largest entry.
     """
-    from mdstopo.store.output import output_file
+    from mdstopo.store.output_file import output_file
 
     output = Output(json=as_json, quiet=quiet)
     methods = tuple(dict.fromkeys(methods or ("adjoint", "direct")))

@@ -76,8 +76,8 @@ def _stamp(path: Path) -> tuple[int, int] | None:
 
 def _is_unfinished(path: Path) -> bool:
     """Whether a file holds a result that `--resume` continues."""
-    from mdstopo.store.errors import StoreError
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
+    from mdstopo.store.store_errors import StoreError
 
     large = ("trajectories", "sensitivities", "optimizer", "iterations", "members", "pareto", "sweep", "combine")
     try:

@@ -73,7 +73,7 @@ def command(name: str, out: Path | None, quiet: bool) -> int:
     title = Path(name).stem.replace("_", " ").replace("-", " ") or "case"
     import json
 
-    from mdstopo.store.errors import StoreError
+    from mdstopo.store.store_errors import StoreError
 
     try:
         place.parent.mkdir(parents=True, exist_ok=True)

@@ -105,14 +105,14 @@ def open_design(path: Path | None, case: "Case") -> "NDArray[np.float64]":
     """
     if path is None:
         return case.start
-    from mdstopo.store.design import read_design
+    from mdstopo.store.design_files import read_design
 
     return case.whole(read_design(path, case.n_design, case.space.parts))
 
 
 def check_design(engine: "Evaluator", alpha: "NDArray[np.float64]", path: Path | None) -> None:
     """Refuse a design that the engine cannot take. Raises StoreError."""
-    from mdstopo.store.errors import StoreError
+    from mdstopo.store.store_errors import StoreError
 
     try:
         engine.design(alpha)
@@ -129,7 +129,7 @@ def result_path(out: Path | None, case: "Case", kind: str = "") -> Path:
 
 def announce_compilation(output: Output, case: "Case") -> None:
     """Say that the first run takes longer, before it does."""
-    from mdstopo.session.engine import compilation_due, compiling
+    from mdstopo.warm import compilation_due, compiling
 
     if compilation_due(case):
         output.notice(compiling(case))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from mdstopo.case.model import Case
-    from mdstopo.front.session import Ask, FrontOutcome
+    from mdstopo.front.run_front import Ask, FrontOutcome
 
 METHODS = ("weighted_exponential", "weighted_sum", "weighted_min_max", "weighted_product", "nbi", "nc")
 DEFAULT_CASE = Path("cases/fig7.yaml")
@@ -83,7 +83,7 @@ def command(
     output = Output(json=as_json, quiet=quiet)
     interrupts = Interrupts(quiet)
     case = open_case(case_path, overrides)
-    from mdstopo.front.session import check, run_front
+    from mdstopo.front.run_front import check, run_front
 
     check(case)
     line = shlex.join(["mdstopo", *sys.argv[1:]])
@@ -123,8 +123,8 @@ def _asked(
     case: "Case", earlier: Path | None, weights: str | None, points: int | None, method: str | None, starts: int | None
 ) -> "Ask":
     """What is to be computed; what is not said is as in the file that is resumed, else as in the case."""
-    from mdstopo.front.session import Ask
-    from mdstopo.store.reader import read_result
+    from mdstopo.front.run_front import Ask
+    from mdstopo.store.result_reader import read_result
 
     if earlier is not None and earlier.exists():
         view = read_result(earlier, leave_out=("pareto/tasks", "pareto/visited", "members"))
@@ -159,7 +159,7 @@ def _directions(case: "Case", weights: str | None, points: int | None) -> "NDArr
 
 
 def front_rows(names: list[str], part: "Mapping[str, Any]") -> list[list[str]]:
-    """A front as a table: the columns of `pareto/...`, with those of further points behind (`store.front`)."""
+    """A front as a table: the columns of `pareto/...`, with those of further points behind (`store.whole_front`)."""
     from mdstopo.status import RunStatus
 
     rows = [["point", *(f"weight {name}" for name in names), *names, "status", "evaluations", "KKT", ""]]
@@ -184,7 +184,7 @@ def front_rows(names: list[str], part: "Mapping[str, Any]") -> list[list[str]]:
 
 def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[str, Any]") -> list[list[str]]:
     """Utopia and maxima that the points were found with, and how good the front is."""
-    from mdstopo.front.measures import REFERENCE
+    from mdstopo.plan.front_measures import REFERENCE
 
     rows = [
         [title, ", ".join(f"{name} {number(value)}" for name, value in zip(names, part[title][0], strict=True))]
@@ -202,7 +202,7 @@ def quality_rows(names: list[str], numbers: "Mapping[str, Any]", part: "Mapping[
 
 
 def _say(output: Output, outcome: "FrontOutcome") -> None:
-    from mdstopo.store.front import joined
+    from mdstopo.store.whole_front import joined
 
     case = outcome.case
     output.say(f"{case.title or case.name}: {outcome.status.replace('_', ' ')} - {outcome.reason}")

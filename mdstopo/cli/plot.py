@@ -11,7 +11,7 @@ from mdstopo.cli.output import Output
 
 def _pictures(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[str]:
     """Names of pictures that begin so."""
-    from mdstopo.plots.table import PLOTS
+    from mdstopo.plots.plot_table import PLOTS
 
     return [name for name in PLOTS if name.startswith(incomplete)]
 
@@ -43,9 +43,9 @@ def command(
     WHAT is one of layout, convergence, design, sensitivities, histories, sensitivity-histories, front; without it,
     everything that the file has is drawn.
     """
+    from mdstopo.plots.plot_table import PLOTS, fitting
     from mdstopo.plots.source import Source
     from mdstopo.plots.style import save, styled
-    from mdstopo.plots.table import PLOTS, fitting
 
     output = Output(json=as_json, quiet=quiet)
     if what is not None and what not in PLOTS:

@@ -15,8 +15,8 @@ from mdstopo.cli.output import Output
 def command(result_path: Path, out: Path | None, quiet: bool) -> int:
     """Write one self-contained HTML page: the motion, responses, convergence, the front, the case."""
     from mdstopo.plots.source import Source
-    from mdstopo.report.content import content
-    from mdstopo.report.page import page
+    from mdstopo.report.report_content import content
+    from mdstopo.report.report_page import page
     from mdstopo.store.admit import made_from
     from mdstopo.store.atomic import replace_file
 

@@ -23,7 +23,7 @@ from mdstopo.cli.options import (
 )
 from mdstopo.cli.output import Output, duration, number, write
 from mdstopo.cli.progress import display
-from mdstopo.cli.uncertain import document_of, lines_of
+from mdstopo.cli.uncertain_numbers import document_of, lines_of
 
 if TYPE_CHECKING:
     from mdstopo.session.outcome import Outcome
@@ -66,7 +66,7 @@ def command(
     case = open_case(case_path, overrides)
     initial = open_design(alpha_path, case) if alpha_path is not None else None
     path = result_path(out, case)
-    from mdstopo.session.run import run_session
+    from mdstopo.session.run_session import run_session
 
     again = resume_command(case_path, out, overrides, alpha_path, starts, workers)
     with saying_how_to_go_on(output, "run", case.name, path, resume, again), display(quiet) as show:
@@ -155,8 +155,8 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
 
 def _optima(outcome: "Outcome") -> list[list[str]]:
     """The distinct optima that several starts have come to: U, which starts, their evaluations, how the best ended."""
-    from mdstopo.optimizer.starts import family_of
-    from mdstopo.session.quotas import distinct
+    from mdstopo.optimizer.start_families import family_of
+    from mdstopo.starts.quotas import distinct
 
     tolerance, count = outcome.case.optimizer.tolerance, len(outcome.states)
     begun = sum(each is not None for each in outcome.states)

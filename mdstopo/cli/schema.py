@@ -16,13 +16,13 @@ def command(out: Path | None) -> int:
 
     An editor that knows it completes and checks a case while it is typed.
     """
-    from mdstopo.case.schema import json_schema
+    from mdstopo.case.schema_case import json_schema
 
     text = json.dumps(json_schema(), indent=2, ensure_ascii=False)
     if out is None:
         Output().say(text)
         return 0
-    from mdstopo.store.errors import StoreError
+    from mdstopo.store.store_errors import StoreError
 
     try:
         out.write_text(text + "\n", encoding="utf-8")

@@ -8,7 +8,7 @@ import click
 
 from mdstopo.cli.options import output_options, result_argument
 from mdstopo.cli.output import Output, duration, number
-from mdstopo.cli.uncertain import say_result
+from mdstopo.cli.uncertain_numbers import say_result
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from mdstopo.store.reader import ResultView
+    from mdstopo.store.result_reader import ResultView
 
 _ROWS = 12  # iterates that a condensed history shows
 
@@ -27,7 +27,7 @@ _ROWS = 12  # iterates that a condensed history shows
 @output_options
 def command(result_path: Path, count: int, as_json: bool, quiet: bool) -> int:
     """Say in words what a result file holds."""
-    from mdstopo.store.reader import read_result
+    from mdstopo.store.result_reader import read_result
 
     output = Output(json=as_json, quiet=quiet)
     view = read_result(result_path, leave_out=("optimizer", "pareto/tasks", "sweep/tasks", "combine/tasks"))
@@ -146,7 +146,7 @@ def _say_starts(output: Output, view: "ResultView") -> None:
 
 def _say_front(output: Output, view: "ResultView") -> None:
     from mdstopo.cli.pareto import front_rows, quality_rows
-    from mdstopo.store.front import whole_front
+    from mdstopo.store.whole_front import whole_front
 
     front, names = whole_front(view), objective_names(view)
     output.table(front_rows(names, front))

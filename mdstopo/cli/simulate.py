@@ -54,7 +54,7 @@ def command(
     chosen = _load_cases(case, names)
     path = result_path(out, case, "simulate")
     command_line = shlex.join(["mdstopo", *sys.argv[1:]])
-    from mdstopo.store.output import output_file
+    from mdstopo.store.output_file import output_file
 
     with output_file(path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line) as file:
         announce_compilation(output, case)

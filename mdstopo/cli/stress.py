@@ -46,7 +46,7 @@ def command(names: tuple[str, ...], long: bool, folder: Path | None, markdown: b
     outcomes = _run(output, found, markdown)
     failed = [each for each in outcomes if not each.ok]
     if markdown:
-        from mdstopo.stress.page import markdown_of
+        from mdstopo.stress.stress_page import markdown_of
 
         output.say(markdown_of(outcomes))
     else:
@@ -58,7 +58,7 @@ def command(names: tuple[str, ...], long: bool, folder: Path | None, markdown: b
 
 
 def _write(folder: Path, scenes: "Sequence[Scene]") -> None:
-    from mdstopo.store.errors import StoreError
+    from mdstopo.store.store_errors import StoreError
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -70,7 +70,7 @@ def _write(folder: Path, scenes: "Sequence[Scene]") -> None:
 
 def _run(output: Output, scenes: "Sequence[Scene]", markdown: bool) -> "list[Outcome]":
     """Every scene in order; a row is printed when it is done."""
-    from mdstopo.stress.watch import Watch, compiled
+    from mdstopo.stress.scene_watch import Watch, compiled
 
     if not compiled():
         output.notice("scenes take longer the first time, because kernels are compiled: some ten minutes in all")

@@ -23,7 +23,7 @@ from mdstopo.cli.pareto import command as pareto
 from mdstopo.cli.pareto import resumed
 
 if TYPE_CHECKING:
-    from mdstopo.front.sweep import SweepOutcome
+    from mdstopo.front.run_sweep import SweepOutcome
 
 
 @click.group("sweep")
@@ -69,7 +69,7 @@ def set_values(
             raise click.BadParameter(f"{text!r} is not KEY=VALUES", param_hint="'KEY=a:b:step'")
         wanted[key.strip()] = value
     case = open_case(case_path, {})
-    from mdstopo.front.sweep import combinations, run_sweep
+    from mdstopo.front.run_sweep import combinations, run_sweep
 
     try:
         combinations(wanted)

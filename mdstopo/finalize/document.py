@@ -15,15 +15,15 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.geometry import Frames
 from mdstopo.case.model import GROUND, Body, Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
+from mdstopo.case.number_rows import rows_in
 from mdstopo.case.overrides import apply_overrides
-from mdstopo.case.rows import rows_in
+from mdstopo.case.start_geometry import Frames
 from mdstopo.finalize.apart import free_name
-from mdstopo.finalize.laws import sized as sized_law
+from mdstopo.finalize.scaled_laws import sized as sized_law
 from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
-from mdstopo.store.errors import StoreError
+from mdstopo.store.store_errors import StoreError
 
 Plain = dict[str, Any]
 _LARGEST = ("max", "max_abs")

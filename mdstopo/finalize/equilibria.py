@@ -16,6 +16,7 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case
 from mdstopo.case.words import number_text, shown
 from mdstopo.engine import Evaluator
+from mdstopo.general.start import size_of
 
 if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
@@ -69,8 +70,6 @@ class _Distance:
     """How far the bodies of a case are apart in two states (n,)."""
 
     def __init__(self, case: Case, one: FloatArray, other: FloatArray) -> None:
-        from mdstopo.general.start import size_of
-
         shift = np.abs(one - other).reshape(-1, 3)
         distance = np.hypot(shift[:, 0], shift[:, 1])
         names = [body.name for body in case.bodies]
@@ -94,8 +93,6 @@ def _followed(
 ) -> FloatArray | None:
     """The equilibrium (n,) of the design `end`, followed from that of `begin`, q; None where it jumps or ends."""
     from mdstopo.general.settle import settle
-    from mdstopo.general.start import size_of
-
     size, share, step = size_of(case), 0.0, FIRST
     while share < 1.0:
         step = min(step, 1.0 - share)

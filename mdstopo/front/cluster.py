@@ -15,9 +15,9 @@ from typing import Any
 
 from mdstopo._version import __version__
 from mdstopo.front.jobs import Job, Setting, perform
-from mdstopo.front.pool import PATIENCE, Keep, Lost, ignore_both
-from mdstopo.session.errors import WorkerError
-from mdstopo.store.errors import StoreError
+from mdstopo.front.pool import Keep, ignore_both
+from mdstopo.store.store_errors import StoreError
+from mdstopo.workers.worker_pool import PATIENCE, Lost, WorkerError
 
 #: engines are for one thread at a time, and a Dask worker may have several
 _one_at_a_time = threading.Lock()

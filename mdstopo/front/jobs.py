@@ -1,4 +1,4 @@
-"""What a worker does: solve a task of a front, or run a case of a sweep. The same in every process."""
+"""A piece of work: a task of a front that is solved, or a case of a sweep that is run. The same in every process."""
 
 import platform
 import time
@@ -9,12 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case, FloatArray
-from mdstopo.front.tasks import Found, StoppedError, Task, failed, solve
+from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.state import State
-from mdstopo.session.combining import even, problem_of
-from mdstopo.session.engine import Engine, make_engine
-from mdstopo.session.ready import compile_apart, get_ready
+from mdstopo.plan.solve_task import Found, Task, failed, solve
+from mdstopo.session.combining import NoUtopiaError
+from mdstopo.session.compiling_apart import compile_apart
+from mdstopo.session.run_session import run_session
+from mdstopo.starts.callbacks import ignore
+from mdstopo.starts.evaluator_interface import Engine, even, problem_of
+from mdstopo.starts.getting_ready import get_ready
+from mdstopo.status import RunStatus
+from mdstopo.workers.worker_pool import Parent, Perform, StoppedError
 
 
 @dataclass(frozen=True)
@@ -60,6 +67,15 @@ def perform(
         return failed(job.point, job.key(setting.case_key), job.start, len(setting.case.objectives), words)
 
 
+def open_jobs(setting: Setting) -> Perform:
+    """In a worker: what does one piece after the other."""
+
+    def work(job: Job, parent: Parent) -> Any:
+        return perform(setting, job, parent.stopped, lambda state: parent.keep(state.to_arrays))
+
+    return work
+
+
 def first(case: Case) -> FloatArray:
     """The optimiser's x of the initial design."""
     return case.space.reduce(case.start)
@@ -69,12 +85,13 @@ def ready_engine(setting: Setting) -> Engine:
     """The case's engine, its kernels loaded in the one order that makes results repeat to the bit (`ready`)."""
     found = _engines.get(setting.case_key)
     if found is None:
-        compile_apart(setting.case, lambda _: None)  # on a machine where nothing has been compiled yet
+        compile_apart(setting.case, ignore)  # on a machine where nothing has been compiled yet
         found = make_engine(setting.case)
         if setting.case.uncertainty is not None:
-            from mdstopo.robust.helpers import compile_kinds
+            from mdstopo.robust.uncertain_run import kinds
 
-            compile_kinds(found, lambda _: None)
+            for kind in kinds(found):
+                compile_apart(kind, ignore)
         get_ready(setting.case, found, problem_of(found, even(setting.case)), None)
         _engines[setting.case_key] = found
         if len(_engines) > _KEPT:
@@ -84,11 +101,6 @@ def ready_engine(setting: Setting) -> Engine:
 
 def run_trial(trial: Trial, stop: Callable[[], bool] | None = None) -> Found:
     """The whole run of one case of a sweep; mistakes that only it has become its status."""
-    from mdstopo.case.errors import CaseError
-    from mdstopo.session.errors import NoUtopiaError
-    from mdstopo.session.run import run_session
-    from mdstopo.status import RunStatus
-
     began = time.perf_counter()
     m = len(trial.case.objectives)
     try:

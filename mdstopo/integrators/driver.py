@@ -7,7 +7,7 @@ little, and gives the steps more room when the kernel asks for it.
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.packing import Packed, aligned, pack
 from mdstopo.status import Status
-from mdstopo.warm import Beside
 
 #: how near to the highest a peak competes, and how many are kept
 CLOSENESS = 0.15
@@ -31,8 +30,8 @@ ROWS = 4
 class Method:
     """An integrator as the engine sees it.
 
-    name: as in the case file. load: imports its compiled entries (simulate, look, dense). tables: its constant
-    arrays. steps, stages: room to begin with.
+    name: as in the case file. load: imports its compiled entries (simulate). tables: its constant arrays. steps,
+    stages: room to begin with.
     """
 
     name: str
@@ -40,6 +39,17 @@ class Method:
     tables: FloatArray
     steps: int
     stages: int
+
+
+class Compiling(Protocol):
+    """Another process that may be compiling what looks at steps (`warm.Beside`).
+
+    due: whether that has never been compiled here; wait: until the process has ended.
+    """
+
+    due: bool
+
+    def wait(self) -> None: ...
 
 
 class Looked(NamedTuple):
@@ -65,24 +75,28 @@ class Looked(NamedTuple):
 class Driver:
     """One scene, one method, ready to run.
 
-    alpha (N,): the array that every design is put in; shared with whoever gives designs. integrated: whether something
-    is looked at that is integrated over time, so that steps have to be good for that, too.
+    looks: imports the compiled entries that look at steps (look, dense). alpha (N,): the array that every design is put
+    in; shared with whoever gives designs. integrated: whether something is looked at that is integrated over time, so
+    that steps have to be good for that, too.
     """
 
     def __init__(
         self,
         scene: Scene,
         method: Method,
+        looks: Callable[[], ModuleType],
         tolerance: float,
         step: float,
         reductions: IndexArray,
         alpha: FloatArray,
-        beside: Beside | None = None,
+        beside: Compiling | None = None,
         integrated: bool = False,
     ) -> None:
         self.scene = scene
         self.method = method
         self._entry: Any = None
+        self._load_looking = looks
+        self._looking: Any = None
         self._beside = beside
         self.packed = self._plain = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
@@ -121,13 +135,20 @@ class Driver:
         if self._beside is not None:
             self._beside.wait()
             self._beside = None
-        return self.entry
+        return self._looking_entries
+
+    @property
+    def _looking_entries(self) -> Any:
+        """Behind the method's own: these enter what the method offers to whatever looks at its steps."""
+        if self._looking is None and self.entry is not None:
+            self._looking = self._load_looking()
+        return self._looking
 
     def compile_looking(self) -> None:
         """Compile what looks at the steps, without running it."""
-        self.entry.look.compile(*self._look_arguments(0, True))
+        self._looking_entries.look.compile(*self._look_arguments(0, True))
         room = self.limits, self.room, self.room_ints, self.strength
-        self.entry.dense.compile(*self._dense_arguments(0, *room))
+        self._looking_entries.dense.compile(*self._dense_arguments(0, *room))
 
     def _make_rows(self, most: int) -> None:
         """Arrays for so many peaks of each objective."""

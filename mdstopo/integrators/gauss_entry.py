@@ -2,6 +2,5 @@
 
 import mdstopo.integrators.gauss_linear  # noqa: F401  (enters the method's functions in the contract's table)
 from mdstopo.integrators.gauss import TAG, simulate
-from mdstopo.sensitivity.look import dense, look
 
-__all__ = ["TAG", "dense", "look", "simulate"]
+__all__ = ["TAG", "simulate"]

@@ -15,9 +15,8 @@ from mdstopo.integrators.steps import carve
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.passes import scale_members
 from mdstopo.scene.packing import unpack
-from mdstopo.sensitivity.look import dense, look
 
-__all__ = ["TAG", "dense", "look", "rate_at_start", "simulate"]
+__all__ = ["TAG", "rate_at_start", "simulate"]
 
 
 @entry

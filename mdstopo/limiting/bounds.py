@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from mdstopo.case.aims import Objective
 from mdstopo.case.model import Case
 from mdstopo.case.units import unit_of_value, words
-from mdstopo.limiting.forces import restrictions
+from mdstopo.limiting.force_limits import restrictions
 from mdstopo.limiting.program import ImpossibleError, Program
 from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row
 from mdstopo.limiting.solve import UnsolvedError

@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
+from mdstopo.case.stages import stage_count
 from mdstopo.limiting.bounds import Bound, bounds
-from mdstopo.store.errors import StoreError
-from mdstopo.store.front import whole_front
+from mdstopo.store.store_errors import StoreError
+from mdstopo.store.whole_front import whole_front
 
 if TYPE_CHECKING:
-    from mdstopo.store.reader import ResultView
+    from mdstopo.store.result_reader import ResultView
 
 #: excess over a limit, relative to it, up to which a design counts as keeping it
 TOLERATED = 1e-6
@@ -95,7 +96,5 @@ def _kept(case: Case, view: ResultView) -> NDArray[np.bool_]:
         over = {"limit": excess[:, i], "at_least": -excess[:, i], "equals": np.abs(excess[:, i])}[row.sense]
         good &= over <= TOLERATED * (abs(row.bound) or 1.0)
     if "iterations/stage" in view.arrays:
-        from mdstopo.case.stages import stage_count
-
         good &= np.asarray(view.array("iterations/stage")) == stage_count(case) - 1
     return good

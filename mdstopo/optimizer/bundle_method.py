@@ -1,14 +1,12 @@
 """The optimiser's piece for rows that compete, as steps of the driver: begin at an iterate, judge a trial, propose one.
 
-Everything between two steps is in `State`. What is solved, and how, is in `rows`.
+Everything between two steps is in `State`. What is solved, and how, is in `competing_rows`.
 """
 
 import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.presets import Settings
-from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
-from mdstopo.optimizer.rows import (
+from mdstopo.optimizer.competing_rows import (
     FLOOR,
     MARGIN,
     NOTHING,
@@ -20,8 +18,10 @@ from mdstopo.optimizer.rows import (
     RowModel,
     Trial,
 )
+from mdstopo.optimizer.problem import Floats, Sample, largest_of_groups
 from mdstopo.optimizer.safeguards import is_least, merit, plain_violation, residual_unit, scaled_violation
 from mdstopo.optimizer.state import State
+from mdstopo.settings.optimizer_presets import Settings
 
 #: the box after the rows were forgotten, and when another piece begins, in ranges
 RESET_TRUST = 0.05

@@ -11,10 +11,10 @@ from math import isfinite
 
 import numpy as np
 
-from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Sample
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_numbers import finite, steepest
+from mdstopo.settings.optimizer_presets import Settings
 from mdstopo.status import RunStatus, Status
 
 # Least and largest weight of the convex term, relative to the largest gradient entry over the range.

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.optimizer.approximation import Approximation
+from mdstopo.optimizer.competing_rows import FeasibleSet
 from mdstopo.optimizer.interior import Optimum
-from mdstopo.optimizer.presets import Settings
 from mdstopo.optimizer.problem import Floats, Sample
-from mdstopo.optimizer.rows import FeasibleSet
 from mdstopo.optimizer.safeguards import (
     CUT_SHRINK,
     PENALTY_CEILING,
@@ -36,6 +35,7 @@ from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.subproblem import solve
 from mdstopo.optimizer.wide import Measures, ShiftRule, is_wide, next_wide_shift, propose
 from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.settings.optimizer_presets import Settings
 from mdstopo.status import RunStatus
 
 Indices = NDArray[np.intp]

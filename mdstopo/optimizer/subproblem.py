@@ -10,8 +10,8 @@ import numpy as np
 from mdstopo.optimizer.approximation import Approximation
 from mdstopo.optimizer.dual import closed_form, solve_dual
 from mdstopo.optimizer.interior import Optimum, interior_point
+from mdstopo.optimizer.nearest_feasible import repair
 from mdstopo.optimizer.problem import Floats, LinearRows
-from mdstopo.optimizer.projection import repair
 
 
 def solve(model: Approximation, lower: Floats, upper: Floats, linear: LinearRows, penalty: Floats) -> Optimum:

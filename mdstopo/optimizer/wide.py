@@ -21,15 +21,15 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.optimizer.presets import Settings
+from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows
-from mdstopo.optimizer.projection import ROUNDING, repair
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import SAMPLE, SOLVED, wide_minimum, wide_rows
 from mdstopo.optimizer.wide_numbers import LIGHT, WIDE, steepest, stride, threads_for, total
 from mdstopo.optimizer.wide_passes import PIECE, wide_change, wide_look, wide_shift, wide_shift_few
 from mdstopo.optimizer.wide_slots import COST, HIGH, LOW, SLOTS
+from mdstopo.settings.optimizer_presets import Settings
 
 Indices = NDArray[np.intp]
 T = TypeVar("T")

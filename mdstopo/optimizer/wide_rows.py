@@ -1,4 +1,4 @@
-"""The bundle method's subproblems with very many variables: what `rows.DenseModel` is for fewer.
+"""The bundle method's subproblems with very many variables: what `competing_rows.DenseModel` is for fewer.
 
 All rows are lines. Those that a subproblem is made of lie in one matrix (`Pool`), which compiled passes go through a
 few times for each solution (`wide_program`); nothing else of the size of rows times variables is formed.
@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.competing_rows import FLOOR, MATCH_COSINE, Around, FeasibleSet, Trial
+from mdstopo.optimizer.nearest_feasible import ROUNDING, repair
 from mdstopo.optimizer.problem import Floats, Ints, largest_of_groups
-from mdstopo.optimizer.projection import ROUNDING, repair
-from mdstopo.optimizer.rows import FLOOR, MATCH_COSINE, Around, FeasibleSet, Trial
 from mdstopo.optimizer.stack import Slopes, Stack, joined
 from mdstopo.optimizer.wide import Measures
 from mdstopo.optimizer.wide_classes import combined, gram, projected
@@ -75,7 +75,10 @@ class Pool:
 
 
 class WideModel:
-    """The duties of `rows.RowModel` for very many variables. space: the problem's; measures: those of the driver."""
+    """The duties of `competing_rows.RowModel` for very many variables.
+
+    space: the problem's; measures: those of the driver.
+    """
 
     def __init__(self, space: FeasibleSet, measures: Measures) -> None:
         self.space, self.measures = space, measures
@@ -171,8 +174,11 @@ class WideModel:
 
 @dataclass(frozen=True, slots=True)
 class _WideAround:
-    """As `rows.Around`. curvature: that of all variables, in ranges if `scaled`; learnt: steps and changes (2 m rows),
-    with their products and M (2 m, 2 m) of B = curvature - Z' M^-1 Z."""
+    """As `competing_rows.Around`.
+
+    curvature: that of all variables, in ranges if `scaled`; learnt: steps and changes (2 m rows), with their products
+    and M (2 m, 2 m) of B = curvature - Z' M^-1 Z.
+    """
 
     model: WideModel
     x: Floats

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
-from mdstopo.store.errors import DamagedError, StoreError
-from mdstopo.store.front import design_of, points_of
-from mdstopo.store.reader import ResultView, read_result
+from mdstopo.store.result_reader import ResultView, read_result
+from mdstopo.store.store_errors import DamagedError, StoreError
 from mdstopo.store.stored_case import case_of
+from mdstopo.store.whole_front import design_of, points_of
 
 if TYPE_CHECKING:
     from mdstopo.engine import Evaluator

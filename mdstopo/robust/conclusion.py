@@ -9,9 +9,9 @@ from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.case.uncertain import Measure
 from mdstopo.design_problem import sign_of
 from mdstopo.evaluation import Evaluation, FloatArray
-from mdstopo.robust.crew import Crew
 from mdstopo.robust.ensemble import NOMINAL, Ensemble
 from mdstopo.robust.intervals import Estimate, estimate
+from mdstopo.robust.points_in_workers import PointWorkers
 from mdstopo.robust.sample import Sample, check_sample
 from mdstopo.robust.trial import Trial, tried
 from mdstopo.store.contents import Datasets
@@ -64,7 +64,7 @@ class Conclusion:
         return next((each for each in self.results if each.name == name), None)
 
 
-def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, crew: Crew | None) -> Conclusion:
+def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, workers: PointWorkers | None) -> Conclusion:
     """Try the final design alpha (N,), which `found` evaluated, on the nominal case, every point and a fresh sample."""
     case, sample = engine.case, engine.sample
     places = range(len(sample))
@@ -74,7 +74,7 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, crew: Crew 
     responses = _responses(case, found, [{j: parts[i].limits[j][0].value for j in rows} for i in places])
     nominal = engine.points[NOMINAL].evaluate(alpha, gradient=False)
     fresh = check_sample(engine.uncertainty)
-    trials = [] if fresh is None else _trials(case, fresh, alpha, crew)
+    trials = [] if fresh is None else _trials(case, fresh, alpha, workers)
     usable = [trial for trial in trials if not trial.reason]
     lost = len(trials) - len(usable)
     warnings: tuple[str, ...] = ()
@@ -110,9 +110,9 @@ def conclude(engine: Ensemble, alpha: FloatArray, found: Evaluation, crew: Crew 
     return Conclusion(tuple(results), len(trials), lost, part, warnings)
 
 
-def _trials(case: Case, fresh: Sample, alpha: FloatArray, crew: Crew | None) -> list[Trial]:
-    if crew is not None:
-        return crew.trials(case, fresh, alpha)
+def _trials(case: Case, fresh: Sample, alpha: FloatArray, workers: PointWorkers | None) -> list[Trial]:
+    if workers is not None:
+        return workers.trials(case, fresh, alpha)
     return [tried(case, fresh, i, alpha) for i in range(len(fresh))]
 
 

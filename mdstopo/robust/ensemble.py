@@ -16,13 +16,13 @@ from mdstopo.engine import Evaluator
 from mdstopo.error_estimate import ErrorEstimate
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows
 from mdstopo.integrators.steps import WORK_NAMES
-from mdstopo.robust.measures import rows, slopes
 from mdstopo.robust.points import evaluator_at, name_of, nominal_case
+from mdstopo.robust.robust_measures import rows, slopes
 from mdstopo.robust.sample import Sample, design_sample
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.robust.crew import Crew
+    from mdstopo.robust.points_in_workers import PointWorkers
 
 #: the nominal case's place among the points
 NOMINAL = -1
@@ -51,14 +51,14 @@ class Ensemble(Evaluator):
         case: Case,
         beside: bool = True,
         points: dict[int, Evaluator] | None = None,
-        crew: "Crew | None" = None,
+        workers: "PointWorkers | None" = None,
         share: Sequence[str] = (),
     ) -> None:
         assert case.uncertainty is not None
         super().__init__(case, beside, share)
         self.uncertainty = case.uncertainty
         self.sample: Sample = design_sample(case.uncertainty)
-        self.crew = crew
+        self.workers = workers
         self._bounds_here = [row.bound for row in case.constraints]
         measures = [self.uncertainty.objectives[name] for name in self._names]
         measures += [self.uncertainty.constraints[i] for i in self._limits]
@@ -143,7 +143,7 @@ class Ensemble(Evaluator):
         if names not in self._narrower:
             chosen = tuple(objective for objective in self.case.objectives if objective.name in names)
             points = {i: point.looking_at(names) for i, point in self.points.items()}
-            self._narrower[names] = Ensemble(replace(self.case, objectives=chosen), False, points, self.crew)
+            self._narrower[names] = Ensemble(replace(self.case, objectives=chosen), False, points, self.workers)
         found = self._narrower[names]
         assert isinstance(found, Ensemble)
         return found
@@ -155,9 +155,9 @@ class Ensemble(Evaluator):
 
     # -- points
 
-    def employ(self, crew: "Crew | None") -> None:
+    def spread(self, workers: "PointWorkers | None") -> None:
         """Have other processes compute most of the points from now on; None: this one alone."""
-        self.crew = crew
+        self.workers = workers
         self._narrower.clear()
 
     def all_parts(self, alpha: FloatArray) -> dict[int, Part]:
@@ -184,9 +184,9 @@ class Ensemble(Evaluator):
     def _parts(
         self, wanted: Sequence[int], design: FloatArray, gradient: bool, sensitivity: str | None
     ) -> dict[int, Part]:
-        if self.crew is None:
+        if self.workers is None:
             return {i: self.part(i, design, gradient, sensitivity) for i in wanted}
-        return self.crew.parts(self, wanted, design, gradient, sensitivity)
+        return self.workers.parts(self, wanted, design, gradient, sensitivity)
 
     def _verdict_of(self, parts: Mapping[int, Part]) -> tuple[Status, str]:
         """How the points ended as one: as the first that is not usable, else the first whose gradient is one-sided."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from mdstopo.case.uncertain import Measure
 from mdstopo.evaluation import FloatArray
-from mdstopo.robust.measures import statistic
+from mdstopo.robust.robust_measures import statistic
 
 CONFIDENCE = 0.95
 #: by how much, relatively, sums of the same numbers may differ

@@ -9,7 +9,7 @@ from mdstopo.case.model import Case, Uncertainty
 from mdstopo.case.reader import read_case
 from mdstopo.case.words import inside
 from mdstopo.engine import Evaluator
-from mdstopo.robust.alike import other_problem
+from mdstopo.robust.compatible_cases import other_problem
 from mdstopo.robust.sample import Sample
 from mdstopo.scene.refusals import refusals
 

@@ -1,4 +1,4 @@
-"""Who is to blame: members and bodies by name when a motion cannot be computed, and the scene's frequencies.
+"""Who is to blame: members and bodies by name when a motion cannot be computed.
 
 Nothing here is on the path of an evaluation that goes well.
 """
@@ -9,7 +9,6 @@ from mdstopo.case.model import Case
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.grids import places_of
 from mdstopo.scene.model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, STIFFNESS, FloatArray
-from mdstopo.scene.packing import pack
 from mdstopo.status import Status
 
 #: a member this much shorter than at the start, when the step collapses, is what stopped the motion
@@ -70,29 +69,3 @@ class Culprits:
             if ratio[i] < best:
                 best, found = float(ratio[i]), int(places[i])
         return found
-
-    def natural_frequencies(self, design: FloatArray) -> FloatArray:
-        """Angular frequencies (rad/s) of small undamped motion about the start; unstable modes are left out."""
-        model, n, pairs = self.scene.model, len(self.scene.model.inv_mass), len(self.scene.model.pair)
-        strength = model.member[5:8].copy()
-        for block, group in zip(model.block.tolist(), self.case.members, strict=True):
-            if block[DESIGN] >= 0:
-                first = block[DESIGN]
-                strength[:, places_of(block)] *= design[first : first + block[COUNT]] ** group.power
-        from mdstopo.mechanics.start_entry import start_tangents
-
-        strength[1] = 0.0  # undamped
-        k, turn = np.zeros((1, pairs, 6, 6)), np.zeros((1, n))
-        packed = pack(model)
-        start_tangents(packed.ints, packed.floats, strength, self.scene.damped, k, turn)
-        matrix = np.zeros((n, n))
-        for p, (a, b) in enumerate(model.pair.tolist()):
-            rows = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
-            matrix[np.ix_(rows, rows)] += k[0, p]
-        for body in range(0, n, 3):
-            matrix[body : body + 3, body + 2] -= turn[0, body : body + 3]
-        root = np.sqrt(model.inv_mass)
-        values = np.linalg.eigvals(root[:, None] * matrix * root[None, :]).real
-        rounding = 1e-12 * np.abs(values).max(initial=0.0)  # bodies that move freely
-        frequencies: FloatArray = np.sort(np.sqrt(values[values > rounding]))
-        return frequencies

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, Objective, ResponseRow, VolumeRow
-from mdstopo.session.engine import Evaluation
+from mdstopo.starts.evaluator_interface import Evaluation
 from mdstopo.store.contents import Motion
 
 Floats = NDArray[np.float64]

@@ -8,28 +8,23 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.design_problem import sign_of
-from mdstopo.front.plan import NoEndError, Planner, Request, Starts
-from mdstopo.front.tasks import Found, Result, StoppedError, Task, front_key, solve
-from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
-from mdstopo.session.callbacks import ignore
-from mdstopo.session.engine import Engine
-from mdstopo.session.errors import NoUtopiaError
+from mdstopo.plan.front_plan import NoEndError, Planner, Request, Starts
+from mdstopo.plan.solve_task import Found, Result, Task, front_key, solve
+from mdstopo.plan.stored_tasks import begun_part, tasks_part
+from mdstopo.starts.callbacks import ignore
+from mdstopo.starts.evaluator_interface import Engine
 from mdstopo.store.contents import Datasets
+from mdstopo.workers.worker_pool import StoppedError
 
 Floats = NDArray[np.float64]
 
 
-def even(case: Case) -> Scalarisation | None:
-    """Equal weights of raw values: a U to get ready with, which needs no utopia. None for one objective."""
-    count = len(case.objectives)
-    return Scalarisation("weighted_sum", np.full(count, 1.0 / count)) if count > 1 else None
+class NoUtopiaError(Exception):
+    """An objective alone cannot be optimised, so that several cannot be combined."""
 
-
-def problem_of(engine: Engine, scalarisation: Scalarisation | None) -> Problem:
-    """What the optimiser sees."""
-    return engine.problem() if scalarisation is None else engine.problem(scalarisation)
+    exit_status = 1
 
 
 class Combining:
@@ -97,6 +92,7 @@ class Combining:
                         if stop():
                             raise StoppedError
                         self.solved[key] = self._solved(engine, task, key, keep, stop)
+                        self.used.add(key)  # before anything is saved, which leaves out what is not used
                         notify(_sentence(case, task, self.solved[key]))
                         keep()
                     self.used.add(key)
@@ -127,8 +123,6 @@ class Combining:
 
     def part(self, visited: Floats) -> Datasets:
         """What the result file holds of it. visited (K, m): raw values so far, for better utopia than was known."""
-        from mdstopo.front.content import begun_part, tasks_part
-
         kept = [found for key, found in self.solved.items() if key in self.used] or list(self.solved.values())
         part: Datasets = tasks_part(kept, self.case, "combine/tasks") if kept else {}
         part |= begun_part(self.begun, "combine/tasks")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.optimizer.state import State
-from mdstopo.session.stages import iterations_of
+from mdstopo.session.start_in_stages import iterations_of
 from mdstopo.status import RunStatus
 
 if TYPE_CHECKING:

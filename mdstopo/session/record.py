@@ -5,13 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import Case, VolumeRow
-from mdstopo.optimizer.starts import best_run
+from mdstopo.case.model import Case
+from mdstopo.optimizer.start_families import best_run
 from mdstopo.optimizer.state import State
-from mdstopo.session.stages import first_row, furthest, is_done
+from mdstopo.session.start_in_stages import first_row, furthest, is_done
+from mdstopo.starts.constraint_columns import constraint_values
 from mdstopo.store.contents import Datasets, design_part
-from mdstopo.store.errors import DamagedError
-from mdstopo.store.reader import ResultView
+from mdstopo.store.result_reader import ResultView
+from mdstopo.store.store_errors import DamagedError
 
 Array = NDArray[np.generic]
 Floats = NDArray[np.float64]
@@ -49,15 +50,6 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
         "kkt": columns["kkt"],
         "accepted": columns["accepted"],
     }
-
-
-def constraint_values(case: Case, columns: Mapping[str, Array]) -> Floats:
-    """h - h0 of all constraints (K + 1, n_con), in the case's order, from the columns of an optimiser's history."""
-    constraints = columns.get("info/constraints")
-    if constraints is None:
-        signs = [-1.0 if row.sense == "at_least" else 1.0 for row in case.constraints if isinstance(row, VolumeRow)]
-        constraints = columns["constraints"].reshape(len(columns["objective"]), len(signs)) * np.array(signs)
-    return np.asarray(constraints, dtype=np.float64)
 
 
 def best_row(state: State) -> int:

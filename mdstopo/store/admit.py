@@ -5,9 +5,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from mdstopo.case.model import Case
-from mdstopo.store.compare import differences
-from mdstopo.store.errors import DamagedError, DifferentCaseError, StoreError, UnfinishedError
-from mdstopo.store.reader import ResultView, read_result
+from mdstopo.store.result_reader import ResultView, read_result
+from mdstopo.store.same_case import differences
+from mdstopo.store.store_errors import DamagedError, DifferentCaseError, StoreError, UnfinishedError
 
 Notify = Callable[[str], None]
 

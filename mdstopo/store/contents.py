@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from mdstopo.case.model import Case
 from mdstopo.status import Status
-from mdstopo.store.compare import describe
 from mdstopo.store.image import Attribute, Value, encode, texts
 from mdstopo.store.labels import labels
 from mdstopo.store.provenance import Provenance
+from mdstopo.store.same_case import describe
 
 FORMAT = 1
 

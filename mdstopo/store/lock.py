@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 
 from mdstopo.compiler.trusted import NotOursError, open_lock
-from mdstopo.store.errors import InUseError, StoreError
+from mdstopo.store.store_errors import InUseError, StoreError
 
 _LONGEST = 300  # bytes of a holder's name
 _UNSUPPORTED = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS}

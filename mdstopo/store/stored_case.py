@@ -5,7 +5,7 @@ from pathlib import Path
 
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
-from mdstopo.store.reader import ResultView
+from mdstopo.store.result_reader import ResultView
 
 
 def case_of(view: ResultView, changes: Mapping[str, str] | None = None) -> Case:

@@ -13,7 +13,7 @@ import numpy as np
 from h5py import h5a, h5d, h5g, h5l, h5o, h5s, h5t, h5z
 from numpy.typing import NDArray
 
-from mdstopo.store.errors import DamagedError
+from mdstopo.store.store_errors import DamagedError
 
 Array = NDArray[np.generic]
 Texts = dict[str, str | tuple[str, ...]]

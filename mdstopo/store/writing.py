@@ -10,10 +10,10 @@ from h5py import h5d, h5s
 from mdstopo.case.model import Case
 from mdstopo.store.atomic import replace_file
 from mdstopo.store.contents import Datasets, result_image
-from mdstopo.store.errors import UnreadableError
 from mdstopo.store.image import Attribute, as_array
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.seal import read_seal
+from mdstopo.store.store_errors import UnreadableError
 
 #: files that this process has written, and read back when it did so first
 _written: set[Path] = set()

@@ -4,14 +4,13 @@ import math
 import time
 import warnings
 
+from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
 from mdstopo.stress.scene import Outcome, Refused, Scene
 
 
 def judge(scene: Scene) -> Outcome:
     """The outcome of a scene, computed in this process."""
-    from mdstopo.case.errors import CaseError
-    from mdstopo.case.reader import read_case
-
     began = time.perf_counter()
     found, message, note = None, "", ""
     with warnings.catch_warnings():

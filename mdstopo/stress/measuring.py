@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mdstopo.engine import Evaluator
 from mdstopo.stress.scene import Refused
 
 if TYPE_CHECKING:
@@ -24,8 +25,6 @@ INTEGRATORS = (*ADAPTIVE, "generalized_alpha")
 
 def moved(case: "Case", alpha: ArrayLike | None = None) -> "Trajectory":
     """The motion; raises Refused where it ends early."""
-    from mdstopo.engine import Evaluator
-
     (load_case,) = case.load_cases
     motion = Evaluator(case).trajectory(_design(case, alpha), load_case.name)
     if not motion.status.ok:
@@ -35,8 +34,6 @@ def moved(case: "Case", alpha: ArrayLike | None = None) -> "Trajectory":
 
 def valued(case: "Case", alpha: ArrayLike | None = None, gradient: bool = True) -> "Evaluation":
     """Objectives and gradients; raises Refused where there are none."""
-    from mdstopo.engine import Evaluator
-
     found = Evaluator(case).evaluate(_design(case, alpha), gradient)
     if not found.status.usable:
         raise Refused(f"{found.status.value}: {found.message}")

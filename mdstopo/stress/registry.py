@@ -1,4 +1,4 @@
-"""Every family of scenes there is. A new one is a file beside this one and a line here."""
+"""Every family of scenes there is. A new one is a file `scenes_of_...` beside this one and a line here."""
 
 from collections.abc import Iterable
 from functools import cache
@@ -30,7 +30,7 @@ FAMILIES: "Mapping[str, str]" = MappingProxyType(
 @cache
 def scenes_of(family: str) -> "tuple[Scene, ...]":
     """The scenes of a family."""
-    return tuple(import_module(f"mdstopo.stress.{family}").scenes())
+    return tuple(import_module(f"mdstopo.stress.scenes_of_{family}").scenes())
 
 
 def scenes() -> "dict[str, Scene]":

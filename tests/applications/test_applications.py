@@ -11,7 +11,7 @@ from benchmarks.scenes import CASES
 from mdstopo import Case, evaluate, load_case, optimize
 from mdstopo.case.model import CrushLaw, VolumeRow
 from mdstopo.scene.refusals import refusals
-from mdstopo.store.design import read_design
+from mdstopo.store.design_files import read_design
 
 #: the rows on members of the lander's sides
 SIDES = ((4, "left"), (5, "right"))

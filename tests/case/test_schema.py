@@ -13,7 +13,7 @@ from jsonschema import Draft202012Validator
 from mdstopo.case.errors import CaseError
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
 from mdstopo.case.reader import load_case, read_case
-from mdstopo.case.schema import json_schema
+from mdstopo.case.schema_case import json_schema
 
 from .scenes import EVERYTHING, SMALL
 

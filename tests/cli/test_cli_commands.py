@@ -392,7 +392,7 @@ def test_what_saved_nothing_is_interrupted_without_a_command(
     def press(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mdstopo.session.run.run_session", press)
+    monkeypatch.setattr("mdstopo.session.run_session.run_session", press)
     for words in (["--out", "a.h5", "--overwrite"], ["--out", "b.h5"]):
         with pytest.raises(KeyboardInterrupt):
             run_group(["run", "probe.yaml", *words])

@@ -15,9 +15,9 @@ from mdstopo.case.reader import load_case, read_case
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
-from mdstopo.finalize.laws import SCALED, sized
-from mdstopo.finalize.session import finalize, ready
+from mdstopo.finalize.scaled_laws import SCALED, sized
 from mdstopo.finalize.text import text_of
 
 SPRINGS = """\

@@ -10,11 +10,11 @@ import pytest
 from mdstopo import cli
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
-from mdstopo.session.callbacks import ignore, never
-from mdstopo.session.run import _Run
+from mdstopo.session.run_session import _Run
+from mdstopo.starts.callbacks import ignore, never
 from mdstopo.status import RunStatus
 from tests.front.support import CASE
-from tests.front.test_combined_runs import single
+from tests.session.test_combined_runs import single
 
 LIMIT = (
     "\n  - {response: {displacement: {body: torso, relative_to: vehicle}}, over_time: max, load_case: rotation, "

@@ -11,12 +11,12 @@ import pytest
 from scipy.integrate import trapezoid
 
 from mdstopo.cli.group import run_group
+from mdstopo.plots.plot_table import PLOTS, fitting
 from mdstopo.plots.scenery import edge_at, hull, outline, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import styled
-from mdstopo.plots.table import PLOTS, fitting
 from mdstopo.plots.watch import response_history
-from mdstopo.report.content import content
+from mdstopo.report.report_content import content
 from tests.front.support import CASE
 
 matplotlib = pytest.importorskip("matplotlib")

@@ -10,7 +10,7 @@ import pytest
 
 from mdstopo.cli.group import run_group
 from mdstopo.plots.source import Source
-from mdstopo.report.content import content
+from mdstopo.report.report_content import content
 from tests.front.support import CASE
 
 BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")

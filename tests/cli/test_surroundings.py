@@ -11,8 +11,8 @@ import pytest
 
 from mdstopo.cli.group import run_group
 from mdstopo.cli.output import harmless
-from mdstopo.report.page import page
-from mdstopo.store.reader import read_result
+from mdstopo.report.report_page import page
+from mdstopo.store.result_reader import read_result
 
 SMALL = """
 format: 1

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from mdstopo.cli.group import run_group
-from mdstopo.compiler import threads
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.compiler.threads import MOST, VARIABLE, ThreadsError, allowed, cores, shared, taken
-from mdstopo.session import crew
 
 
 @kernel
@@ -81,20 +79,3 @@ def test_a_wrong_number_of_threads_is_a_users_mistake(monkeypatch, capsys):
     error = capsys.readouterr().err
     assert f"{VARIABLE} is 'many'" in error
     assert "Traceback" not in error
-
-
-@pytest.mark.parametrize("workers", [1, 2, 64])
-def test_workers_share_the_cores_among_them(monkeypatch, workers):
-    found = {}
-
-    class AskedError(Exception):
-        pass
-
-    def popen(*arguments, env, **rest):
-        found.update(env)
-        raise AskedError
-
-    monkeypatch.setattr(crew.subprocess, "Popen", popen)
-    with pytest.raises(AskedError):
-        crew.WorkerProcess("nothing", None, workers, None)
-    assert int(found[threads.VARIABLE]) == max(1, cores() // workers)

@@ -12,7 +12,7 @@ pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -e '.
 
 from documentation import case_keys, command_pages, maths
 from documentation.hooks import expanded
-from mdstopo.case.schema import FORMAT, json_schema
+from mdstopo.case.schema_case import FORMAT, json_schema
 from mdstopo.cli.commands import COMMANDS, EXIT_STATUSES
 from mdstopo.cli.group import cli
 

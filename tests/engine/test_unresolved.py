@@ -7,7 +7,7 @@ from mdstopo import evaluate
 from mdstopo.case.reader import read_case
 from mdstopo.status import Status
 from mdstopo.stress.scene import Scene
-from mdstopo.stress.stiffness import chain, modes
+from mdstopo.stress.scenes_of_stiffness import chain, modes
 
 INTEGRATORS = pytest.mark.parametrize("integrator", ["gauss", "runge_kutta"])
 

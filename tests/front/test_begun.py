@@ -1,11 +1,9 @@
 """What a front, or the individual optima of a run, has reached within a solve is kept, and gone on from."""
 
-import io
-import pickle
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,14 +13,13 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.front import tasks
-from mdstopo.front.pool import Processes, Reached
-from mdstopo.front.session import Ask, run_front
-from mdstopo.front.worker import _Sender
+from mdstopo.front.pool import Processes
+from mdstopo.front.run_front import Ask, run_front
+from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
-from mdstopo.session.run import run_session
-from mdstopo.store.checkpoint import Checkpointer
-from mdstopo.store.reader import read_result
+from mdstopo.plan import solve_task as tasks
+from mdstopo.session.run_session import run_session
+from mdstopo.store.result_reader import read_result
 from tests.front.support import CASE
 
 WALL_TIMES = {"seconds", "created"}
@@ -113,50 +110,36 @@ def reached() -> State:
     found: list[State] = []
     case = read_case(CASE)
     run_front(case, Ask(spread(2)), path=Path("x.h5"), workers=1, stop_requested=after(4))
-    from mdstopo.front.content import read_begun
+    from mdstopo.plan.stored_tasks import read_begun
 
     found += read_begun(read_result("x.h5")).values()
     return found[0]
 
 
-def test_workers_send_what_they_have_reached_now_and_then() -> None:
-    output, now = io.BytesIO(), [0.0]
-    sender = _Sender(output)
-    sender._timer = Checkpointer(sender._send, clock=lambda: now[0])
-    state = reached()
-    for _ in range(10):
-        now[0] += 0.1
-        sender.keep(state)
-    output.seek(0)
-    messages = []
-    while output.tell() < len(output.getvalue()):
-        messages.append(pickle.load(output))
-    assert 1 <= len(messages) <= 3
-    assert State.from_arrays(messages[0].arrays).evaluations == state.evaluations
+def test_a_piece_whose_worker_is_lost_goes_on_from_where_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    state, kept, asked = reached(), [], []
 
+    class OneIsLost:
+        """A pool in which the worker of the first piece is lost after it has said how far it is."""
 
-def test_what_workers_have_reached_is_kept_until_they_are_done(monkeypatch: pytest.MonkeyPatch) -> None:
-    state, kept = reached(), []
+        def results(self, count: int, task: Any, *, keep: Any, stop: Any) -> Iterator[tuple[int, Any]]:
+            asked.extend([task(0), task(1)])
+            keep(0, state.to_arrays())
+            asked.append(task(0))
+            yield from ((0, "first"), (1, "second"))
 
-    class Fake:
-        def send(self, job: Any) -> None:
-            pool._inbox.put((self, Reached(state.to_arrays())))
-            pool._inbox.put((self, f"found {job}"))
-
-        def kill(self) -> None:
-            pass
-
+    pieces = [tasks.Task(point, Scalarisation("weighted_sum", np.ones(2)), np.ones(3), 5) for point in (0, 1)]
     pool = Processes(None, lambda: False, 1)  # type: ignore[arg-type]
-    worker = Fake()
-    monkeypatch.setattr(pool, "_idle", lambda doing: worker)
-    results = list(pool.results(["a", "b"], lambda place, each: kept.append((place, each.evaluations))))  # type: ignore[list-item]
-    assert results == [(0, "found a"), (1, "found b")]
-    assert kept == [(0, state.evaluations), (1, state.evaluations)]
+    monkeypatch.setattr(pool, "_pool", OneIsLost())
+    results = pool.results(pieces, lambda place, each: kept.append((place, each.evaluations)))
+    assert list(results) == [(0, "first"), (1, "second")]
+    assert kept == [(0, state.evaluations)]
+    assert asked[:2] == pieces
+    assert asked[2].begun is not None
+    assert asked[2].begun.evaluations == state.evaluations
 
 
 def test_where_a_task_was_left_does_not_change_its_key() -> None:
     state = reached()
-    from mdstopo.optimizer.scalarisation import Scalarisation
-
     task = tasks.Task(0, Scalarisation("weighted_sum", np.ones(2)), np.ones(3), 5)
     assert replace(task, begun=state).key("k") == task.key("k")

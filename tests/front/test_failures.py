@@ -14,11 +14,12 @@ import pytest
 import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
-from mdstopo.front import jobs, session
+from mdstopo.front import jobs
+from mdstopo.front import run_front as fronts
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.pool import Lost
-from mdstopo.front.session import Ask, run_front
-from mdstopo.front.sweep import run_sweep
+from mdstopo.front.run_front import Ask, run_front
+from mdstopo.front.run_sweep import run_sweep
+from mdstopo.workers.worker_pool import Lost
 from tests.front.support import CASE
 from tests.front.test_fronts import assert_equal, contents, spread
 
@@ -55,13 +56,13 @@ def test_what_no_worker_finished_is_tried_again(monkeypatch):
     case, ask = read_case(CASE), Ask(spread(4))
     run_front(case, ask, path=Path("whole.h5"), workers=1)
 
-    class Loses(session.Here):
+    class Loses(fronts.Here):
         def results(self, tasks, *more):
             for place, found in super().results(tasks, *more):
-                yield place, Lost() if tasks[place].point == 1 else found
+                yield place, Lost("a worker process (pid 1) ended unexpectedly") if tasks[place].point == 1 else found
 
     with monkeypatch.context() as patch:
-        patch.setattr(session, "Here", Loses)
+        patch.setattr(fronts, "Here", Loses)
         run_front(case, ask, path=Path("parts.h5"), workers=1)
     with h5py.File("parts.h5") as file:
         assert file["pareto/status"].asstr()[1] == "failed"
@@ -76,7 +77,7 @@ def test_an_error_of_the_program_leaves_what_was_finished(monkeypatch):
         raise RuntimeError("a bug")
 
     with monkeypatch.context() as patch:
-        patch.setattr(session.Planner, "rounds", broken)
+        patch.setattr(fronts.Planner, "rounds", broken)
         with pytest.raises(RuntimeError, match="a bug"):
             run_front(read_case(CASE), Ask(spread(3)), path=Path("front.h5"), workers=1)
     assert len(contents("front.h5")["pareto/tasks/key"]) == 4
@@ -149,7 +150,7 @@ def test_workers_end_with_a_parent_that_is_killed():
     large = CASE.replace("count: 8}", "count: 200}").replace("count: 3}", "count: 60}").replace("7.2", "3600")
     Path("probe.yaml").write_text(large)
     code = (
-        "from pathlib import Path; from mdstopo import load_case; from mdstopo.front.session import Ask, run_front;"
+        "from pathlib import Path; from mdstopo import load_case; from mdstopo.front.run_front import Ask, run_front;"
         "from mdstopo.front.directions import weights_of_first;"
         "run_front(load_case('probe.yaml'), Ask(weights_of_first([0.0, 0.5, 1.0])), workers=2, worth=0.0)"
     )
@@ -163,7 +164,8 @@ def test_workers_end_with_a_parent_that_is_killed():
                 command = place.with_name("cmdline").read_text()
             except OSError:
                 continue
-            if "mdstopo.front.worker" in command and (words[1] == str(parent.pid) or place.parent.name in known):
+            own = words[1] == str(parent.pid) or place.parent.name in known
+            if "mdstopo.workers.worker_program" in command and own:
                 found.append(place.parent.name)
         return found
 

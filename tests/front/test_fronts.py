@@ -17,8 +17,8 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.cli.group import run_group
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.measures import dominated, hypervolume, neighbour_gaps, scaled
-from mdstopo.front.session import Ask, run_front
+from mdstopo.front.run_front import Ask, run_front
+from mdstopo.plan.front_measures import dominated, hypervolume, neighbour_gaps, scaled
 from tests.front.support import CASE, THREE
 
 ROOT = Path(__file__).parents[2]

@@ -7,24 +7,24 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.front import race as races
 from mdstopo.front.directions import weights_of_first
-from mdstopo.front.plan import Planner, Request, Starts
-from mdstopo.front.race import race, rivals
-from mdstopo.front.session import Ask, run_front
-from mdstopo.front.tasks import Task, failed
-from mdstopo.optimizer.driver import Gsao
-from mdstopo.optimizer.presets import settings
+from mdstopo.front.run_front import Ask, run_front
+from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.scalarisation import Scalarisation
-from mdstopo.optimizer.starts import Family, begins_at_best, family_of
+from mdstopo.optimizer.start_families import Family, begins_at_best, family_of
 from mdstopo.optimizer.state import State
+from mdstopo.plan import race as races
+from mdstopo.plan.front_plan import Planner, Request, Starts
+from mdstopo.plan.race import race, rivals
+from mdstopo.plan.solve_task import Task, failed
+from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
-from mdstopo.store.reader import read_result
+from mdstopo.store.result_reader import read_result
 from tests.front.support import CASE
 from tests.front.test_begun import after, assert_same
 from tests.front.test_fronts import spread
-from tests.front.test_plan import carried_out, convex, solver
 from tests.optimizer.toys import compliance_problem
+from tests.plan.test_plan import carried_out, convex, solver
 
 STARTS = 4
 U = Scalarisation("weighted_sum", np.ones(2))

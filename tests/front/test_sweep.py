@@ -9,8 +9,8 @@ import pytest
 
 import mdstopo
 from mdstopo.cli.group import run_group
-from mdstopo.front.sweep import combinations, run_sweep
-from tests.front.test_combined_runs import single
+from mdstopo.front.run_sweep import combinations, run_sweep
+from tests.session.test_combined_runs import single
 
 
 @pytest.fixture(autouse=True)

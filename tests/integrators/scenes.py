@@ -12,6 +12,7 @@ from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for
 from mdstopo.scene.model import VECTOR, Model
 from mdstopo.scene.packing import pack
+from mdstopo.sensitivity.look import dense, look
 from mdstopo.sensitivity.reductions import MAX
 
 
@@ -167,7 +168,7 @@ class Bench:
                 break
             self.size *= 2
         if code == OK:
-            self.entry.look(
+            look(
                 self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits,
                 self.count, self.reductions, gradient, self.room, self.room_ints, self.strength,
                 np.zeros((ROWS, padded)), self.rows, self.found, self.gradients, np.zeros(2, dtype=np.int64), self.work,
@@ -214,7 +215,7 @@ class Bench:
         """q, v, a (3, T, n) of the dense output."""
         times = np.atleast_1d(np.asarray(times, dtype=float))
         out = np.zeros((3, len(times), len(self.scene.model.inv_mass)))
-        self.entry.dense(
+        dense(
             self.entry.TAG, *self.packed, self.tables, self.scene.damped, self.limits, self.count, self.room,
             self.room_ints, self.strength, times, out, self.work,
         )  # fmt: skip

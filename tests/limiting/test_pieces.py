@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import linprog
 
 from mdstopo.limiting.compare import gap
-from mdstopo.limiting.forces import cone_of, restrictions, travel
+from mdstopo.limiting.force_limits import cone_of, restrictions, travel
 from mdstopo.limiting.known import with_second_derivative
 from mdstopo.limiting.response import limits_of
 from mdstopo.limiting.system import System

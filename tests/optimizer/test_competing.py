@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.gsao import Gsao, run
 from mdstopo.optimizer.problem import Sample
 from mdstopo.optimizer.state import State
+from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from tests.optimizer.toys import Toy, volume
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.gsao import Gsao, run
 from mdstopo.optimizer.problem import Floats, LinearRows, Sample
 from mdstopo.optimizer.state import State
+from mdstopo.settings.optimizer_presets import settings
 
 
 class Pieces:

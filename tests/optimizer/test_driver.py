@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import PRESETS, settings
+from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.nearest_feasible import InfeasibleRows
 from mdstopo.optimizer.problem import LinearRows
-from mdstopo.optimizer.projection import InfeasibleRows
 from mdstopo.optimizer.state import State
+from mdstopo.settings.optimizer_presets import PRESETS, settings
 from mdstopo.status import RunStatus, Status
 
 from .toys import Toy, compliance, compliance_problem, failing, two_peaks, volume

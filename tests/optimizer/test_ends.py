@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from tests.optimizer.toys import Toy
 

@@ -5,8 +5,8 @@ import pytest
 
 from mdstopo.case.exchange import exchange_ends
 from mdstopo.case.reader import read_case
-from mdstopo.optimizer.starts import Family, design_of_family, neighbour
-from mdstopo.session.engine import make_engine
+from mdstopo.evaluators import make_engine
+from mdstopo.optimizer.start_families import Family, design_of_family, neighbour
 
 HEAD = """
 format: 1

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from mdstopo.optimizer.options import OPTIONS
-from mdstopo.optimizer.presets import PRESETS, mistakes, resolve, settings
+from mdstopo.settings.optimizer_options import OPTIONS
+from mdstopo.settings.optimizer_presets import PRESETS, mistakes, resolve, settings
 
 
 def test_defaults_and_presets_lie_within_the_limits():
@@ -53,5 +53,5 @@ def test_a_misspelt_preset_is_named():
 
 def test_the_table_imports_nothing_heavy():
     heavy = "('numpy', 'numba', 'scipy')"
-    code = f"import sys, mdstopo.optimizer.presets; sys.exit(any(m in sys.modules for m in {heavy}))"
+    code = f"import sys, mdstopo.settings.optimizer_presets; sys.exit(any(m in sys.modules for m in {heavy}))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

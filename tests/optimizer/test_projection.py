@@ -7,8 +7,8 @@ from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
+from mdstopo.optimizer.nearest_feasible import InfeasibleRows, project, satisfied
 from mdstopo.optimizer.problem import LinearRows
-from mdstopo.optimizer.projection import InfeasibleRows, project, satisfied
 
 from .toys import volume
 

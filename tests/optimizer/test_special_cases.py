@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, linprog
 
-from mdstopo.optimizer.driver import Gsao
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.problem import LinearRows
+from mdstopo.settings.optimizer_presets import settings
 
 from .toys import Toy, volume
 

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
-from mdstopo.optimizer.projection import satisfied
-from mdstopo.optimizer.starts import (
+from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.nearest_feasible import satisfied
+from mdstopo.optimizer.start_families import (
     Family,
     begins_at_best,
     best_run,
@@ -17,6 +16,7 @@ from mdstopo.optimizer.starts import (
     sparse,
     uniform,
 )
+from mdstopo.settings.optimizer_presets import settings
 from tests.optimizer.toys import Toy, volume
 
 

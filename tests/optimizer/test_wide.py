@@ -7,16 +7,16 @@ import pytest
 
 from mdstopo.compiler.jit import vector_entry
 from mdstopo.compiler.threads import VARIABLE
-from mdstopo.optimizer import driver, separable, wide, wide_numbers
-from mdstopo.optimizer.driver import Gsao
+from mdstopo.optimizer import gsao, separable, wide, wide_numbers
+from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.powers import largest, powers, primitives
-from mdstopo.optimizer.presets import settings
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.safeguards import next_shift
 from mdstopo.optimizer.shifts import Shifts
 from mdstopo.optimizer.state import State, Step
 from mdstopo.optimizer.wide_kernels import COARSER, FEWEST
 from mdstopo.optimizer.wide_slots import BEYOND, ROOM, ROW, SLOTS, WHOLE, bracket_slots, enter_slot, root
+from mdstopo.settings.optimizer_presets import settings
 
 N = 12_000
 SIZES = [wide.MANY, 1_020, N]
@@ -45,7 +45,7 @@ class Many:
 def states(problem, steps, monkeypatch=None, **options):
     if monkeypatch is not None:
         monkeypatch.setattr(wide, "MANY", 10**9)
-        for module in (driver, separable, wide, wide_numbers):
+        for module in (gsao, separable, wide, wide_numbers):
             monkeypatch.setattr(module, "WIDE", 10**9)
     optimizer = Gsao(problem, settings("default", options, max_iterations=100))
     found = [optimizer.start()]

@@ -6,8 +6,7 @@ import pytest
 from mdstopo.compiler.threads import VARIABLE
 from mdstopo.optimizer import conic, wide_numbers
 from mdstopo.optimizer.curvature import Curvature, learnt
-from mdstopo.optimizer.driver import Gsao, run
-from mdstopo.optimizer.presets import settings
+from mdstopo.optimizer.gsao import Gsao, run
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.stack import Stack
 from mdstopo.optimizer.state import State
@@ -15,6 +14,7 @@ from mdstopo.optimizer.wide_curvature import compact, known_curvature
 from mdstopo.optimizer.wide_interior import CURVED, EQUAL, LIMIT, LINE
 from mdstopo.optimizer.wide_program import FEW, Region, Room, WideProgram, solve
 from mdstopo.optimizer.wide_rows import Pool
+from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from tests.optimizer.toys import volume
 

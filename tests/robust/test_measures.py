@@ -5,7 +5,7 @@ import pytest
 
 from mdstopo.case.uncertain import Measure
 from mdstopo.evaluation import Peak
-from mdstopo.robust.measures import MEANS, ROWS, rows, slopes, statistic
+from mdstopo.robust.robust_measures import MEANS, ROWS, rows, slopes, statistic
 
 ALL = [Measure("mean"), Measure("mean_deviation", factor=1.5), Measure("worst"), Measure("quantile", level=0.7)]
 

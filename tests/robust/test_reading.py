@@ -9,7 +9,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.case.uncertain import Measure, Normal
 from mdstopo.evaluators import evaluator_of
-from mdstopo.store.compare import describe, differences
+from mdstopo.store.same_case import describe, differences
 from tests.robust.scenes import PARAMETERS, SCENARIOS, read, scene, text, uncertain
 
 BOUND = {"response": {"angle": {"body": "torso"}}, "over_time": "max_abs", "limit": 0.5}

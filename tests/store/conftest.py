@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fakes import hand_made_case
 
 from mdstopo.case.model import Case
+from tests.fakes import hand_made_case
 
 
 @pytest.fixture

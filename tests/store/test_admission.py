@@ -9,8 +9,8 @@ import pytest
 
 from mdstopo.case.model import Case, OptimizerSettings, SolverSettings, SpringLaw
 from mdstopo.store.admit import admit, admit_resume, prepare_place
-from mdstopo.store.compare import describe, differences
-from mdstopo.store.errors import DamagedError, DifferentCaseError, StoreError, UnfinishedError
+from mdstopo.store.same_case import describe, differences
+from mdstopo.store.store_errors import DamagedError, DifferentCaseError, StoreError, UnfinishedError
 
 MakeResult = Callable[..., Path]
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mdstopo.store.design import read_design
-from mdstopo.store.errors import StoreError
+from mdstopo.store.design_files import read_design
+from mdstopo.store.store_errors import StoreError
 
 ALPHA = np.random.default_rng(0).random(6)
 

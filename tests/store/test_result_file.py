@@ -9,9 +9,9 @@ import pytest
 
 from mdstopo.case.model import Case
 from mdstopo.store.contents import case_part, sensitivity_part
-from mdstopo.store.errors import DamagedError, StoreError
 from mdstopo.store.image import encode
-from mdstopo.store.reader import read_result
+from mdstopo.store.result_reader import read_result
+from mdstopo.store.store_errors import DamagedError, StoreError
 
 MakeResult = Callable[..., Path]
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from mdstopo.store import writing
-from mdstopo.store.errors import DamagedError, UnreadableError
 from mdstopo.store.image import encode
-from mdstopo.store.reader import read_result
+from mdstopo.store.result_reader import read_result
 from mdstopo.store.seal import lookup3, right_superblock
+from mdstopo.store.store_errors import DamagedError, UnreadableError
 from mdstopo.store.untrusted import check_heaps
 from mdstopo.store.writing import read_back
 
@@ -185,9 +185,8 @@ def test_what_cannot_be_read_back_replaces_nothing(
     make_result: MakeResult, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """As with a library that writes what it cannot read."""
-    from fakes import hand_made_case
-
     from mdstopo.store.provenance import Provenance
+    from tests.fakes import hand_made_case
 
     path = make_result()
     before = path.read_bytes()

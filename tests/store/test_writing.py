@@ -12,8 +12,8 @@ import pytest
 from mdstopo.store import atomic
 from mdstopo.store.atomic import remove_leftovers, replace_file
 from mdstopo.store.checkpoint import INTERVAL, Checkpointer
-from mdstopo.store.errors import InUseError, StoreError, WriteError
 from mdstopo.store.lock import Lock
+from mdstopo.store.store_errors import InUseError, StoreError, WriteError
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from mdstopo.stress.registry import scenes
 from mdstopo.stress.scene import Scene
-from mdstopo.stress.watch import Watch
+from mdstopo.stress.scene_watch import Watch
 
 #: what takes more than a few seconds, once kernels are compiled
 SLOW = ("periods-", "stiffness-1e12-slow-gauss", "stiffness-1e12-slow-runge-kutta", "turns-wheel-", "turns-driven-")

@@ -4,7 +4,7 @@ import numpy as np
 
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.session.run import run_session
+from mdstopo.session.run_session import run_session
 
 
 def case_of(text, **solver):

@@ -14,8 +14,8 @@ from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.finalize_design import ready
 from mdstopo.finalize.keep import chosen, kept_values, one_alpha, places, restricted
-from mdstopo.finalize.session import ready
 from mdstopo.finalize.text import text_of
 from mdstopo.finalize.values import bound_of
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from mdstopo.case.design_variables import PARAMETERS
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
-from mdstopo.case.variables import PARAMETERS
 from mdstopo.mechanics.laws.table import COMMON, PLACES
 
 SCENE = """

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import mdstopo
+from mdstopo.case.design_variables import PARAMETERS
 from mdstopo.case.reader import read_case
-from mdstopo.case.variables import PARAMETERS
 from tests.variables.support import differences, with_variables
 
 SCENE = """

@@ -7,10 +7,10 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.session.run import run_session
-from mdstopo.store.design import read_design
-from mdstopo.store.errors import StoreError
-from mdstopo.store.reader import read_result
+from mdstopo.session.run_session import run_session
+from mdstopo.store.design_files import read_design
+from mdstopo.store.result_reader import read_result
+from mdstopo.store.store_errors import StoreError
 from tests.variables.support import whole_and_resumed
 
 CATCH = Path(__file__).parents[2] / "cases" / "catch.yaml"
@@ -103,7 +103,7 @@ def test_the_catch_keeps_its_displacement_and_comes_near_the_gentlest_there_is()
 
 def test_random_starts_of_values_are_anywhere_between_their_bounds():
     from mdstopo.engine import Evaluator
-    from mdstopo.optimizer.starts import random_feasible
+    from mdstopo.optimizer.start_families import random_feasible
 
     problem = Evaluator(mdstopo.load_case(CATCH)).problem()
     draws = np.array([random_feasible(problem, 0, index) for index in range(1, 400)])

@@ -7,7 +7,7 @@ import mdstopo
 from mdstopo.case.errors import CaseError
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
-from mdstopo.session.run import run_session
+from mdstopo.session.run_session import run_session
 from tests.variables.support import whole_and_resumed
 
 SCENE = """

@@ -16,7 +16,7 @@ from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.case.stages import stage_case, stage_count
 from mdstopo.session.outcome import Outcome
-from mdstopo.session.run import run_session
+from mdstopo.session.run_session import run_session
 from mdstopo.status import RunStatus
 
 #: a body on springs all around it, pushed to the side and turned
@@ -168,7 +168,7 @@ def test_parameters_of_laws_go_on_from_stage_to_stage():
 
 
 def test_another_list_is_another_case_when_resuming(tmp_path):
-    from mdstopo.store.errors import DifferentCaseError
+    from mdstopo.store.store_errors import DifferentCaseError
 
     run_session(staged("[1, 3]", max_iterations=3), path=tmp_path / "a.h5", **stop_after(2))
     for other in ("3", "[1, 2, 3]"):
@@ -231,7 +231,7 @@ def test_commands_tell_the_stages_and_refuse_with_status_2(tmp_path):
 
 
 def test_each_run_of_a_sweep_goes_through_the_stages(tmp_path):
-    from mdstopo.front.sweep import run_sweep
+    from mdstopo.front.run_sweep import run_sweep
 
     place = tmp_path / "web.yaml"
     place.write_text(SCENE.replace("power: 1}", "power: [1, 3]}"))
@@ -250,8 +250,8 @@ def test_a_design_made_in_stages_is_finalized_at_the_last_power():
 
 
 def test_a_stage_that_fails_ends_the_run_and_says_which(monkeypatch):
+    from mdstopo.evaluators import make_engine
     from mdstopo.optimizer.problem import Sample
-    from mdstopo.session.engine import make_engine
     from mdstopo.status import Status
 
     class Broken:

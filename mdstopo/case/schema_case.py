@@ -1,0 +1,392 @@
+"""Format 1 of the case file: every key, its type, limits, words, default and meaning.
+
+The single source of the reader's checks and of the JSON Schema. What cannot be said of one value alone (names
+that must be declared, sums, lengths) is checked where the case is built.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mdstopo.case.kinds import Flag, Number, Ref, Text, Version, explained
+from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
+from mdstopo.case.schema_contact import CONTACT
+from mdstopo.case.schema_scene import (
+    BODY,
+    BODY_KEYS,
+    BUSHING,
+    FRAME,
+    GROUP,
+    GROUP_KEYS,
+    JOINT,
+    LOAD_CASE,
+    LOADS,
+    MOTIONS,
+    NOT_NEGATIVE,
+    NUMBER,
+    PAIR,
+    POINTS,
+    POSITIVE,
+    parameter_words,
+)
+from mdstopo.case.schema_uncertainty import UNCERTAINTY
+from mdstopo.settings.optimizer_options import OPTIONS
+from mdstopo.settings.optimizer_presets import PRESETS
+
+# Design, objectives, constraints.
+
+
+def _design(name: str, number: Number, doc: str, default: float) -> Key:
+    by_group = ByName("member group", number, "number")
+    kind = ByShape("a number or {group: number}", scalar=number, mapping=by_group)
+    return Key(name, kind, doc + "; a number or {group: number}", default=default)
+
+
+_POWERS = ListOf(POSITIVE, 1, "powers")
+_OF_A_GROUP = ByShape("a number or a list of numbers", scalar=POSITIVE, sequence=_POWERS)
+_POWER = Key(
+    "power",
+    ByShape(
+        "a number, a list of numbers or {group: number or list}",
+        scalar=POSITIVE,
+        sequence=_POWERS,
+        mapping=ByName("member group", _OF_A_GROUP, "number or list"),
+    ),
+    "mu of Eq. 12: a member's force is alpha^mu times its law's; a number, a list or {group: number or list}. `run` "
+    "goes through a list, which rises, from one optimum to the next; everything else takes its last",
+    default=1.0,
+)
+_VARIABLE = Record(
+    "a design variable",
+    (
+        Key(
+            "group",
+            ByShape(
+                "a member group or a list of member groups", scalar=GROUP, sequence=ListOf(GROUP, 1, "member groups")
+            ),
+            "whose law it is; of several groups, all have the same values",
+            required=True,
+        ),
+        Key("parameter", explained(parameter_words()), "which key of the law varies", required=True),
+        Key(
+            "law",
+            Number(minimum=0, whole=True),
+            "where the group has a list of laws: which of them, from 0",
+            otherwise="the only one that has the parameter",
+        ),
+        Key(
+            "each",
+            explained({"group": "one value for all members", "member": "a value for each member"}),
+            "how many values there are",
+            default="group",
+        ),
+        Key("initial", NUMBER, "where the optimiser begins, in the unit of the parameter", otherwise="the law's own"),
+        Key("lower", NUMBER, "lower bound, within what the law allows", required=True),
+        Key("upper", NUMBER, "upper bound", required=True),
+        Key(
+            "cost",
+            NOT_NEGATIVE,
+            "what a unit of each value adds to volume rows that cover the group, as V_i does for a unit of alpha",
+            default=0.0,
+        ),
+    ),
+    doc="A parameter of laws that the optimiser varies, whether alpha of its group varies or not. Its value takes the "
+    "place of the law's own.",
+)
+DESIGN = Record(
+    "design settings",
+    (
+        _design("initial", Number(minimum=0, maximum=1), "start of the design variables, within the bounds", 0.1),
+        _design("lower", Number(minimum=0, maximum=1), "lower bound; above 0 where the power is below 1", 0.001),
+        _design("upper", Number(minimum=0, maximum=1), "upper bound", 1.0),
+        _POWER,
+        Key("shared", ListOf(GROUP, what="member groups"), "groups whose members all have one alpha", default=()),
+        Key(
+            "mirrored",
+            ListOf(ListOf(GROUP, 2, "member groups"), what="lists of member groups"),
+            "lists of groups with equal counts: member k of each has the same alpha",
+            default=(),
+        ),
+        Key("variables", Named(_VARIABLE, "design variable"), "parameters of laws that vary, by name"),
+    ),
+    doc="The design variables: alpha, one for each member with `design: true`, and parameters of laws. In `initial`, "
+    "`lower`, `upper` and `power` groups left out have the default.",
+)
+_RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
+_OF_BODY = Key("body", BODY, "whose motion it is", required=True)
+_COMPONENTS = explained({"x": "along x", "y": "along y", "norm": "the length of the vector"})
+_AT_POINT = Record(
+    "the motion of a point",
+    (
+        _OF_BODY,
+        Key("at", PAIR, "the point, which rides on the body", unit="m", otherwise="the centre of mass"),
+        FRAME,
+        _RELATIVE,
+        Key("component", _COMPONENTS, "which part of the vector", default="norm"),
+    ),
+    doc="What an observer riding on `relative_to` sees: the change of the point's coordinates in that body's frame "
+    "since the start, or their time derivatives.",
+)
+_OF_ANGLE = Record(
+    "the rotation of a body",
+    (_OF_BODY, _RELATIVE),
+    doc="psi of the body less psi of `relative_to`, not wrapped, or its time derivatives.",
+)
+_OF_GROUP = Record(
+    "forces in members",
+    (Key("group", GROUP, "whose members are looked at", required=True),),
+    doc="The largest |f*| in the group at each time.",
+)
+_OF_JOINT = Record(
+    "what a joint transmits",
+    (Key("joint", Ref("joint", index=True), "name of the joint, or its index", required=True),),
+    doc="The norm of what the joint transmits. Not for joints that repeat others.",
+)
+RESPONSES = {
+    "displacement": (_AT_POINT, "of a point, in m"),
+    "velocity": (_AT_POINT, "of a point, in m/s"),
+    "acceleration": (_AT_POINT, "of a point, in m/s^2"),
+    "angle": (_OF_ANGLE, "of a body, in rad"),
+    "angular_velocity": (_OF_ANGLE, "of a body, in rad/s"),
+    "angular_acceleration": (_OF_ANGLE, "of a body, in rad/s^2"),
+    "member_force": (_OF_GROUP, "the largest force in a group's members, in N"),
+    "joint_force": (_OF_JOINT, "the force that a joint transmits, in N"),
+    "joint_moment": (_OF_JOINT, "the couple that a joint transmits, in N m"),
+}
+_RESPONSE = ByShape(
+    "energy | a mapping such as {displacement: {body: b}}",
+    scalar=explained(
+        {"energy": "stored energy, in J: the sum of alpha^mu V over the design members whose laws act"},
+        " | a mapping such as {displacement: {body: b}}",
+    ),
+    mapping=Record(
+        "a response",
+        tuple(Key(name, kind, doc) for name, (kind, doc) in RESPONSES.items()),
+        one_of=(tuple(RESPONSES),),
+        doc="Exactly one of these.",
+    ),
+)
+_REDUCERS = explained(
+    {
+        "max": "its largest value, in continuous time; where it jumps, the larger one-sided limit",
+        "min": "its smallest value, in continuous time",
+        "max_abs": "the largest magnitude",
+        "mean": "the average over time",
+        "rms": "the root of the mean square",
+        "integral": "the integral over time",
+        "final": "the value at the end",
+    }
+)
+_OVER_TIME = Key("over_time", _REDUCERS, "how the response over time becomes a number", default="max")
+_LOAD_CASE = Key(
+    "load_case",
+    Ref("load case", also=("default",)),
+    "in which load case",
+    otherwise="the only one; needed where there are several",
+)
+_SENSE = explained({"minimize": "the lower, the better", "maximize": "the higher, the better"})
+OBJECTIVE = Record(
+    "an objective",
+    (
+        Key("response", _RESPONSE, "what is looked at over time", required=True),
+        _OVER_TIME,
+        _LOAD_CASE,
+        Key("sense", _SENSE, "which way is better", default="minimize"),
+    ),
+    doc="What is to be improved: a response, made a number.",
+)
+_METHODS = explained(
+    {
+        "weighted_exponential": "U = sum w g^p (Eq. 23), continued oddly below zero",
+        "weighted_sum": "U = sum w g",
+        "weighted_min_max": "U = max w g",
+        "weighted_product": "U = prod G^w of raw values, which must be positive",
+    }
+)
+COMBINE = Record(
+    "how objectives are combined",
+    (
+        Key("method", _METHODS, "how the objectives g (Eq. 24 of G) become one U", default="weighted_exponential"),
+        Key(
+            "weights",
+            ByName("objective", NOT_NEGATIVE, "number"),
+            "of every objective; not all zero; scaled to the sum 1",
+            required=True,
+        ),
+        Key("exponent", Number(minimum=1), "p of Eq. 23, for weighted_exponential", default=2.0),
+        Key("normalize", Flag(), "take g of Eq. 24, between utopia and maximum; false: raw values", default=True),
+    ),
+    doc="How several objectives become one.",
+)
+SENSES = ("limit", "fraction", "equals", "at_least")
+CONSTRAINT = Record(
+    "a constraint",
+    (
+        Key(
+            "volume",
+            ByShape(
+                "all, a member group or a list of member groups",
+                scalar=Ref("member group", also=("all",)),
+                sequence=ListOf(GROUP, 1, "member groups"),
+            ),
+            "bounds the sum of alpha_i V_i over these members (Eq. 14)",
+        ),
+        Key("response", _RESPONSE, "bounds what is looked at over time"),
+        Key("over_time", _OVER_TIME.kind, "how the response becomes a number", otherwise="max"),
+        _LOAD_CASE,
+        Key("limit", NUMBER, "at most this"),
+        Key("fraction", NUMBER, "of a volume: at most this share of sum V_i"),
+        Key("equals", NUMBER, "exactly this"),
+        Key("at_least", NUMBER, "at least this"),
+    ),
+    one_of=(("volume", "response"), SENSES),
+    needs=(("over_time", "response"), ("load_case", "response"), ("fraction", "volume")),
+    doc="A bound on a volume or on a response. Bounds on a response are in its own unit.",
+)
+
+
+def _option(name: str) -> Key:
+    """A single setting of the optimiser; its default is the preset's."""
+    option = OPTIONS[name]
+    default = str(option.default).lower() if option.type is bool else f"{option.default:g}"
+    kind = (
+        Flag()
+        if option.type is bool
+        else Number(option.minimum, None, option.maximum, None, option.type is int)
+    )  # fmt: skip
+    return Key(name, kind, option.doc, otherwise=f"the preset's; {default} in `default`")
+
+
+_PRESETS = {
+    "default": "the tuned settings of GSAO",
+    "oc": "the optimality-criteria update, from the highest peak",
+    "mma": "the method of moving asymptotes (Svanberg 1987)",
+    "conlin": "reciprocal where a function falls, linear where it rises (Fleury and Braibant 1986)",
+    "slp": "sequential linear programming in a trust box",
+}
+OPTIMIZER = Record(
+    "optimizer settings",
+    (
+        Key("name", explained({"gsao": "generalized sequential approximate optimization"}), "method", default="gsao"),
+        Key("preset", explained({name: _PRESETS[name] for name in PRESETS}), "named settings", default="default"),
+        Key(
+            "max_iterations",
+            Number(minimum=0, maximum=10**9, whole=True),
+            "evaluations after the first one, for each start",
+            default=200,
+        ),
+        Key(
+            "tolerance",
+            NOT_NEGATIVE,
+            "of the projected KKT residual, relative to the largest |dU/dalpha|",
+            default=1e-6,
+        ),
+        Key(
+            "starts",
+            Number(minimum=1, maximum=10**6, whole=True),
+            "how many starting designs; the further ones are random and feasible",
+            default=1,
+        ),
+        Key("seed", Number(minimum=0, maximum=2**53, whole=True), "of the random starts", default=0),
+        *(_option(name) for name in OPTIONS),
+    ),
+    doc="How the design is improved. Single settings override the preset's.",
+)
+_INTEGRATORS = explained(
+    {
+        "auto": "gauss for springs between free bodies and their energy, else runge_kutta; the reason is printed",
+        "gauss": "adaptive collocation at Gauss nodes; for springs between free bodies and their energy",
+        "runge_kutta": "explicit and adaptive; for everything",
+        "generalized_alpha": "implicit, fixed steps; for stiff scenes and the paper's figures",
+    }
+)
+_SENSITIVITIES = explained(
+    {
+        "auto": "adjoint",
+        "adjoint": "the exact gradient by a reverse sweep; its cost does not grow with the number of members",
+        "direct": "the same, carried forward; its cost grows with the number of members",
+        "iterative": "the same on the steps of generalized_alpha, by fixed-point sweeps",
+        "constant_load": "inertia and loads frozen at the peak: an approximation",
+    }
+)
+SOLVER = Record(
+    "solver settings",
+    (
+        Key("integrator", _INTEGRATORS, "how the motion is computed", default="auto"),
+        Key(
+            "tolerance",
+            Number(above=0, below=1),
+            "relative error allowed in objectives and their gradients",
+            default=1e-8,
+        ),
+        Key("step", POSITIVE, "fixed step", unit="s", otherwise="chosen from the tolerance"),
+        Key(
+            "spectral_radius",
+            Number(minimum=0, maximum=1),
+            "of generalized_alpha: 1 keeps high frequencies, 0 damps them out in a step",
+            otherwise="0.8",
+        ),
+        Key("sensitivity", _SENSITIVITIES, "how gradients are computed", default="auto"),
+        Key("assemble", Flag(), "move the start to the nearest one that fits the joints", default=False),
+        Key("settle", Flag(), "move the start to the static equilibrium nearby, with each design anew", default=False),
+    ),
+    doc="How motions and gradients are computed.",
+)
+
+FORMAT = Record(
+    "a case",
+    (
+        Key("format", Version(1), "version of the format", required=True),
+        Key("title", Text(), "what outputs and pictures call the case", default=""),
+        Key("gravity", PAIR, "acceleration of free fall, [x, y]", default=(0.0, 0.0), unit="m/s^2"),
+        Key(
+            "time",
+            Record(
+                "times",
+                (
+                    Key("start", NUMBER, "when the motion begins", default=0.0, unit="s"),
+                    Key("end", NUMBER, "when it ends, after the start", required=True, unit="s"),
+                ),
+                doc="When the motion is computed.",
+            ),
+            "when the motion begins and ends",
+            required=True,
+        ),
+        Key(
+            "bodies",
+            Named(BODY_KEYS, "body", 1),
+            "rigid bodies by name; `ground` is there without being declared",
+            required=True,
+        ),
+        Key("joints", ListOf(JOINT, what="joints"), "ideal constraints between two bodies", default=()),
+        Key("bushings", ListOf(BUSHING, what="bushings"), "elastic joints", default=()),
+        MOTIONS,
+        Key("points", Named(POINTS, "point grid"), "grids of points by name"),
+        Key("contacts", ListOf(CONTACT, what="contacts"), "points of one body against an edge of another", default=()),
+        Key("members", Named(GROUP_KEYS, "member group"), "groups of candidate members by name"),
+        LOADS,
+        Key(
+            "load_cases",
+            Named(LOAD_CASE, "load case"),
+            "loadings by name, each added to the common part",
+            otherwise="one, called `default`",
+        ),
+        Key("design", DESIGN, "start, bounds and power of the design variables", otherwise="that of each key"),
+        Key("objectives", Named(OBJECTIVE, "objective"), "what is to be improved, by name"),
+        Key("combine", COMBINE, "how objectives become one; needed where there is more than one"),
+        Key("constraints", ListOf(CONSTRAINT, what="constraints"), "bounds on volumes and responses", default=()),
+        Key("uncertainty", UNCERTAINTY, "what is not known for certain, and what becomes of objectives then"),
+        Key("optimizer", OPTIMIZER, "how the design is improved", otherwise="that of each key"),
+        Key("solver", SOLVER, "how motions and gradients are computed", otherwise="that of each key"),
+    ),
+)
+
+
+def json_schema() -> dict[str, Any]:
+    """The format as JSON Schema, draft 2020-12: completes and checks a case as it is typed."""
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "mdstopo case file, format 1",
+        "description": "One design problem. SI units; coordinates are global, at the start.",
+        **FORMAT.schema(),
+    }

@@ -1,0 +1,29 @@
+"""What `warm.Beside` runs in another process: `python -m mdstopo.compile_looking INTEGRATOR [MODULE...]`.
+
+It compiles what looks at the steps of an integrator; before that, the `compile_share` of each module.
+"""
+
+import gc
+import importlib
+import sys
+
+from mdstopo.children import end_with_parent
+from mdstopo.engine import Evaluator
+from mdstopo.integrators.driver import Driver
+from mdstopo.warm import tiny
+
+
+def compile_looking(integrator: str) -> None:
+    """Compile here what looks at the steps of an integrator: the work of the other process."""
+    driver = Evaluator(tiny(integrator), beside=False).driver("default")
+    assert isinstance(driver, Driver)
+    driver.compile_looking()
+
+
+if __name__ == "__main__":
+    end_with_parent(sys.stdin.buffer)
+    gc.disable()  # as in `session.compiling_apart`
+    for module in sys.argv[2:]:
+        importlib.import_module(module).compile_share()
+    compile_looking(sys.argv[1])
+    gc.freeze()  # it would be looked through at the end as well

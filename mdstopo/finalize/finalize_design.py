@@ -1,0 +1,243 @@
+"""From a result to its final case, each step a verb: keep, size, verify, write, read again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray, IndexArray
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import read_case
+from mdstopo.evaluators import make_engine
+from mdstopo.finalize.apart import apart, unlike
+from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.equilibria import Comparison, compare_equilibria
+from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
+from mdstopo.finalize.text import text_of
+from mdstopo.finalize.values import Parameter, told_apart
+from mdstopo.scene.refusals import refusals
+from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.run_session import run_session
+from mdstopo.starts.callbacks import ignore, never
+from mdstopo.starts.evaluator_interface import Evaluation, even, problem_of
+from mdstopo.starts.single_start import first_design, unshared
+from mdstopo.status import RunStatus
+from mdstopo.store.design_files import with_values
+from mdstopo.store.result_reader import ResultView
+from mdstopo.store.store_errors import StoreError
+from mdstopo.store.stored_case import case_of
+
+TIGHTER = 100.0
+"""By how much the tolerance of the verification is below the case's."""
+TIGHTEST = 1e-13
+"""Tolerances below it are lost in rounding."""
+SHORTER = 10.0
+"""The same for fixed steps: errors of second order fall a hundredfold."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One design, evaluated: its name in the table, how many members it has, and what was found."""
+
+    title: str
+    members: int
+    found: Evaluation
+
+
+@dataclass(frozen=True)
+class Finalized:
+    """What became of a result.
+
+    case: the full one; reduced: with only the members kept. kept (K,): their places among the design members, places:
+    in their groups. before, alpha (K,): their alphas in the result and now; values: the same of parameters of laws.
+    columns: full design, kept, re-optimised, verified, the last two those of the final case where there are such
+    parameters and it says all. outcome: of the re-optimisation. tighter: the verification's tolerance or step in words.
+    text: the final case, empty where there is none; told: what it cannot say. difference: largest relative one between
+    its objectives and those of the re-optimised design, None where it has none. equilibria: where the final design
+    settles, beside the full one; there is no text where that is lost.
+    """
+
+    case: Case
+    reduced: Case
+    kept: IndexArray
+    places: list[tuple[str, int]]
+    before: FloatArray
+    alpha: FloatArray
+    columns: tuple[Column, ...]
+    outcome: Outcome
+    tighter: str
+    text: str
+    told: list[str]
+    difference: float | None
+    values: list[Parameter]
+    equilibria: Comparison = field(default_factory=Comparison)
+
+
+def opened(
+    view: ResultView, changes: Mapping[str, str], notify: Callable[[str], None] = ignore
+) -> tuple[Case, FloatArray]:
+    """The case of a run, with further keys set, and its best design (N + P,), alphas that are one made so.
+
+    Raises CaseError and StoreError.
+    """
+    if view.kind != "run":
+        raise StoreError(f"{view.path}: a result of `{view.kind}`; finalize takes one of `run`")
+    case = case_of(view, changes)
+    for name, digest in case.files.items():
+        if view.texts.get(f"files/{name}", digest) != digest:
+            raise StoreError(f"{view.path}: the file {name} is no longer the one that the run read")
+    if "design/alpha" not in view.arrays:
+        raise StoreError(f"{view.path}: the run has no design yet")
+    alpha = np.squeeze(view.alpha) if view.alpha.ndim > 1 else view.alpha
+    if alpha.shape != (case.n_design,):
+        raise StoreError(
+            f"{case.path or case.name}: the design has {alpha.size} values; "
+            f"the case has {case.n_design} design variables"
+        )
+    space = case.space
+    if unknown := [name for name in view.under("design/variables") if name not in space.parts]:
+        raise StoreError(f"{view.path}: it holds values of the design variable {unknown[0]}; the case has none")
+    design = case.whole(with_values(view, None, alpha, space.parts))
+    if words := unshared(case, design):
+        notify(words)
+        design = np.concatenate([space.expand(space.reduce(design))[: case.n_design], design[case.n_design :]])
+    return case, design
+
+
+def ready(case: Case, design: FloatArray, keep: int | None, threshold: float | None) -> tuple[IndexArray, Case]:
+    """The members to keep and the case with only these; everything that can be refused is refused here.
+
+    design (N,) or (N + P,). Members whose alphas are one are kept together. Without any design member all is kept.
+    Raises CaseError and StoreError.
+    """
+    check(case)
+    if not case.is_optimizable:
+        raise StoreError(f"{case.path or case.name}: the case has no objectives to size members for")
+    whole = case.whole(design)
+    if whole.shape != (case.space.length,):
+        raise ValueError(f"design must have {case.n_design} or {case.space.length} values, not {design.size}")
+    alpha = whole[: case.n_design]
+    kept = chosen(alpha, keep, threshold, one_alpha(case))
+    if not len(kept) and case.n_design:
+        raise StoreError(f"no member has alpha of {threshold:g} or more; the largest is {alpha.max():.6g}")
+    split = unlike(case, kept)
+    reduced = restricted(apart(case, split), kept, whole)
+    check_restricted(reduced, case, split)
+    content_of(case)
+    return kept, reduced
+
+
+def tied(alpha: FloatArray, kept: IndexArray) -> int:
+    """How many members that are not kept have as large an alpha (N,) as the smallest that is."""
+    least = alpha[kept].min(initial=np.inf)
+    return int(np.count_nonzero(alpha >= least)) - len(kept)
+
+
+def finalize(
+    case: Case,
+    design: FloatArray,
+    kept: IndexArray,
+    reduced: Case,
+    *,
+    place: Path,
+    head: str = "",
+    on_iteration: Callable[[Progress], None] = ignore,
+    stop_requested: Callable[[], bool] = never,
+    notify: Callable[[str], None] = ignore,
+) -> Finalized:
+    """Re-optimise the members kept, verify them, and make the text of the final case.
+
+    Their sizes and the parameters of laws that vary are optimised together. case, reduced, kept: as `ready` gave them;
+    design (N,) or (N + P,): the design. place: where the text is going to stand. head: its first lines, comments. The
+    text is empty where the run was interrupted or its design cannot be computed.
+    """
+    design = case.whole(design)
+    joined = apart(case, unlike(case, kept))
+    held = kept_values(joined, kept)
+    count = len(kept)
+    before = design[np.concatenate([kept, case.n_design + held])]
+    outcome = run_session(
+        reduced, initial=before, on_iteration=on_iteration, stop_requested=stop_requested, notify=notify
+    )
+    engine = make_engine(reduced)
+    reached = np.concatenate([outcome.alpha, *outcome.variables.values()])
+    now = reduced.space.expand(first_design(reduced, problem_of(engine, even(reduced)), reached)[1])
+    own = places(case, kept)
+    values = told_apart(case, held, before[count:], now[count:])
+    equilibria = Comparison()
+
+    def made(columns: tuple[Column, ...], words: str, text: str, told: list[str], gap: float | None) -> Finalized:
+        sizes, stated = now[:count], before[:count]
+        return Finalized(
+            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, equilibria
+        )
+
+    if outcome.status is RunStatus.INTERRUPTED:
+        return made((), "", "", [], None)
+    found = engine.evaluate(now, gradient=False)
+    full = Column("full design", case.n_design, make_engine(case).evaluate(design, gradient=False))
+    first = Column("kept as they were", count, engine.evaluate(before, gradient=False))
+    told: list[str] = []
+    text, difference = "", None
+    source, sized = reduced, now
+    if found.status.usable and (not count or np.any(now[:count] ** reduced.power > 0.0)):
+        content, told = final_content(content_of(case), reduced, own, now)
+        text = head + text_of(content)
+        final = _read(text, place)
+        difference = _difference(final, found)
+        if reduced.variables and _says_all(final, reduced):
+            # without variables other kernels may compute it: what is reported is what is written
+            source, sized = final, final.start
+            found = make_engine(final).evaluate(sized, gradient=False)
+    tighter, words = _tighter(source)
+    verified = make_engine(tighter).evaluate(sized, gradient=False)
+    columns = (full, first, Column("re-optimised", count, found), Column("verified", count, verified))
+    if not (found.status.usable and verified.status.usable):
+        return made(columns, words, "", [], None)
+    end = design.copy()  # the final design as one of the full case: members left out have no size
+    end[: case.n_design] = 0.0
+    end[kept], end[case.n_design + held] = now[:count], now[count:]
+    equilibria = compare_equilibria(joined, design, end, reduced, now)
+    if equilibria.lost:
+        return made(columns, words, "", [], None)
+    return made(columns, words, text, told, difference)
+
+
+def _says_all(final: Case, reduced: Case) -> bool:
+    """Whether a final case has every objective and constraint of the one that it was made from."""
+    names = [objective.name for objective in final.objectives]
+    same = names == [objective.name for objective in reduced.objectives]
+    return same and len(final.constraints) == len(reduced.constraints)
+
+
+def _tighter(case: Case) -> tuple[Case, str]:
+    """The case with a hundredth of its errors, and how."""
+    solver = case.solver
+    if solver.step is not None:
+        step = solver.step / SHORTER
+        return replace(case, solver=replace(solver, step=step)), f"step {step:g} s"
+    tolerance = max(solver.tolerance / TIGHTER, min(solver.tolerance, TIGHTEST))
+    return replace(case, solver=replace(solver, tolerance=tolerance)), f"tolerance {tolerance:g}"
+
+
+def _read(text: str, place: Path) -> Case:
+    """The final case as a user will read it. Raises CaseError where it is none."""
+    case = read_case(text, path=place)
+    refused = refusals(case)
+    if refused:
+        raise CaseError(refused, str(place))
+    return case
+
+
+def _difference(case: Case, found: Evaluation) -> float | None:
+    """The largest relative difference between the objectives of a case at its own design and those found."""
+    if not case.objectives:
+        return None
+    again = make_engine(case).evaluate(case.start, gradient=False).objectives
+    pairs = np.array([[value, found.objectives[name]] for name, value in again.items()])
+    size = np.maximum(np.abs(pairs).max(axis=1), np.finfo(np.float64).tiny)
+    return float((np.abs(pairs[:, 0] - pairs[:, 1]) / size).max())

@@ -1,0 +1,242 @@
+"""A case run over values of its keys: every combination is a run of its own, and one table holds what they found."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import load_case
+from mdstopo.compiler.threads import cores
+from mdstopo.front.cluster import Cluster
+from mdstopo.front.directions import MOST, parse_range
+from mdstopo.front.jobs import Setting, Trial, first
+from mdstopo.front.pool import Here, Pool, Processes
+from mdstopo.front.run_front import WORTH, Snapshot
+from mdstopo.plan.solve_task import Found, case_key, failed
+from mdstopo.plan.stored_tasks import read_tasks, tasks_part
+from mdstopo.session.compiling_apart import compile_apart
+from mdstopo.session.shortfall import of_many
+from mdstopo.starts.callbacks import ignore, never
+from mdstopo.status import RunStatus, together
+from mdstopo.store.admit import admit, admit_resume, prepare_place
+from mdstopo.store.atomic import remove_leftovers
+from mdstopo.store.checkpoint import INTERVAL, Checkpointer
+from mdstopo.store.contents import Datasets, case_part
+from mdstopo.store.lock import Lock
+from mdstopo.store.provenance import Provenance
+from mdstopo.store.store_errors import WriteError
+from mdstopo.store.writing import write_result
+from mdstopo.workers.worker_pool import Lost
+
+
+@dataclass(frozen=True)
+class SweepOutcome:
+    """A sweep that has ended, or was stopped: keys, their values (W) as written, and what was found, None if not."""
+
+    case: Case
+    keys: tuple[str, ...]
+    values: tuple[tuple[str, ...], ...]
+    found: tuple[Found | None, ...]
+    status: RunStatus
+    reason: str
+    seconds: float
+    path: Path | None
+    warnings: tuple[str, ...] = ()
+
+
+def combinations(sets: Mapping[str, str]) -> tuple[tuple[str, ...], ...]:
+    """Every combination of the values of some keys, the last key fastest. Raises ValueError with a sentence."""
+    columns = []
+    for key, text in sets.items():
+        if ":" in text:
+            columns.append([shortest(value) for value in parse_range(text)])
+        else:
+            columns.append([word.strip() for word in text.split(",")])
+        if "" in columns[-1]:
+            raise ValueError(f"{key}: found {text!r}; a value is missing")
+    count = int(np.prod([len(column) for column in columns]))
+    if count > MOST:
+        raise ValueError(f"{count} combinations are more than {MOST}")
+    return tuple(product(*columns))
+
+
+def run_sweep(
+    case_path: Path,
+    overrides: Mapping[str, str],
+    sets: Mapping[str, str],
+    *,
+    path: Path,
+    resume: bool = False,
+    overwrite: bool = False,
+    workers: int | None = None,
+    cluster: str | None = None,
+    on_progress: Callable[[Snapshot], None] | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+    notify: Callable[[str], None] | None = None,
+    command: str = "",
+    worth: float = WORTH,
+) -> SweepOutcome:
+    """Run a case with every combination of the values in `sets`, {key: "a:b:step" or "x,y,z"}.
+
+    Other arguments as `run_front`'s. Raises CaseError where a combination is no case (all their mistakes at once).
+    """
+    values = combinations(sets)
+    base = load_case(case_path, dict(overrides))
+    cases = _cases(case_path, overrides, tuple(sets), values)
+    sweep = _Sweep(base, tuple(sets), values, cases, command)
+    tell = notify or ignore
+    place = prepare_place(path)
+    with Lock(place):
+        remove_leftovers(place)
+        solved: dict[str, Found] = {}
+        if resume:
+            view = admit_resume(place, base, tell, "sweep")
+            solved = {} if view is None else read_tasks(view, "sweep/tasks")
+        else:
+            admit(place, base, "sweep", overwrite, tell)
+        began = time.perf_counter()
+        for case in cases:
+            compile_apart(case, tell)
+        stop = stop_requested or never
+        saver = Checkpointer(lambda: sweep.checkpoint(place, tell))
+        due = [i for i, key in enumerate(sweep.runs) if key not in solved]
+        sweep.solved = solved
+        pool: Pool | None = None
+        try:
+            while due:
+                jobs = [Trial(cases[i], sweep.runs[i]) for i in due]
+                if pool is None:
+                    setting = Setting(base, case_key(base))
+                    wanted = cores() if workers is None else workers
+                    if cluster is not None:
+                        pool = Cluster(setting, stop, cluster)
+                    else:
+                        pool = Here(setting, stop)
+                        jobs = jobs if wanted == 1 else jobs[:1]  # the time of one says who runs the others
+                count = 0
+                for k, result in pool.results(jobs):
+                    i = due[k]
+                    count += 1
+                    sweep.solved[sweep.runs[i]] = lost(cases[i], result) if isinstance(result, Lost) else result
+                    if on_progress is not None:
+                        on_progress(sweep.snapshot())
+                    saver.offer(urgent=sweep.solved[sweep.runs[i]].seconds > INTERVAL)
+                if count < len(jobs):
+                    break
+                due = [i for i in due if sweep.runs[i] not in sweep.solved]
+                if isinstance(pool, Here) and due and wanted > 1:
+                    spent = sum(each.seconds for each in sweep.solved.values()) / max(len(sweep.solved), 1)
+                    if spent * len(due) > worth:
+                        pool = Processes(setting, stop, wanted, tell)
+        except Exception as error:  # what is finished is worth keeping, whatever it is that cannot go on
+            sweep.save(place, RunStatus.INTERRUPTED, str(error) or type(error).__name__)
+            raise
+        finally:
+            if pool is not None:
+                pool.close()
+        whole = all(key in sweep.solved for key in sweep.runs)
+        status, reason = sweep.verdict() if whole else (RunStatus.INTERRUPTED, "stopped; what is finished is saved")
+        sweep.warnings = sweep.stalled() if whole else ()
+        sweep.save(place, status, reason)
+    found = tuple(sweep.solved.get(key) for key in sweep.runs)
+    return SweepOutcome(
+        base, tuple(sets), values, found, status, reason, time.perf_counter() - began, place, sweep.warnings
+    )
+
+
+def _cases(
+    case_path: Path, overrides: Mapping[str, str], keys: Sequence[str], values: Sequence[tuple[str, ...]]
+) -> list[Case]:
+    cases, mistakes, seen = [], [], set()
+    for row in values:
+        try:
+            cases.append(load_case(case_path, {**overrides, **dict(zip(keys, row, strict=True))}))
+        except CaseError as error:
+            new = [mistake for mistake in error.mistakes if str(mistake) not in seen]
+            seen |= {str(mistake) for mistake in new}
+            mistakes += new
+    if mistakes:
+        raise CaseError(mistakes, str(case_path))
+    return cases
+
+
+class _Sweep:
+    """What a sweep has reached, and how it is saved."""
+
+    def __init__(
+        self, base: Case, keys: tuple[str, ...], values: Sequence[tuple[str, ...]], cases: list[Case], command: str
+    ) -> None:
+        self.base = base
+        self.keys = keys
+        self.values = values
+        self.runs = [case_key(case) for case in cases]
+        self.spaces = [case.space for case in cases]
+        self.solved: dict[str, Found] = {}
+        self.fixed: Datasets = case_part(base)
+        self.provenance = Provenance.collect(command)
+        self.warnings: tuple[str, ...] = ()
+
+    def stalled(self) -> tuple[str, ...]:
+        """The warning about runs that stalled; their tolerances may differ."""
+        found = [self.solved[key] for key in self.runs]
+        return of_many([(each.status, each.kkt) for each in found], "runs")
+
+    def verdict(self) -> tuple[RunStatus, str]:
+        """How the runs have ended."""
+        return together([self.solved[key].status for key in self.runs], "runs")
+
+    def snapshot(self) -> Snapshot:
+        """Progress."""
+        done = {i: self.solved[key] for i, key in enumerate(self.runs) if key in self.solved}
+        mean = sum(each.seconds for each in done.values()) / max(len(done), 1)
+        return Snapshot(
+            np.arange(len(self.runs), dtype=np.float64)[:, None], tuple(o.name for o in self.base.objectives), done, (),
+            len(done), sum(each.evaluations for each in done.values()), mean * (len(self.runs) - len(done)),
+        )  # fmt: skip
+
+    def checkpoint(self, path: Path, notify: Callable[[str], None]) -> None:
+        """Save in the middle."""
+        try:
+            self.save(path, RunStatus.RUNNING, "running")
+        except WriteError as error:
+            notify(f"no checkpoint: {error}")
+
+    def save(self, path: Path, status: RunStatus, reason: str) -> None:
+        """Write the file as a whole."""
+        done = [self.solved.get(key) for key in self.runs]
+        m = len(self.base.objectives)
+        part: Datasets = {
+            "keys": list(self.keys),
+            "objectives": np.array([np.full(m, np.nan) if each is None else each.objectives for each in done]),
+            "status": ["running" if each is None else each.status.value for each in done],
+            "reason": ["" if each is None else each.reason for each in done],
+            "kkt": np.array([np.nan if each is None else each.kkt for each in done]),
+            "evaluations": np.array([0 if each is None else each.evaluations for each in done], dtype=np.int64),
+        }
+        for k, key in enumerate(self.keys):
+            part[f"values/{key}"] = [row[k] for row in self.values]
+        tasks = [each for each in done if each is not None]
+        for i, (each, space) in enumerate(zip(done, self.spaces, strict=True)):
+            if each is not None:
+                design = space.expand(each.alpha)
+                part[f"alpha/{i}"] = design[: space.n_alpha]
+                part |= {f"variables/{i}/{name}": values for name, values in space.named(design).items()}
+        datasets = self.fixed | {f"sweep/{name}": value for name, value in part.items()}
+        datasets |= tasks_part(tasks, self.base, "sweep/tasks")
+        write_result(path, self.base, "sweep", status.value, reason, datasets, self.provenance, {}, self.warnings)
+
+
+def shortest(value: float) -> str:
+    """A number as a user would write it."""
+    text = f"{value:.15g}"
+    return text if float(text) == value else repr(value)
+
+
+def lost(case: Case, result: Lost) -> Found:
+    """What stands for a run that no worker finished; its key is empty, so that a resumed sweep tries again."""
+    return failed(0, "", first(case), len(case.objectives), result.reason)

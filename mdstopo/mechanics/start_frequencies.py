@@ -1,0 +1,38 @@
+"""Natural frequencies of springs between free bodies, at the start."""
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.mechanics.start_entry import start_tangents
+from mdstopo.scene.compile import Scene
+from mdstopo.scene.grids import places_of
+from mdstopo.scene.model import COUNT, DESIGN, FloatArray
+from mdstopo.scene.packing import pack
+
+
+def natural_frequencies(case: Case, scene: Scene, design: FloatArray) -> FloatArray:
+    """Angular frequencies (rad/s), rising, of small undamped motion about the start; unstable modes are left out.
+
+    design: alpha (N,).
+    """
+    model, n, pairs = scene.model, len(scene.model.inv_mass), len(scene.model.pair)
+    strength = model.member[5:8].copy()
+    for block, group in zip(model.block.tolist(), case.members, strict=True):
+        if block[DESIGN] >= 0:
+            first = block[DESIGN]
+            strength[:, places_of(block)] *= design[first : first + block[COUNT]] ** group.power
+    strength[1] = 0.0  # undamped
+    k, turn = np.zeros((1, pairs, 6, 6)), np.zeros((1, n))
+    packed = pack(model)
+    start_tangents(packed.ints, packed.floats, strength, scene.damped, k, turn)
+    matrix = np.zeros((n, n))
+    for p, (a, b) in enumerate(model.pair.tolist()):
+        rows = np.r_[3 * a : 3 * a + 3, 3 * b : 3 * b + 3]
+        matrix[np.ix_(rows, rows)] += k[0, p]
+    for body in range(0, n, 3):
+        matrix[body : body + 3, body + 2] -= turn[0, body : body + 3]
+    root = np.sqrt(model.inv_mass)
+    values = np.linalg.eigvals(root[:, None] * matrix * root[None, :]).real
+    rounding = 1e-12 * np.abs(values).max(initial=0.0)  # bodies that move freely
+    frequencies: FloatArray = np.sort(np.sqrt(values[values > rounding]))
+    return frequencies

@@ -1,0 +1,275 @@
+"""The piece of the optimiser for problems whose rows compete: limits on responses, members, load cases, objectives.
+
+A sequential quadratic program with a bundle. At the iterate x the subproblem is
+
+    minimise   z + sum_j nu_j s_j + d'B d/2   in the trust box, under the linear rows
+    subject to m_r(d) <= z,  m_r(d) <= s_j    for every row of the objective, and of constraint j, that is known
+
+with rows from the iterate and from trials near it, accepted or not, each a line or a norm (`bundle`, `conic`), one
+slack and one penalty a constraint, and B from the gradients of the Lagrangian (`curvature`). A step has to decrease the
+merit U + sum_j nu_j max(0, c_j), which is continuous whatever peaks come and go. Prices follow the multipliers, raised
+where a step leaves a violation that another in the box would not (steering: R. H. Byrd, J. Nocedal, R. A. Waltz, 2008).
+Where violation resists, the largest one becomes the objective itself (restoration) until limits hold, or until its own
+optimality conditions say that nothing near keeps them.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.conic import Program, Solution, solve
+from mdstopo.optimizer.curvature import FEW, Curvature, learnt
+from mdstopo.optimizer.nearest_feasible import repair
+from mdstopo.optimizer.problem import Floats, LinearRows, largest_of_groups
+from mdstopo.optimizer.stack import Slopes, Stack, joined
+
+#: what violations cost, in multipliers; the least share of the violation that could go which has to go; the factor on
+#: penalties until it does, and how often
+MARGIN, STEER, RAISE, RAISES = 2.0, 0.3, 5.0, 8
+#: steps that curvature is learnt from, where B is a matrix and where it is not
+STEPS, FEW_STEPS = 60, 12
+#: the least curvature, of the largest gradient entry over the range
+FLOOR = 1e-5
+#: cosine of two gradients from which on they are taken for those of one peak
+MATCH_COSINE = 0.5
+#: how much a rejected trial shrinks the box where its rows tell what stood in the way
+NULL_STEP_SHRINK = 0.7
+#: a violation below this share of the tolerance is none
+NOTHING = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A proposed step: x + d (N,), multipliers of the rows (K,) and of the linear rows (m,), what the model promises of
+    every group (J + 1,) there, and d'B d/2; whether the subproblem was solved."""
+
+    x: Floats
+    multipliers: Floats
+    linear: Floats
+    levels: Floats
+    curved: float
+    solved: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FeasibleSet:
+    """The designs that keep bounds (N,) and linear rows; range (N,): the unit of each variable."""
+
+    lower: Floats
+    upper: Floats
+    linear: LinearRows
+    range: Floats
+
+
+class Around(Protocol):
+    """The subproblems around one iterate, in its box."""
+
+    def solve(self, rows: Bundle, penalty: Floats) -> Trial:
+        """That of rows, where violations of the constraints cost penalty (J,)."""
+
+    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
+        """The step to the least sum of violations of so many constraints."""
+
+    def reach(self, rows: Bundle) -> Floats:
+        """By how much rows can change in the box, at most, (K,)."""
+
+    def flat(self, curvature: float) -> "Around":
+        """The same with one curvature of all variables, in ranges, and none that was learnt."""
+
+
+class RowModel(Protocol):
+    """What a problem's size decides of the bundle method: how subproblems are solved and steps are measured."""
+
+    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
+        """The subproblems at x (N,), in a box of so many ranges and so far; steps, changes: as of `State`."""
+
+    def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
+        """As `residual`."""
+
+    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+        """As `gradient_change`."""
+
+    def lengths(self, d: Floats) -> tuple[float, float]:
+        """The largest change of a variable and the length of a step d (N,), in ranges."""
+
+    def learnt(self, known: Slopes, more: Floats) -> Slopes:
+        """The last steps, or changes, that curvature is learnt from, and one (N,) more."""
+
+
+class DenseModel:
+    """Problems whose rows are matrices: everything is computed of all variables."""
+
+    def __init__(self, space: FeasibleSet) -> None:
+        self.space = space
+
+    def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
+        """As of `RowModel`."""
+        assert isinstance(steps, np.ndarray)
+        assert isinstance(changes, np.ndarray)
+        space = self.space
+        far = np.minimum(reach[1], reach[0] * space.range)
+        box = np.maximum(space.lower, x - far), np.minimum(space.upper, x + far)
+        return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range))
+
+    def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
+        """As of `RowModel`."""
+        return residual(own, x, self.space, penalty, steepest)
+
+    def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+        """As of `RowModel`."""
+        return gradient_change(bundle, new, d, multipliers)
+
+    def lengths(self, d: Floats) -> tuple[float, float]:
+        """As of `RowModel`."""
+        scaled = d / self.space.range
+        return float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
+
+    def learnt(self, known: Slopes, more: Floats) -> Slopes:
+        """As of `RowModel`."""
+        return joined(known, more[None])[-(STEPS if len(more) <= FEW else FEW_STEPS) :]
+
+
+@dataclass(frozen=True, slots=True)
+class _DenseAround:
+    """As `Around`: the iterate x, the box's ends (N,), B."""
+
+    x: Floats
+    space: FeasibleSet
+    box: tuple[Floats, Floats]
+    curvature: Curvature
+
+    def solve(self, rows: Bundle, penalty: Floats) -> Trial:
+        return subproblem(rows, self.x, self.space, self.box, penalty, self.curvature)
+
+    def least_violation(self, rows: Bundle, constraints: int) -> Trial:
+        return least_violation(rows, self.x, self.space, self.box, np.ones(constraints))
+
+    def reach(self, rows: Bundle) -> Floats:
+        return np.asarray(np.abs(_matrix(rows)) @ (self.box[1] - self.box[0]))
+
+    def flat(self, curvature: float) -> Around:
+        flat = Curvature.diagonal_of(np.full(len(self.x), curvature) / self.space.range**2)
+        return replace(self, curvature=flat)
+
+
+def _matrix(rows: Bundle) -> Floats:
+    assert not isinstance(rows.slope, Stack)
+    return rows.slope
+
+
+def subproblem(
+    bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], penalty: Floats, curvature: Curvature
+) -> Trial:
+    """Solve the model in the box (lower, upper) of designs around x (N,).
+
+    penalty (J,): of the constraints' violations; curvature: B. Fixed variables and linear rows without a free one are
+    left out; the trial keeps box and linear rows to rounding.
+    """
+    lower, upper = box[0] - x, box[1] - x
+    free = upper > lower
+    d, linear = np.zeros(len(x)), np.zeros(len(space.linear))
+    multipliers, solved = np.zeros(len(bundle)), True
+    if free.any():
+        left = LinearRows(space.linear.A[:, free], -space.linear.excess(x), space.linear.equal)
+        used = np.abs(left.A).max(axis=1, initial=0.0) > 0.0
+        left = LinearRows(left.A[used], left.b[used], left.equal[used])
+        (at_lines, lines), (at_norms, norms) = bundle.lines(), bundle.norms()
+        program = Program(
+            np.minimum(lower[free], 0.0), np.maximum(upper[free], 0.0),
+            replace(lines, slope=lines.slope[:, free]),
+            replace(norms, slope=norms.slope[:, free], across=norms.across[:, free]),
+            penalty, left, curvature.restricted(free),
+        )  # fmt: skip
+        found: Solution = solve(program)
+        solved = found.solved
+        d[free] = found.d
+        multipliers[at_lines], multipliers[at_norms] = found.lines, found.norms
+        linear[used] = found.linear
+    trial = repair(np.clip(x + d, box[0], box[1]), box[0], box[1], space.linear)
+    d = trial - x
+    levels = largest_of_groups(bundle.values_at(d), bundle.group, len(penalty) + 1)
+    return Trial(trial, multipliers, linear, levels, 0.5 * float(d @ curvature.times(d)), solved)
+
+
+def least_violation(bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], weight: Floats) -> Trial:
+    """The step to the least sum of violations in the box, times weight (J,); of the rows of constraints alone."""
+    only = bundle.subset(bundle.group > 0)
+    nothing = Bundle(
+        np.zeros((1, 2)), np.zeros((1, len(x))), np.zeros((1, only.across.shape[1])), np.array([np.nan]),
+        np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.bool_), np.zeros(1, dtype=np.int64), np.zeros(1),
+    )  # fmt: skip
+    steepest = float((weight[only.group - 1] * only.steepest).max(initial=0.0))
+    flat = Curvature.diagonal_of(np.maximum(1e-6 * steepest, 1e-300) / space.range)
+    return subproblem(nothing.joined(only), x, space, box, weight, flat)
+
+
+def gradient_change(bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
+    """How the gradient of the Lagrangian has changed over a step d beyond what the rows foresee, (N,), or None.
+
+    The iterate's own rows that carried a multiplier are compared with those of the trial (`new`, seen from there) which
+    have nearly the same gradient: the same peak, moved. Rows from elsewhere have no gradient at the iterate; their
+    multipliers count for the own ones of their group.
+    """
+    groups = int(max(bundle.group.max(initial=0), new.group.max(initial=0))) + 1
+    own = np.flatnonzero(bundle.own & (multipliers > 0.0))
+    total = np.bincount(bundle.group, weights=multipliers, minlength=groups)
+    mine = np.bincount(bundle.group[own], weights=multipliers[own], minlength=groups)
+    slopes, fresh = bundle.subset(own).slopes_at(d), new.slopes_at(np.zeros(len(d)))
+    change, matched = np.zeros(len(d)), False
+    sizes = np.sqrt((fresh**2).sum(axis=1))
+    for k, slope in zip(own.tolist(), slopes, strict=True):
+        size = float(np.sqrt(slope @ slope))
+        if size == 0.0 or mine[bundle.group[k]] == 0.0:
+            continue
+        cosine = np.where(new.group == bundle.group[k], fresh @ slope / np.maximum(size * sizes, 1e-300), -1.0)
+        best = int(cosine.argmax()) if len(cosine) else 0
+        if len(cosine) and cosine[best] >= MATCH_COSINE:
+            weight = multipliers[k] * total[bundle.group[k]] / mine[bundle.group[k]]
+            change += weight * (fresh[best] - slope)
+            matched = True
+    return change if matched else None
+
+
+def curvature_of(steps: Floats, changes: Floats, steepest: float, range_: Floats) -> Curvature:
+    """B in the variables' own units; it is learnt in ranges.
+
+    steps, changes (m, N): as `curvature.learnt`, in the variables' own units; steepest: the largest gradient entry of
+    the objective's rows; range_ (N,).
+    """
+    floor = FLOOR * steepest
+    found = learnt(steps / range_, changes * range_, floor)
+    return found.scaled(1.0 / range_, 1.0)
+
+
+def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float) -> float:
+    """The projected KKT residual at x, relative to the largest gradient entry `steepest`.
+
+    own: the iterate's rows; penalty (J,): bounds of the constraints' multipliers. The multipliers are those of the
+    proximal step, whose curvature is that entry: they make the residual all but least. It is the largest of: what a
+    step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
+    the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
+    """
+    if steepest == 0.0:
+        return 0.0
+    lines = Bundle(
+        np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
+        np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,
+    )  # fmt: skip
+    flat = Curvature.diagonal_of(np.full(len(x), steepest))
+    trial = subproblem(lines, x, space, (space.lower, space.upper), penalty, flat)
+    return residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
+
+
+def residual_of(
+    lines: Bundle, multipliers: Floats, linear: Floats, x: Floats, space: FeasibleSet, steepest: float
+) -> float:
+    """The residual with given multipliers of the rows (K,) and the linear rows (m,); see `residual`."""
+    gradient = (multipliers @ _matrix(lines) + linear @ space.linear.A) / steepest
+    moved = float(np.abs(x - np.clip(x - gradient, space.lower, space.upper)).max(initial=0.0))
+    values = lines.values()
+    objective = lines.group == 0
+    gaps = multipliers * np.where(objective, values.max(initial=-np.inf, where=objective) - values, np.abs(values))
+    slack = np.where(space.linear.equal, 0.0, np.abs(linear * space.linear.excess(x)))
+    return max(moved, float(gaps.sum() + slack.sum()) / steepest, abs(1.0 - float(multipliers[objective].sum())))

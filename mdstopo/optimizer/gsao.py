@@ -1,0 +1,287 @@
+"""The driver loop, as the paper's Figure 2: evaluate, judge, adapt, approximate, solve, and again.
+
+One step is one evaluation. Between two steps everything is in `State`, so that the loop can be stopped,
+stored and resumed anywhere without a difference in any bit.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.bundle_method import RESET_TRUST, BundleMethod
+from mdstopo.optimizer.competing_rows import DenseModel, FeasibleSet
+from mdstopo.optimizer.nearest_feasible import project
+from mdstopo.optimizer.problem import Floats, Problem, Sample
+from mdstopo.optimizer.safeguards import better, failure, no_cuts, plain_violation, scaled_violation, verdict
+from mdstopo.optimizer.separable import SeparableMethod
+from mdstopo.optimizer.shifts import Shifts
+from mdstopo.optimizer.state import History, RowDetails, State, Step
+from mdstopo.optimizer.wide import Measures, Space, ranges
+from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.optimizer.wide_rows import WideModel
+from mdstopo.settings.optimizer_presets import Settings
+from mdstopo.status import RunStatus
+
+# Share of U by which a design may be better than the iterate that has converged, by what it breaks limits within their
+# tolerance.
+EQUAL = 1e-5
+# What is left of the step that led to a failed evaluation.
+RETREAT = 0.5
+
+
+class Method(Protocol):
+    """What makes the steps of the driver, which copies the state before it lets a method change it."""
+
+    def begin(self, state: State) -> None:
+        """Go on from the iterate, whatever another method knows."""
+
+    def judge(self, state: State, sample: Sample) -> bool:
+        """Whether the evaluated trial is accepted, and then the iterate; adapts what depends on that."""
+
+    def propose(self, state: State) -> None:
+        """Set the next trial, what it promises, and the KKT residual at the iterate."""
+
+    def is_exhausted(self, state: State) -> bool:
+        """Whether the last steps have changed next to nothing, or the next one promises nothing."""
+
+
+class Gsao:
+    """General Sequential Approximate Optimization of a `Problem`.
+
+    problem: what to minimise; settings: from `presets.settings`. `start` gives the first state, `step` the
+    next one, until `state.running` is false. Raises InfeasibleRows from `start` where no design satisfies
+    bounds and volume rows, and ValueError where the bounds cross.
+    """
+
+    def __init__(self, problem: Problem, settings: Settings, clock: Callable[[], float] = time.perf_counter) -> None:
+        self.problem = problem
+        self.settings = settings
+        self.clock = clock
+        self.lower = np.asarray(problem.lower, dtype=np.float64)
+        self.upper = np.asarray(problem.upper, dtype=np.float64)
+        if not np.all(self.lower <= self.upper):
+            raise ValueError("a lower bound lies above its upper bound")
+        space = FeasibleSet(self.lower, self.upper, problem.linear, ranges(self.lower, self.upper))
+        self._measures = Measures(Space.of(self.lower, self.upper, problem.linear))
+        self.separable = SeparableMethod(space, self._measures, settings, getattr(problem, "competitors", None))
+        #: whether rows compete from the start; else the separable model begins
+        self.competes = bool(getattr(problem, "competes", False))
+        self.bundle = self._bundle_method(space) if settings.flag("bundle") else None
+
+    def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
+        """That of the problem's size; of very many variables only where rows compete from the start."""
+        if len(self.lower) < WIDE:
+            return BundleMethod(DenseModel(space), self.settings)
+        return BundleMethod(WideModel(space, self._measures), self.settings) if self.competes else None
+
+    def start(self, initial: Floats | None = None) -> State:
+        """Evaluate the (projected) initial design and propose a first step."""
+        began = self.clock()
+        first = self.problem.initial if initial is None else initial
+        alpha = project(np.asarray(first, dtype=np.float64), self.lower, self.upper, self.problem.linear)
+        sample = self.problem.evaluate(alpha)
+        wrong = failure(sample, self._measures.steepest)
+        state = self._first_state(alpha, sample, bool(wrong))
+        if wrong:
+            state.status = RunStatus.FAILED
+            state.reason = f"the initial design cannot be evaluated: {wrong}"
+        else:
+            self.separable.begin(state)
+            if self.bundle is not None and self.competes:
+                self.bundle.begin(state)
+            self._propose(state)
+        return self._finish(state, sample, alpha, 0.0, not wrong, began)
+
+    def step(self, state: State) -> State:
+        """One iteration: evaluate the proposed design, judge it, adapt, and propose the next.
+
+        Raises ValueError where the state is not running.
+        """
+        if not state.running:
+            raise ValueError(f"the run has ended: {state.reason}")
+        began = self.clock()
+        state = state.copy()
+        state.iteration += 1
+        state.evaluations += 1
+        tried, origin = state.trial, state.alpha
+        sample = self.problem.evaluate(tried)
+        self._measures.look(sample.gradients, tried)
+        wrong = failure(sample, self._measures.steepest)
+        accepted = False
+        if wrong:
+            self._retreat(state, wrong)
+        else:
+            accepted = self._judge(state, sample)
+        if state.running:
+            self._propose(state)
+        change, _ = self._measures.change(tried, origin)
+        return self._finish(state, sample, tried, change, accepted, began)
+
+    def reopen(self, state: State) -> State:
+        """The state under the present limits: a run that a moved limit or tolerance ended goes on."""
+        state = state.copy()
+        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
+        return state
+
+    # The steps of the loop.
+
+    def _first_state(self, alpha: Floats, sample: Sample, failed: bool) -> State:
+        """The state at a first design, before a method begins."""
+        n = len(alpha)
+        violation, plain = (float("inf"),) * 2 if failed else (scaled_violation(sample), plain_violation(sample))
+        return State(
+            alpha=alpha,
+            objective=sample.objective,
+            rows=sample.rows,
+            gradients=sample.gradients,
+            constraint_rows=sample.constraint_rows,
+            constraint_gradients=sample.constraint_gradients,
+            violation=violation,
+            cuts=no_cuts(n)[0],
+            cut_gradients=no_cuts(n)[1],
+            forgotten=float("inf"),
+            trial=alpha,
+            predicted=0.0,
+            kkt=float("nan"),
+            shift=Shifts(np.full(n, self.settings.number("shift_start"))),
+            step=Step(alpha, alpha),
+            trust=self.settings.number("trust_start") if self.settings.flag("trust_region") else 1.0,
+            convex=self.settings.number("convex_start"),
+            penalty=np.zeros(0),
+            merit_penalty=np.zeros(0),
+            row_details=RowDetails.of(sample),
+            bundle=Bundle.empty(n),
+            multipliers=np.zeros(0),
+            steps=np.zeros((0, n)),
+            changes=np.zeros((0, n)),
+            uses_bundle=False,
+            restoring=False,
+            resets=0,
+            concavity=np.zeros(1),
+            stagnation=0,
+            violation_mark=float("inf"),
+            dropped=False,
+            largest_gradient=0.0,
+            iteration=0,
+            evaluations=1,
+            small=0,
+            failed=0,
+            seconds=0.0,
+            best_alpha=alpha,
+            best_objective=sample.objective,
+            best_violation=violation,
+            best_plain=plain,
+            status=RunStatus.RUNNING,
+            reason="",
+            history=History(),
+        )
+
+    def _judge(self, state: State, sample: Sample) -> bool:
+        """Keep the evaluated trial where it is the best so far; whether the method at work accepts it."""
+        violation, plain = scaled_violation(sample), plain_violation(sample)
+        if better(sample.objective, violation, plain, state, self.settings.tolerance):
+            state.best_alpha, state.best_objective = state.trial, sample.objective
+            state.best_violation, state.best_plain = violation, plain
+        state.failed = 0
+        return self._method(state).judge(state, sample)
+
+    def _propose(self, state: State) -> None:
+        """The next trial; where the method at work gets no further, that of another one, or of the same begun anew."""
+        self._method(state).propose(state)
+        if self.bundle is not None and state.running and self._change_method(state, self.bundle):
+            self._method(state).propose(state)
+
+    def _method(self, state: State) -> Method:
+        """The one at work."""
+        if not state.uses_bundle:
+            return self.separable
+        assert self.bundle is not None
+        return self.bundle
+
+    def _change_method(self, state: State, bundle: BundleMethod) -> bool:
+        """Whether the bundle method takes over or begins anew, because the method at work gets no further."""
+        stuck = self._is_stuck(state)
+        if state.uses_bundle:
+            return bundle.begin_anew(state, stuck)
+        tolerance = self.settings.tolerance
+        if not stuck or (state.kkt <= tolerance and state.violation <= tolerance):
+            return False
+        state.trust = max(state.trust, RESET_TRUST)
+        bundle.begin(state)
+        return True
+
+    def _is_stuck(self, state: State) -> bool:
+        """Whether the next step would change next to nothing, or the last ones have."""
+        if self._move(state) <= self.settings.number("change_tolerance"):
+            return True
+        return self._method(state).is_exhausted(state)
+
+    def _retreat(self, state: State, wrong: str) -> None:
+        """After a failed evaluation: a smaller box around the iterate, or the end after too many in a row."""
+        state.failed += 1
+        state.small = 0
+        move = self._move(state)
+        state.trust = min(state.trust, move) * RETREAT
+        if state.failed > self.settings.number("failures"):
+            state.status = RunStatus.FAILED
+            state.reason = (
+                f"{state.failed} evaluations in a row failed, the last one because {wrong}; "
+                "the best design so far is kept"
+            )
+
+    def _move(self, state: State) -> float:
+        return self._measures.change(state.trial, state.alpha)[1]
+
+    def _finish(
+        self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
+    ) -> State:
+        """Write the history's row and look at the stops."""
+        state.seconds += self.clock() - began
+        state.history = state.history.extended(
+            sample,
+            self._measures.excess(design),
+            change,
+            state.evaluations,
+            state.seconds,
+            state.kkt,
+            accepted,
+        )
+        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
+        if state.status is RunStatus.CONVERGED:
+            self._report_iterate(state)
+        return state
+
+    @staticmethod
+    def _report_iterate(state: State) -> None:
+        """What has converged is what is told, where a design before it is better by no more than limits are kept to."""
+        if abs(state.objective - state.best_objective) <= EQUAL * abs(state.best_objective):
+            state.best_alpha, state.best_objective = state.alpha, state.objective
+            state.best_violation, state.best_plain = state.violation, plain_violation(state.sample)
+
+
+def run(
+    optimizer: Gsao,
+    state: State | None = None,
+    *,
+    on_iteration: Callable[[State], None] | None = None,
+    stop_requested: Callable[[], bool] | None = None,
+) -> State:
+    """Drive an optimiser to its end, from `state` or from the start.
+
+    on_iteration sees every new state, the first included. Between iterations stop_requested is asked; if it
+    says yes the state is returned still running, and `run` continues from it as if nothing had been.
+    """
+    if state is None:
+        state = optimizer.start()
+        if on_iteration is not None:
+            on_iteration(state)
+    while state.running:
+        if stop_requested is not None and stop_requested():
+            break
+        state = optimizer.step(state)
+        if on_iteration is not None:
+            on_iteration(state)
+    return state

@@ -1,0 +1,55 @@
+"""The pictures there are. A new one is a line here and a file `NAME_plot.py` beside this one."""
+
+from dataclasses import dataclass
+from importlib import import_module
+
+import numpy as np
+
+from mdstopo.store.result_reader import ResultView
+
+
+@dataclass(frozen=True)
+class Plot:
+    """place: module and function that draw it; what: a sentence; options: of the command that it understands."""
+
+    place: tuple[str, str]
+    what: str
+    options: tuple[str, ...] = ()
+
+    @property
+    def draw(self):  # type: ignore[no-untyped-def]
+        """The function."""
+        return getattr(import_module(f"mdstopo.plots.{self.place[0]}_plot"), self.place[1])
+
+
+PLOTS: dict[str, Plot] = {
+    "layout": Plot(("layout", "draw"), "bodies and members, at the start or at --time", ("load_case", "times")),
+    "convergence": Plot(("convergence", "draw"), "objectives over the iterations"),
+    "design": Plot(("design", "draw"), "alpha of every member"),
+    "sensitivities": Plot(("sensitivities", "draw"), "dG/dalpha of every member", ("members",)),
+    "histories": Plot(("histories", "draw"), "what the objectives look at, over time", ("load_case",)),
+    "sensitivity-histories": Plot(
+        ("histories", "draw_sensitivities"), "dg/dalpha over time, from `gradient --history`", ("members",)
+    ),
+    "front": Plot(("front", "draw"), "the front and every design visited", ("marked",)),
+}
+
+
+def fitting(view: ResultView) -> list[str]:
+    """The pictures that a result file has the content for."""
+    paths = view.arrays.keys()
+    found = []
+    if "pareto/objectives" in paths:
+        found.append("front")
+    alphas = bool(np.any(view.arrays.get("members/design", True)))
+    if view.kind in ("run", "pareto") or "design/alpha" in paths:
+        found += ["layout", "design"] if alphas else ["layout"]
+    if "iterations/combined" in paths:
+        found.insert(0, "convergence")
+    if alphas and any(path.startswith("sensitivities/") and "/history/" not in path for path in paths):
+        found.append("sensitivities")
+    if alphas and any("/history/" in path for path in paths):
+        found.append("sensitivity-histories")
+    if "layout" in found and view.lines("objectives"):
+        found.append("histories")
+    return found

@@ -1,0 +1,230 @@
+"""What the page shows, as plain data: everything that the script draws is computed here."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import GROUND, Case, GapLaw, MemberGroup, SpringLaw
+from mdstopo.case.units import unit_of, unit_of_value, words
+from mdstopo.engine import Evaluator
+from mdstopo.limiting.compare import compared
+from mdstopo.plots.scenery import outline, sizes, start_state
+from mdstopo.plots.source import Source
+from mdstopo.plots.watch import points_at, response_history
+from mdstopo.store.whole_front import whole_front
+
+Floats = NDArray[np.float64]
+
+#: frames of a motion, samples of a response; designs of a front that are simulated; members that are drawn, at most
+FRAMES, SAMPLES, SIMULATED, DRAWN = 81, 161, 60, 10_000
+#: share of its range below which a member is not drawn
+FAINT = 0.02
+
+
+def content(source: Source) -> dict[str, Any]:
+    """The page's data; numbers are rounded to what a screen can show."""
+    case, view = source.case, source.view
+    names = list(source.names)
+    known = _bounds(source)
+    kkts = view.arrays.get("iterations/kkt", np.zeros(0))
+    objectives = {each.name: each for each in case.objectives}
+    page: dict[str, Any] = {
+        "title": source.title,
+        "status": view.status.replace("_", " "),
+        "reason": view.reason,
+        "kkt": _plain(_rounded(kkts[-1:], 2))[0] if view.kind == "run" and len(kkts) else None,
+        "kind": view.kind,
+        "warnings": list(view.warnings),
+        "case": view.case_text,
+        "versions": dict(view.provenance),
+        "settings": {key: value for key, value in view.settings.items() if not key.startswith("set ")},
+        "objectives": [
+            {"name": name, "unit": unit_of_value(objectives[name]), "what": _what(case, name),
+             "load_case": objectives[name].load_case, "over_time": objectives[name].over_time,
+             "bound": known.get(name)}
+            for name in names
+        ],
+        "load_cases": list(source.load_cases),
+        "bodies": _bodies(case),
+        "start": _rounded(start_state(case)),
+        "designs": _designs(source),
+    }  # fmt: skip
+    iterations = view.under("iterations")
+    if "combined" in iterations:
+        page["iterations"] = {
+            "objectives": _rounded(iterations["objectives"].T),
+            "combined": _rounded(iterations["combined"]),
+        }
+    if "pareto/objectives" in view.arrays:
+        front = whole_front(view)
+        page["front"] = {
+            "objectives": _rounded(front["objectives"]),
+            "weights": _rounded(front["weights"]),
+            "dominated": front["dominated"].tolist(),
+            "status": front["status"],
+            "reason": front["reason"],
+            "kkt": _rounded(front["kkt"], 2),
+        }
+    return page
+
+
+def _bounds(source: Source) -> dict[str, dict[str, Any]]:
+    """What no members do better, beside the best of a run or a front; of the objectives for which theory gives it."""
+    if source.view.kind not in ("run", "pareto"):
+        return {}
+    found = compared(source.case, source.view)
+    largest = {each.name for each in source.case.objectives if each.sense == "maximize"}
+    return {
+        name: {"value": each.bound, "why": each.why, "best": each.best, "gap": each.gap, "above": name in largest}
+        for name, each in found.items()
+        if each.bound is not None
+    }
+
+
+def _what(case: Case, name: str) -> str:
+    """What an objective looks at, and its measure in an uncertain case; what is shown over time is the nominal case."""
+    what = words(_objective(case, name).response)
+    return what if case.uncertainty is None else f"{what}, {case.uncertainty.objectives[name].words}"
+
+
+def _bodies(case: Case) -> list[dict[str, Any]]:
+    found = []
+    for name in [*(body.name for body in case.bodies), GROUND]:
+        corners = outline(case, name)
+        points = [grid.local for grid in case.points.values() if grid.body == name]
+        if name == GROUND and not len(corners):
+            continue
+        cloud = np.concatenate(points) if points else np.zeros((0, 2))
+        found.append({"name": name, "outline": _rounded(corners), "points": _rounded(cloud)})
+    return found
+
+
+def _designs(source: Source) -> list[dict[str, Any]]:
+    """One design of a run, or all of a front; each with its members, motions and responses."""
+    arrays = source.view.arrays
+    if "pareto/alpha" not in arrays:
+        return [_design(source, source.engine, source.design)]
+    front = whole_front(source.view)
+    values = [front[f"variables/{each.name}"] for each in source.case.variables]
+    designs = np.concatenate([front["alpha"], *values], axis=1).astype(np.float64)
+    usable = [k for k in range(len(designs)) if np.isfinite(designs[k]).all()]
+    chosen = set(usable[:: max(1, math.ceil(len(usable) / SIMULATED))])
+    return [_design(source, source.engine, designs[k], k in chosen) if k in usable else {} for k in range(len(designs))]
+
+
+def _design(source: Source, engine: Evaluator, alpha: Floats, moves: bool = True) -> dict[str, Any]:
+    case = source.case
+    members, kept = _members(case, alpha)
+    design: dict[str, Any] = {"members": members, "motions": {}}
+    for load_case in case.load_cases if moves else ():
+        motion = engine.trajectory(alpha, load_case.name)
+        last = float(motion.t[-1])
+        if len(motion.t) < 2:
+            continue
+        frames = np.linspace(motion.t[0], last, FRAMES)
+        states = motion.at(frames)
+        forces = _forces(case, alpha, kept, states.q, states.v)
+        times = np.linspace(motion.t[0], last, SAMPLES)
+        histories = response_history(engine, alpha, load_case.name, times)
+        design["motions"][load_case.name] = {
+            "t": _rounded(frames),
+            "q": _rounded(states.q),
+            "force": None if forces is None else _rounded(forces, 4),
+            "whole": motion.status.ok,
+            "times": _rounded(times),
+            "responses": [
+                {"name": name, "unit": unit_of(_objective(case, name).response), "values": _rounded(values)}
+                for name, values in histories.items()
+            ],
+        }
+    return design
+
+
+def _objective(case: Case, name: str) -> Any:
+    return next(each for each in case.objectives if each.name == name)
+
+
+def _members(case: Case, alpha: Floats) -> tuple[dict[str, Any], list[tuple[MemberGroup, NDArray[np.int64]]]]:
+    """Members that are thick enough to be seen, the thickest first where there are many; and which they are."""
+    slices = case.group_slices
+    shares = []
+    for group in case.members:
+        if group.design:
+            shares.append(sizes(group, alpha[slices[group.name]]))
+        else:
+            shares.append(np.ones(len(group)))
+    every = np.concatenate(shares) if shares else np.zeros(0)
+    least = max(FAINT, float(np.sort(every)[-DRAWN]) if len(every) > DRAWN else 0.0)
+    index = {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
+    kept, rows = [], []
+    for g, (group, share) in enumerate(zip(case.members, shares, strict=True)):
+        chosen = np.flatnonzero(share >= least)
+        kept.append((group, chosen))
+        a, b = index[group.body_from], index[group.body_to]
+        p, q = group.p_local[chosen], group.q_local[chosen]
+        for k, i in enumerate(chosen.tolist()):
+            rows.append([g, a, b, *_rounded(p[k]), *_rounded(q[k]), round(float(share[i]), 3), i])
+    return {"groups": [group.name for group in case.members], "rows": rows, "all": len(every)}, kept
+
+
+def _forces(
+    case: Case, alpha: Floats, kept: list[tuple[MemberGroup, NDArray[np.int64]]], q: Floats, v: Floats
+) -> Floats | None:
+    """f* (T, K) of the members that are drawn, pull positive.
+
+    None where a law is no spring or gap that always acts, and where laws vary.
+    """
+    slices, columns = case.group_slices, []
+    if case.variables:
+        return None
+    for group, chosen in kept:
+        if not all(
+            isinstance(law, (SpringLaw, GapLaw)) and law.active_from is None and law.active_until is None
+            for law in group.laws
+        ):
+            return None
+        p = points_at(case, group.body_from, group.p_local[chosen], q)
+        r = points_at(case, group.body_to, group.q_local[chosen], q) - p
+        length = np.linalg.norm(r, axis=2)
+        h = 1e-6
+        moved = points_at(case, group.body_to, group.q_local[chosen], q + h * v)
+        moved = moved - points_at(case, group.body_from, group.p_local[chosen], q + h * v)
+        rate = (np.linalg.norm(moved, axis=2) - length) / h
+        scale = alpha[slices[group.name]][chosen] ** group.power if group.design else np.ones(len(chosen))
+        total = np.zeros_like(length)
+        for law in group.laws:
+            assert isinstance(law, (SpringLaw, GapLaw))
+            free = group.length[chosen] if law.free_length is None else law.free_length
+            total += _spring(law, length - free, rate) if isinstance(law, SpringLaw) else _gap(law, length - free, rate)
+        columns.append(scale * total)
+    return np.concatenate(columns, axis=1) if columns else np.zeros((len(q), 0))
+
+
+def _spring(law: SpringLaw, stretch: Floats, rate: Floats) -> Floats:
+    return law.stiffness * stretch + law.damping * rate + law.preload
+
+
+def _gap(law: GapLaw, stretch: Floats, rate: Floats) -> Floats:
+    side = -1.0 if law.side == "compression" else 1.0
+    force = law.stiffness * (side * stretch - law.gap) + law.damping * side * rate
+    if law.clip:
+        force = np.maximum(force, 0.0)
+    return np.where(side * stretch >= law.gap, side * force, 0.0)
+
+
+def _rounded(array: Any, digits: int = 6) -> Any:
+    """Nested lists with so many significant digits; null for what is not finite."""
+    values = np.asarray(array, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.where((values != 0.0) & np.isfinite(values), np.floor(np.log10(np.abs(values))), 0.0)
+    factor = 10.0 ** np.clip(digits - 1 - size, -300, 300)
+    plain = np.where(np.isfinite(values), np.round(values * factor) / factor, np.nan)
+    return _plain(plain.tolist())
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_plain(each) for each in value]
+    return None if value != value else value

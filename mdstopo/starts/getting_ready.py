@@ -1,0 +1,74 @@
+"""Getting ready: every kernel loaded, always in one order.
+
+Machine code that a process has just compiled can differ in the last bits from the same kernels loaded from the cache
+(functions inside it exist in several copies, and which one is linked depends on who came first). A run that is resumed,
+or spread over workers, must not depend on that. So nothing that counts is computed by freshly compiled code: another
+process compiles first (`session.compiling_apart`), and every process then loads kernels alike.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.model import Case
+from mdstopo.optimizer.problem import LinearRows, Problem, Sample
+from mdstopo.optimizer.wide import MANY
+from mdstopo.optimizer.wide_numbers import WIDE
+from mdstopo.starts.evaluator_interface import Engine
+from mdstopo.starts.single_start import first_design, make_optimizer
+from mdstopo.store.contents import Motion
+
+Floats = NDArray[np.float64]
+
+FEW = 3
+"""Variables of the smallest problem."""
+_SMALL = 100_000  # members up to which an evaluation costs nothing beside loading its kernels
+
+
+def get_ready(
+    case: Case, engine: Engine, problem: Problem, initial: Floats | None
+) -> tuple[Floats, Floats, dict[str, Motion]]:
+    """Load every kernel, always in this order, so that iterations are timed for themselves and repeat to the bit.
+
+    Returns the stated first x (n,), the nearest one that keeps bounds and volume rows, and its motion in each load
+    case. Raises CaseError where no design keeps the rows.
+    """
+    for size in [FEW, *(many for many in (MANY, WIDE) if len(problem.initial) >= many)]:
+        meet(case, size, size >= WIDE and bool(getattr(problem, "competes", False)))
+    stated, begin = first_design(case, problem, initial)
+    before = motions(case, engine, case.space.expand(begin))
+    if case.n_members <= _SMALL:
+        problem.evaluate(begin)
+    return stated, begin, before
+
+
+def meet(case: Case, size: int, competes: bool = False) -> None:
+    """Load the kernels that the optimiser calls where there are so many variables, and where their rows compete."""
+    optimizer = make_optimizer(case, _Toy(size, competes))
+    state = optimizer.start()
+    if state.running:
+        optimizer.step(state)
+
+
+def motions(case: Case, engine: Engine, design: Floats) -> dict[str, Motion]:
+    """The motion of a design in each load case."""
+    return {each.name: engine.trajectory(design, each.name) for each in case.load_cases}
+
+
+class _Toy:
+    """A problem of two rows, both of which decide, or of many variables the higher: enough to meet every kernel."""
+
+    def __init__(self, size: int, competes: bool) -> None:
+        self.competes = competes
+        self.initial = np.full(size, 0.5)
+        self.lower = np.full(size, 0.001)
+        self.upper = np.ones(size)
+        self.linear = LinearRows(np.ones((1, size)), np.array([0.5 * size]), np.array([True]))
+        rising = np.linspace(1.0, 3.0, size)
+        self._slopes = np.array([rising, rising[::-1] if size < MANY else 0.9 * rising])
+
+    def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
+        """The rows and their slopes."""
+        values = np.sum(self._slopes / x, axis=1)
+        order = np.argsort(-values, kind="stable")
+        slopes = (-self._slopes / x**2)[order]
+        return Sample(float(values.max()), values[order], slopes, np.zeros(0), np.zeros((0, len(x))))
