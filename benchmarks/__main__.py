@@ -29,6 +29,7 @@ SECTIONS = {
     "forward": "forward runs of the paper's bodies beside other programs",
     "million": "a million members beside JAX",
     "parts": "what parts of our own save: single precision, sines and powers, counting (compiles for minutes)",
+    "golden": "what differs to the bit from values, gradients and iterates kept before (--check FILE, --write FILE)",
     "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
     "hunt": "random scenes against a second model, differences, invariances and the error estimates (--minutes)",
 }
@@ -40,7 +41,7 @@ PEERS = ("peers", "ring", "forward", "million")
 CAMPAIGNS = ("damage", "hunt")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts")
+NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts", "golden")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {
@@ -68,6 +69,8 @@ def main() -> int:
     parser.add_argument("--peers-python", default=sys.executable, metavar="FILE", help="interpreter that runs them")
     parser.add_argument("--minutes", type=float, default=10.0, metavar="M", help="how long to hunt (default: 10)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="the first scene of a hunt (default: 0)")
+    parser.add_argument("--check", type=Path, metavar="FILE", help="golden: compare with what is kept in FILE")
+    parser.add_argument("--write", type=Path, metavar="FILE", help="golden: keep what is computed now in FILE")
     parser.add_argument(
         "--readme",
         action="store_true",
@@ -115,6 +118,8 @@ def _tables(name: str, chosen: argparse.Namespace) -> Iterator[Table]:
     section: Callable[..., Iterator[Table]] = getattr(import_module(module), name)
     if name == "hunt":
         return section(chosen.minutes, chosen.seed)
+    if name == "golden":
+        return section(chosen.check, chosen.write)
     return section(folder=Path("cases/designs")) if name == "applications" and chosen.pages else section()
 
 
