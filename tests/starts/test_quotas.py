@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mdstopo.optimizer.start_families import Family
 from mdstopo.optimizer.state import State
 from mdstopo.starts.quotas import QUOTAS, drop, rounds
-from mdstopo.starts.single_start import make_optimizer
+from mdstopo.starts.single_start import LONG_FIRST_STEPS, make_optimizer
 from mdstopo.status import RunStatus
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
 
@@ -55,3 +56,14 @@ def test_starts_that_begin_at_the_best_do_so_at_that_of_the_others_also_when_res
         tasks = [next(going)[0] for _ in range(3)][1:]
         assert [task.index for task in tasks] == [4, 5]
         assert all(task.best is not None and task.best[0] == 0.1 for task in tasks)
+
+
+def test_random_designs_begin_with_long_steps_where_the_case_states_none() -> None:
+    case = limited(hand_made_case(), 60)
+    problem = FakeEngineWithEvaluations(case).problem()
+    boxes = {family: make_optimizer(case, problem, family).start().trust for family in Family}
+    assert boxes.pop(Family.RANDOM) == LONG_FIRST_STEPS
+    assert set(boxes.values()) == {make_optimizer(case, problem).start().trust}
+    assert LONG_FIRST_STEPS > 2.0 * boxes[Family.STATED]
+    stated = replace(case, optimizer=replace(case.optimizer, options=(("trust_start", 0.1),)))
+    assert make_optimizer(stated, problem, Family.RANDOM).start().trust == 0.1
