@@ -7,8 +7,7 @@ from dataclasses import field
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray, FrozenDict, read_only
-from mdstopo.case.parts import Pair
+from mdstopo.case.arrays import FloatArray, FrozenDict, Pair, read_only
 from mdstopo.case.value import Value, frozen
 
 

@@ -13,6 +13,9 @@ from mdstopo.case.value import Value, frozen
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
+Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+
 _K = TypeVar("_K")
 _V = TypeVar("_V")
 

@@ -2,30 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import Field
 from typing import Any
 
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import Number
-from mdstopo.case.model import MemberGroup, Variable
+from mdstopo.case.laws.law import with_role
+from mdstopo.case.model import Law, MemberGroup, Variable
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.schema_scene import LAW
 from mdstopo.case.words import inside, listed, number_text, shown
 
-_ALWAYS = ("active_from", "active_until")
-#: the parameters of each law by which the engine differentiates
-PARAMETERS = {
-    "spring": ("stiffness", "damping", "free_length", "preload", *_ALWAYS),
-    "gap": ("stiffness", "damping", "gap", "free_length", *_ALWAYS),
-    "cubic": ("stiffness", "cubic", "free_length", *_ALWAYS),
-    "curve": ("free_length", *_ALWAYS),
-    "pulse": ("peak", "rate", "time", *_ALWAYS),
-    "table": _ALWAYS,
-    "actuator": ("proportional", "derivative", "target", "limit", *_ALWAYS),
-    "crush": ("stiffness", "force", "gap", "free_length", *_ALWAYS),
-    "inerter": ("inertance", *_ALWAYS),
-}
+
+def varying(law: Law) -> tuple[str, ...]:
+    """The parameters of a law by which the engine differentiates."""
+    return with_role(type(law), "varies")
 
 
 def build_shared(top: Fields, groups: dict[str, MemberGroup] | None, reading: Reading) -> dict[str, Any]:
@@ -127,20 +119,20 @@ def _build(name: str, fields: Fields, groups: dict[str, MemberGroup], reading: R
             reading.mistake(path, f"the key 'initial' is missing, and the laws {why} (the first value of {parameter})")
             return None
         initial = own.pop()
-    if not _within(fields, initial, parameter, records[0].type, reading):
+    field = type(records[0]).__dataclass_fields__[parameter]
+    if not _within(fields, initial, field, reading):
         return None
-    key = _key(records[0].type, parameter)
     return Variable(
         name, tuple(names), tuple(law or 0 for law in laws), parameter, fields["each"],
         counts[0] if fields["each"] == "member" else 1, initial, fields["lower"], fields["upper"], fields["cost"],
-        key.unit,
+        field.metadata["unit"],
     )  # fmt: skip
 
 
 def _law(group: MemberGroup, fields: Fields, reading: Reading) -> int | None:
     """The place of the law that is meant, of those of a group."""
     parameter, stated = fields["parameter"], fields["law"]
-    having = [i for i, law in enumerate(group.laws) if parameter in PARAMETERS.get(law.type, ())]
+    having = [i for i, law in enumerate(group.laws) if parameter in varying(law)]
     if stated is None:
         if len(having) == 1:
             return having[0]
@@ -155,30 +147,26 @@ def _law(group: MemberGroup, fields: Fields, reading: Reading) -> int | None:
         return None
     elif stated in having:
         return int(stated)
-    types = [law.type for law in group.laws] if stated is None else [group.laws[stated].type]
-    can = dict.fromkeys(name for law in types for name in PARAMETERS.get(law, ()))
+    asked = group.laws if stated is None else (group.laws[stated],)
+    types = listed(law.type for law in asked)
+    can = dict.fromkeys(name for law in asked for name in varying(law))
     reading.mistake(
         inside(fields.path, "parameter"),
-        f"found {shown(parameter)}, which can be varied in no law of {group.name!r} ({listed(types)}); "
+        f"found {shown(parameter)}, which can be varied in no law of {group.name!r} ({types}); "
         f"there can be {listed(can) or 'none'}",
     )
     return None
 
 
-def _key(law: str, parameter: str) -> Any:
-    return next(key for key in LAW.variants[law].keys if key.name == parameter)
-
-
-def _within(fields: Fields, initial: float, parameter: str, law: str, reading: Reading) -> bool:
+def _within(fields: Fields, initial: float, field: Field[Any], reading: Reading) -> bool:
     """Whether bounds and start go together, and with what the law allows; notes what does not."""
     good = True
-    kind = _key(law, parameter).kind
-    # a limit of 0 means another law: no force at all
-    above = 0.0 if parameter == "limit" else kind.above
+    kind = field.metadata["kind"]
+    above = field.metadata.get("varies_above", kind.above)
     lower, upper = fields["lower"], fields["upper"]
     if (above is not None and lower <= above) or (kind.minimum is not None and lower < kind.minimum):
         allowed = Number(above=above).allowed() if above is not None else kind.allowed()
-        reading.mistake(inside(fields.path, "lower"), f"found {number_text(lower)}, {parameter} is {allowed}")
+        reading.mistake(inside(fields.path, "lower"), f"found {number_text(lower)}, {field.name} is {allowed}")
         good = False
     if lower > upper:
         message = f"found {number_text(lower)}, allowed is at most upper {number_text(upper)}"

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray, Table
+from mdstopo.case.laws.law import numbers
 from mdstopo.case.memory import BYTES_PER_MEMBER, total_memory
-from mdstopo.case.model import GROUND, LAWS, CurveLaw, Law, MemberGroup, PointGrid
+from mdstopo.case.model import GROUND, LAWS, Law, MemberGroup, PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
@@ -242,7 +243,7 @@ def _in_range(
     worst = len(length) * longest * longest / min([1.0, *masses])
     good = True
     for index, law in enumerate(laws):
-        if isinstance(law, CurveLaw):
+        if not numbers(type(law)):
             continue
         for key in type(law).__dataclass_fields__:
             value = getattr(law, key)

@@ -101,6 +101,11 @@ class Number(Value):
         return {"type": kind, **{word: limit for word, limit in limits.items() if limit is not None}}
 
 
+NUMBER = Number()
+POSITIVE = Number(above=0)
+NOT_NEGATIVE = Number(minimum=0)
+
+
 @frozen
 class Flag(Value):
     """true or false."""

@@ -5,21 +5,13 @@ Whether joints fit at the start is checked where scenes are built.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import (
-    GROUND,
-    Bushing,
-    DistanceJoint,
-    FixedJoint,
-    Joint,
-    Pair,
-    PrismaticJoint,
-    RevoluteJoint,
-)
+from mdstopo.case.joints import JOINTS, Joint
+from mdstopo.case.joints.joint import Stated
+from mdstopo.case.model import GROUND, Bushing, Pair
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, listed, shown
@@ -66,31 +58,16 @@ def build_bushings(entries: Any, frames: Frames, reading: Reading) -> tuple[Bush
 def _build_joint(index: int, fields: Fields, frames: Frames, reading: Reading) -> Joint | None:
     bodies = _two_bodies(fields, frames, reading)
     ends = None if bodies is None else _points(fields, bodies, frames, reading)
-    axis = fields.get("axis")
-    if axis is not None and axis is not BAD and not math.hypot(*axis) > 0.0:
-        reading.mistake(inside(fields.path, "axis"), "found a zero vector, allowed is a direction")
-        axis = BAD
-    if bodies is None or ends is None or axis is BAD or not fields.good():
+    if bodies is None or ends is None or not fields.good():
         return None
     (first, first_world), (second, second_world) = ends
-    common: dict[str, Any] = {
-        "name": fields["name"] or str(index),
-        "index": index,
-        "bodies": bodies,
-        "at_first": first,
-        "at_second": second,
-    }
-    if fields["type"] == "revolute":
-        return RevoluteJoint(**common)
-    if fields["type"] == "fixed":
-        return FixedJoint(**common)
-    if fields["type"] == "prismatic":
-        return PrismaticJoint(axis=_axis(bodies[0], fields["axis"], frames), **common)
-    length = math.hypot(second_world[0] - first_world[0], second_world[1] - first_world[1])
-    if not length > 0.0:
-        reading.mistake(inside(fields.path, "at"), "the two points coincide; a link needs a length")
+    angle = 0.0 if bodies[0] == GROUND else frames.bodies[bodies[0]].angle
+    joint = JOINTS[fields["type"]]
+    own = joint.own_values(Stated(fields, first_world, second_world, angle), reading)
+    if own is None:
         return None
-    return DistanceJoint(length=length, **common)
+    name = fields["name"] or str(index)
+    return joint(name=name, index=index, bodies=bodies, at_first=first, at_second=second, **own)
 
 
 def _two_bodies(fields: Fields, frames: Frames, reading: Reading) -> tuple[str, str] | None:
@@ -103,16 +80,6 @@ def _two_bodies(fields: Fields, frames: Frames, reading: Reading) -> tuple[str, 
         reading.mistake(inside(fields.path, "bodies"), message)
         return None
     return (first, second) if first in frames.bodies and second in frames.bodies else None
-
-
-def _axis(body: str, axis: Pair, frames: Frames) -> Pair:
-    """The unit vector along `axis` in the coordinates of `body`."""
-    angle = 0.0 if body == GROUND else frames.bodies[body].angle
-    longest = max(abs(axis[0]), abs(axis[1]))
-    x, y = axis[0] / longest, axis[1] / longest
-    norm = math.hypot(x, y)
-    c, s = math.cos(angle) / norm, math.sin(angle) / norm
-    return (c * x + s * y, c * y - s * x)
 
 
 def _points(

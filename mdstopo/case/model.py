@@ -7,8 +7,7 @@ array. The fixed body is called ``ground``: it is not among `Case.bodies`, its f
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import field
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +22,20 @@ from mdstopo.case.aims import (
     Variable,
     VolumeRow,
 )
-from mdstopo.case.arrays import FloatArray, FrozenDict, IndexArray, Signal, Table, VectorSignal, read_only
+from mdstopo.case.arrays import (
+    FloatArray,
+    FrozenDict,
+    IndexArray,
+    Pair,
+    Signal,
+    Table,
+    Triple,
+    VectorSignal,
+    read_only,
+)
 from mdstopo.case.design_space import DesignSpace, slots_of
 from mdstopo.case.errors import Mistake
+from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
 from mdstopo.case.laws import (
     LAWS,
     ActuatorLaw,
@@ -39,30 +49,25 @@ from mdstopo.case.laws import (
     SpringLaw,
     TableLaw,
 )
+from mdstopo.case.marks import Marks
 from mdstopo.case.parts import (
-    GROUND,
     Body,
     Bushing,
     Contact,
-    DistanceJoint,
-    FixedJoint,
-    Joint,
     Load,
     LoadCase,
     MemberGroup,
     Motion,
-    Pair,
     PointGrid,
     Prescribed,
-    PrismaticJoint,
-    RevoluteJoint,
-    Triple,
 )
 from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
+from mdstopo.case.words import GROUND
 
 __all__ = [
     "GROUND",
+    "JOINTS",
     "LAWS",
     "ActuatorLaw",
     "Body",
@@ -108,46 +113,6 @@ __all__ = [
     "VectorSignal",
     "VolumeRow",
 ]
-
-
-@frozen
-class Marks(Value):
-    """Where each key of the file stands: key path -> (line, column), both from 1.
-
-    origins: key path -> ``--set KEY`` for values that came from outside the file.
-    """
-
-    places: Mapping[str, tuple[int, int]]
-    origins: Mapping[str, str] = field(default_factory=FrozenDict)
-
-    def __getitem__(self, path: str) -> tuple[int, int]:
-        """Line and column of `path`, or of the nearest key that encloses it; (1, 1) where nothing does."""
-        while path:
-            place = self.places.get(path)
-            if place is not None:
-                return place
-            path = enclosing(path)
-        return self.places.get("", (1, 1))
-
-    def mistake(self, path: str, message: str) -> Mistake:
-        """A mistake at the place of `path`, for later stages that refuse what the reader accepted."""
-        line, column = self[path]
-        origin, around = self.origins.get(path, ""), path
-        while not origin and around and around not in self.places:
-            around = enclosing(around)
-            origin = self.origins.get(around, "")
-        return Mistake(path, message, line, column, origin)
-
-    def __contains__(self, path: object) -> bool:
-        return path in self.places
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self.places)
-
-
-def enclosing(path: str) -> str:
-    """The key path around a key path: ``joints[0].axis`` -> ``joints[0]`` -> ``joints`` -> empty."""
-    return path[: max(path.rfind("."), path.rfind("["), 0)]
 
 
 @frozen

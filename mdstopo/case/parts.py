@@ -1,17 +1,10 @@
-"""What moves and what acts: bodies, points, members, loads, motions, joints."""
+"""What moves and what acts: bodies, points, members, loads, motions, bushings."""
 
 from __future__ import annotations
 
-from typing import ClassVar
-
-from mdstopo.case.arrays import FloatArray, IndexArray, Signal, VectorSignal, read_only, read_only_index
+from mdstopo.case.arrays import FloatArray, IndexArray, Pair, Signal, Triple, VectorSignal, read_only, read_only_index
 from mdstopo.case.laws import Law
 from mdstopo.case.value import Value, frozen
-
-GROUND = "ground"
-
-Pair = tuple[float, float]
-Triple = tuple[float, float, float]
 
 
 @frozen
@@ -172,55 +165,6 @@ class Contact(Value):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", read_only(self.points))
-
-
-@frozen(kw_only=True)
-class Joint(Value):
-    """What all joints have in common.
-
-    index: its place in the file, from 0; name: as stated, else the index as text.
-    bodies: first and second; at_first, at_second: the joint's point on each, in body coordinates.
-    """
-
-    type: ClassVar[str]
-
-    name: str
-    index: int
-    bodies: tuple[str, str]
-    at_first: Pair
-    at_second: Pair
-
-
-@frozen(kw_only=True)
-class RevoluteJoint(Joint):
-    """The two points coincide."""
-
-    type: ClassVar[str] = "revolute"
-
-
-@frozen(kw_only=True)
-class PrismaticJoint(Joint):
-    """The second body slides along `axis`, a unit vector in the first body's coordinates, without turning."""
-
-    type: ClassVar[str] = "prismatic"
-
-    axis: Pair
-
-
-@frozen(kw_only=True)
-class FixedJoint(Joint):
-    """The two points coincide and neither body turns against the other."""
-
-    type: ClassVar[str] = "fixed"
-
-
-@frozen(kw_only=True)
-class DistanceJoint(Joint):
-    """A rigid massless link of `length` in m between the two points."""
-
-    type: ClassVar[str] = "distance"
-
-    length: float
 
 
 @frozen

@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.errors import Mistake
-from mdstopo.case.model import GROUND, FrozenDict, Marks, enclosing
+from mdstopo.case.marks import Marks, enclosing
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.words import did_you_mean, listed, shown
+from mdstopo.case.words import GROUND, did_you_mean, listed, shown
 
 MOST_MISTAKES = 1000
 

@@ -35,6 +35,25 @@ class Vector(Value):
 
 
 @frozen
+class Direction(Value):
+    """A plane vector that is not zero."""
+
+    pair: Vector
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """tuple or BAD."""
+        vector = self.pair.read(node, path, reading)
+        if vector is not BAD and not any(vector):
+            reading.mistake(path, "found a zero vector, allowed is a direction")
+            return BAD
+        return vector
+
+    def schema(self) -> Schema:
+        """As of the vector."""
+        return self.pair.schema()
+
+
+@frozen
 class ListOf(Value):
     """A list of values of one kind."""
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.kinds import Flag, Number, Ref, Text, Version, explained
+from mdstopo.case.joints.joint import PAIR
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Number, Ref, Text, Version, explained
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_scene import (
@@ -22,11 +23,7 @@ from mdstopo.case.schema_scene import (
     LOAD_CASE,
     LOADS,
     MOTIONS,
-    NOT_NEGATIVE,
-    NUMBER,
-    PAIR,
     POINTS,
-    POSITIVE,
     parameter_words,
 )
 from mdstopo.case.schema_uncertainty import UNCERTAINTY

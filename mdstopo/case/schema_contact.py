@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from mdstopo.case.kinds import Name, Ref
+from mdstopo.case.joints.joint import PAIR
+from mdstopo.case.kinds import NOT_NEGATIVE, POSITIVE, Name, Ref
 from mdstopo.case.records import Key, Record
-from mdstopo.case.schema_scene import BODY, FRAME, NOT_NEGATIVE, PAIR, POSITIVE
+from mdstopo.case.schema_scene import BODY, FRAME
 
 EDGE = Record(
     "an edge",

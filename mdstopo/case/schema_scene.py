@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Word, explained
+from mdstopo.case.joints import JOINTS
+from mdstopo.case.joints.joint import BODIES, PAIR, POINT
+from mdstopo.case.joints.joint import record_of as record_of_joint
+from mdstopo.case.kinds import (
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    Flag,
+    Kind,
+    Number,
+    NumberOrWord,
+    Ref,
+    explained,
+)
+from mdstopo.case.laws import LAWS
+from mdstopo.case.laws.law import record_of as record_of_law
 from mdstopo.case.number_rows import Rows, Signals
-from mdstopo.case.records import ByName, ByShape, Key, ListOf, Record, Tagged, Vector
+from mdstopo.case.records import ByShape, Key, ListOf, Record, Tagged, Vector
 
-NUMBER = Number()
-POSITIVE = Number(above=0)
-NOT_NEGATIVE = Number(minimum=0)
 COUNT = Number(minimum=1, whole=True)
-PAIR = Vector(2, NUMBER)
 FRAMES = explained(
     {
         "global": "global coordinates in the configuration at the start",
@@ -35,57 +46,13 @@ BODY_KEYS = Record(
 )
 
 # Joints and bushings.
-_BODIES = Key("bodies", Vector(2, BODY), "the first and the second of the two bodies", required=True)
-_NAME = Key("name", Name(), "what responses and results call the joint", otherwise="its index in the list, from 0")
-_OWN = ByName("body", PAIR, "[x, y]")
-_POINT = ByShape("[x, y] or {body: [x, y], body: [x, y]}", sequence=PAIR, mapping=_OWN)
-_TWO = ByShape("[[x, y], [x, y]] or {body: [x, y], body: [x, y]}", sequence=Vector(2, PAIR), mapping=_OWN)
-
-
-def _joint(word: str, doc: str, *keys: Key) -> Record:
-    tag = Key("type", Word((word,)), "which joint it is", required=True)
-    return Record(f"a {word} joint", (tag, _NAME, _BODIES, *keys), doc=doc)
-
-
-JOINT = Tagged(
-    "a joint",
-    "type",
-    {
-        "revolute": _joint(
-            "revolute",
-            "A pin: a point of the one body and a point of the other stay together; the bodies turn freely.",
-            Key("at", _POINT, "the common point, or each body's own, which may then misfit", required=True, unit="m"),
-        ),
-        "prismatic": _joint(
-            "prismatic",
-            "A slide: the second body moves along an axis of the first and does not turn against it.",
-            Key("at", _POINT, "a point on the axis, or each body's own", required=True, unit="m"),
-            Key("axis", PAIR, "direction of the slide at the start; the first body carries it", required=True),
-        ),
-        "fixed": _joint(
-            "fixed",
-            "A weld: the two bodies move as one.",
-            Key(
-                "at",
-                _POINT,
-                "where the reaction is taken, or each body's own point",
-                unit="m",
-                otherwise="the second body's centre of mass",
-            ),
-        ),
-        "distance": _joint(
-            "distance",
-            "A rigid link without mass: two points keep their distance, which is that at the start.",
-            Key("at", _TWO, "a point on the first body and a point on the second", required=True, unit="m"),
-        ),
-    },
-)
+JOINT = Tagged("a joint", "type", {word: record_of_joint(joint) for word, joint in JOINTS.items()})
 _THREE = Vector(3, NOT_NEGATIVE)
 BUSHING = Record(
     "a bushing",
     (
-        _BODIES,
-        Key("at", _POINT, "the point that the two bodies share at the start", required=True, unit="m"),
+        BODIES,
+        Key("at", POINT, "the point that the two bodies share at the start", required=True, unit="m"),
         Key(
             "stiffness",
             _THREE,
@@ -225,111 +192,7 @@ POINTS = Record(
 )
 
 # Members.
-_ACTIVE = (
-    Key("active_from", NUMBER, "acts from this time on", unit="s", otherwise="always"),
-    Key("active_until", NUMBER, "acts until this time, not at it", unit="s", otherwise="always"),
-)
-_STIFFNESS = Key("stiffness", NOT_NEGATIVE, "k at alpha = 1", required=True, unit="N/m")
-_DAMPING = Key("damping", NOT_NEGATIVE, "c at alpha = 1", default=0.0, unit="N s/m")
-_FREE_LENGTH = Key(
-    "free_length", POSITIVE, "l0, the length at which Delta = 0", unit="m", otherwise="each member's initial length"
-)
-_SIDES = explained(
-    {
-        "tension": "closes where the member has become longer: Delta >= gap",
-        "compression": "closes where it has become shorter: k (Delta + gap) + c dDelta/dt for Delta <= -gap",
-    }
-)
-
-
-_CRUSHED = explained(
-    {
-        "compression": "it is crushed where the member becomes shorter, and pushes",
-        "tension": "it is drawn out where the member becomes longer, and pulls",
-    }
-)
-
-
-def _law(word: str, doc: str, *keys: Key) -> Record:
-    tag = Key("type", Word((word,)), "which law it is", required=True)
-    article = "an" if word[0] in "aeiou" else "a"
-    return Record(f"{article} {word} law", (tag, *keys, *_ACTIVE), doc=doc)
-
-
-LAW = Tagged(
-    "a member law",
-    "type",
-    {
-        "spring": _law(
-            "spring",
-            "Passive: f = k Delta + c dDelta/dt + preload (Eq. 2); energy k Delta^2 / 2.",
-            _STIFFNESS,
-            _DAMPING,
-            _FREE_LENGTH,
-            Key("preload", NUMBER, "tension at Delta = 0, at alpha = 1", default=0.0, unit="N"),
-        ),
-        "gap": _law(
-            "gap",
-            "Reactive, a belt with slack or a contact: f = 0 until Delta >= gap, then k (Delta - gap) + c dDelta/dt "
-            "(Eq. 3); energy k (Delta - gap)^2 / 2 while closed.",
-            _STIFFNESS,
-            _DAMPING,
-            Key("gap", NUMBER, "elongation at which it closes", default=0.0, unit="m"),
-            _FREE_LENGTH,
-            Key("side", _SIDES, "on which side it acts", default="tension"),
-            Key("clip", Flag(), "true: damping cannot reverse the force; false: Eq. 3 to the letter", default=False),
-        ),
-        "cubic": _law(
-            "cubic",
-            "Passive: f = k1 Delta + k3 Delta^3; energy k1 Delta^2 / 2 + k3 Delta^4 / 4.",
-            Key("stiffness", NOT_NEGATIVE, "k1 at alpha = 1", required=True, unit="N/m"),
-            Key("cubic", NUMBER, "k3 at alpha = 1; negative: it softens", required=True, unit="N/m^3"),
-            _FREE_LENGTH,
-        ),
-        "curve": _law(
-            "curve",
-            "Passive: f follows a monotone cubic (PCHIP) through rows [Delta, f], linear outside them; its integral "
-            "from Delta = 0 is the energy.",
-            Key("curve", Rows(("Delta", "f"), "rising", 2), "rows of rising Delta", required=True, unit="m and N"),
-            _FREE_LENGTH,
-        ),
-        "pulse": _law(
-            "pulse",
-            "Active: f = f0 exp(-sigma (t - t0)^2) (Eq. 4); stores no energy.",
-            Key("peak", NUMBER, "f0, the largest tension at alpha = 1", required=True, unit="N"),
-            Key("rate", NOT_NEGATIVE, "sigma; larger is shorter", required=True, unit="1/s^2"),
-            Key("time", NUMBER, "t0, when the peak is", required=True, unit="s"),
-        ),
-        "table": _law(
-            "table",
-            "Active: f is a table of time; stores no energy.",
-            Key("table", Rows(("t", "f")), "tension over time at alpha = 1", required=True, unit="s and N"),
-        ),
-        "actuator": _law(
-            "actuator",
-            "Active: f = kp (Delta - target) + kd dDelta/dt, kept between -limit and limit; stores no energy.",
-            Key("proportional", NOT_NEGATIVE, "kp at alpha = 1", required=True, unit="N/m"),
-            Key("derivative", NOT_NEGATIVE, "kd at alpha = 1", default=0.0, unit="N s/m"),
-            Key("target", NUMBER, "the elongation that it steers to", default=0.0, unit="m"),
-            Key("limit", NOT_NEGATIVE, "largest force at alpha = 1", unit="N", otherwise="none"),
-        ),
-        "crush": _law(
-            "crush",
-            "Reactive, a crushable leg or an energy absorber: f rises with k (Delta - gap) up to F, stays F while it "
-            "is crushed further, falls with k on the way back to 0 and leaves a permanent set; energy f^2 / (2 k).",
-            Key("stiffness", POSITIVE, "k at alpha = 1", required=True, unit="N/m"),
-            Key("force", POSITIVE, "F, the plateau, at alpha = 1", required=True, unit="N"),
-            Key("gap", NUMBER, "elongation, or shortening, at which contact begins", default=0.0, unit="m"),
-            _FREE_LENGTH,
-            Key("side", _CRUSHED, "the way in which it is crushed", default="compression"),
-        ),
-        "inerter": _law(
-            "inerter",
-            "Passive: f = b d2Delta/dt2, the acceleration of Eq. 1; stores no energy.",
-            Key("inertance", NOT_NEGATIVE, "b at alpha = 1", required=True, unit="kg"),
-        ),
-    },
-)
+LAW = Tagged("a member law", "type", {word: record_of_law(law) for word, law in LAWS.items()})
 
 
 def parameter_words() -> dict[str, str]:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from mdstopo.case.kinds import Kind, Number, Schema, explained
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, Number, Schema, explained
 from mdstopo.case.nodes import MAPPING, SEQUENCE, Node
 from mdstopo.case.number_rows import Rows
 from mdstopo.case.reading import BAD, Reading, found
 from mdstopo.case.records import ByName, Key, Named, Record
-from mdstopo.case.schema_scene import NOT_NEGATIVE, NUMBER, POSITIVE
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside
 

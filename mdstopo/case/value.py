@@ -84,6 +84,12 @@ def _same(a: Any, b: Any) -> bool:
     return bool(a == b)
 
 
+def stated(kind: Any, doc: str, *, unit: str = "", default: Any = MISSING, otherwise: str = "", **roles: Any) -> Any:
+    """A field that is a key of the case file: what it may be, described as `records.Key` is, and its roles by name."""
+    metadata = {"kind": kind, "doc": doc, "unit": unit, "otherwise": otherwise, **roles}
+    return field(default=default, metadata=metadata)
+
+
 @overload
 def frozen(cls: type[_T], /) -> type[_T]: ...
 
@@ -92,7 +98,7 @@ def frozen(cls: type[_T], /) -> type[_T]: ...
 def frozen(*, kw_only: bool = False) -> Callable[[type[_T]], type[_T]]: ...
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass_transform(frozen_default=True, field_specifiers=(field, stated))
 def frozen(cls: type[Any] | None = None, /, *, kw_only: bool = False) -> Any:
     """Make a subclass of `Value` from its annotations, slotted; kw_only: its values are given by name."""
 

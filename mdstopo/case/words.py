@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import islice
 
+#: the fixed body
+GROUND = "ground"
+
 _LONGEST = 60
 _MOST = 60
 _MOST_COMPARED = 2000

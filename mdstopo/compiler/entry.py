@@ -67,6 +67,12 @@ class Entry(Kernel):
         self._last: Native | None = None
         self._callable: Any = None
 
+    def forget(self) -> None:
+        """Look for machine code anew when it is next called. What was prepared stays as it is."""
+        super().forget()
+        self._native.clear()
+        self._last = self._callable = None
+
     def __call__(self, *arguments: Any) -> Any:
         last = self._last
         if last is not None:  # nearly always they are of the types that they were last time
@@ -153,7 +159,7 @@ class Entry(Kernel):
         from mdstopo.compiler import numba_plain
         from mdstopo.compiler.tried import private
 
-        return numba_plain.outer(self.py_func, self._fastmath, kept=private() is None)
+        return numba_plain.outer(self.py_func, self.fastmath, kept=private() is None)
 
     def _inside(self) -> Any:
-        return way().outer(self.py_func, self._fastmath)
+        return way().outer(self.py_func, self.fastmath)

@@ -7,6 +7,7 @@ import contextlib
 import functools
 import os
 import sys
+import weakref
 from collections.abc import Callable, Iterator
 from types import ModuleType
 from typing import Any
@@ -17,12 +18,20 @@ from mdstopo.compiler import tried
 _PLAIN = "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"
 
 _PENDING: list[Callable[[], None]] = []
+#: all kernels of this process
+_MADE: "weakref.WeakSet[Kernel]" = weakref.WeakSet()
 
 
 def when_compiling(register: Callable[[], None]) -> Callable[[], None]:
     """Have this run before anything is compiled: what has to be entered in Numba's own tables."""
     _PENDING.append(register)
     return register
+
+
+def compile_anew() -> None:
+    """Forget what was compiled in this process: kernels that others call have changed."""
+    for each in tuple(_MADE):
+        each.forget()
 
 
 def numba() -> Any:
@@ -76,13 +85,18 @@ class Kernel:
     def __init__(self, function: Callable[..., Any], fastmath: frozenset[str], part: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
-        self._fastmath = fastmath
-        self._part = part
+        self.fastmath = fastmath
+        self.part = part
         self._dispatcher: Any = None
         self._way: ModuleType | None = None
+        _MADE.add(self)
 
     def __call__(self, *arguments: Any) -> Any:
         raise TypeError(f"{self.py_func.__name__} is called by kernels only; from Python, call its py_func")
+
+    def forget(self) -> None:
+        """Make Numba's object anew when it is next asked for."""
+        self._dispatcher = self._way = None
 
     @property
     def dispatcher(self) -> Any:
@@ -98,4 +112,4 @@ class Kernel:
 
     def _inside(self) -> Any:
         """Numba's object for the function where compiled functions call it."""
-        return way().inner(self.py_func, self._fastmath, self._part)
+        return way().inner(self.py_func, self.fastmath, self.part)

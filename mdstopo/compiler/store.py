@@ -27,6 +27,9 @@ _DAY = 86400.0
 #: how long, in seconds, another process is waited for that compiles the same
 _PATIENCE = 600.0
 
+#: a hash of the sources that `include` has added; empty where there are none
+_foreign = ""
+
 #: the functions in the glue that Python calls: with what `Native.block_of` fills, and with what is prepared
 CALL, PREPARED = "mdstopo_call", "mdstopo_prepared"
 
@@ -80,13 +83,33 @@ def _fresh() -> Path:
     return folder
 
 
-@functools.cache
+def include(module: str) -> None:
+    """Have machine code hold kernels of another distribution from now on: it is kept apart, by their sources too.
+
+    module: an imported module; of a package all files count. The order counts, for codes follow it.
+    """
+    global _foreign
+    top = sys.modules[module.partition(".")[0]]
+    file = Path(getattr(top, "__file__", None) or sys.modules[module].__file__ or "")
+    files = sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
+    digest = hashlib.sha256(f"{_foreign} {module}".encode())
+    for each in files:
+        digest.update(each.read_bytes())
+    _foreign = digest.hexdigest()[:16]
+
+
 def cache_folder() -> Path:
     """Folder of the machine code that belongs to exactly this source, these versions and this processor.
 
     The name is a hash over the sources: a changed line anywhere means a fresh folder, never stale code.
     """
-    folder = cache_root() / f"kernels-{_key()}"
+    return _folder(_foreign)
+
+
+@functools.cache
+def _folder(foreign: str) -> Path:
+    """`cache_folder`; foreign: a hash of what `include` has added."""
+    folder = cache_root() / f"kernels-{_key()}{'-' if foreign else ''}{foreign}"
     new = not folder.exists()
     if not make_private(folder):
         return _fresh() if folder.exists() else folder  # what others could write to is left alone

@@ -8,26 +8,14 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Table
+from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Law
-
-#: which keys of each law are forces: multiplied by a factor they multiply force and energy by it, at any motion
-SCALED: dict[str, tuple[str, ...]] = {
-    "spring": ("stiffness", "damping", "preload"),
-    "gap": ("stiffness", "damping"),
-    "cubic": ("stiffness", "cubic"),
-    "curve": ("curve",),
-    "pulse": ("peak",),
-    "table": ("table",),
-    "actuator": ("proportional", "derivative", "limit"),
-    "crush": ("stiffness", "force"),
-    "inerter": ("inertance",),
-}
 
 
 def sized(law: Law, factor: float) -> dict[str, Any]:
     """The law times a factor, as the mapping of the case file; keys that have their defaults are left out."""
     stated: dict[str, Any] = {"type": law.type}
-    scaled = SCALED[law.type]
+    scaled = with_role(type(law), "scales")
     for each in fields(law):
         value = getattr(law, each.name)
         if each.default is not MISSING and value == each.default:

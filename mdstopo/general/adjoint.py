@@ -11,11 +11,11 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unknowns
-from mdstopo.general.crush import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.duties import point_of, step_back, weights_of
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.parameters import add_event, add_times
+from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.responses import (
     ENERGY,
     MEMBER_FORCE,
@@ -47,7 +47,7 @@ def free_only(model, x):  # type: ignore[no-untyped-def]
 def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, out):  # type: ignore[no-untyped-def]
     """Pull cotangents behind the events of a state back to before them (saltation), in place.
 
-    bar_set (slots,): those of the sets (`crush`). drops (E,): by how much an integrand falls at each event
+    bar_set (slots,): those of the sets (`permanent_sets`). drops (E,): by how much an integrand falls at each event
     (`event_drops`), or no rows. out (M_padded + P,): what parameters do to the events' times and to the sets made there
     is added to it, behind the members.
     """

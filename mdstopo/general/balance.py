@@ -32,10 +32,9 @@ from mdstopo.integrators.banded import factorise, solve
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.joints.revolute import PLACES, revolute_pull
 from mdstopo.mechanics.joints.table import (
-    FIXED,
-    REVOLUTE,
     joint_acceleration_slopes,
     joint_gamma,
+    joint_is_point,
     joint_rows,
     joint_stiffness,
 )
@@ -408,7 +407,7 @@ def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):  # type: ignore[
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
-        if code in (REVOLUTE, FIXED):  # what the angle's row has is constant
+        if joint_is_point(code):  # what other rows have is constant
             y0 = y[row[j, 0]] if row[j, 0] >= 0 else 0.0
             y1 = y[row[j, 1]] if row[j, 1] >= 0 else 0.0
             first, second, rate_first, rate_second = revolute_pull(

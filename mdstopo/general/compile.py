@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow, TableLaw
+from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow
 from mdstopo.general.contact_compile import contact_rows
 from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.responses import KINDS, POINT
-from mdstopo.general.variables import RATES, each_member, lasting, varied
+from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied
 from mdstopo.integrators.choice import choose
 from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
@@ -72,8 +72,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
     fine = choose(case.solver, "laws")[0] == "generalized_alpha"
-    more = [t for group in case.members for law in lasting(case, group) for t in laws.landings(law, fine)]
-    more += motion_times(load_case)
+    more = lasting_times(case, fine) + motion_times(load_case)
     times = breakpoints(load_case, more)
     driven, drive = drives(load_case, times, q0, v0)
     _refuse_impacts(case, load_case, driven, drive, times)
@@ -171,11 +170,11 @@ def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int
         pair = pairs.setdefault((index[first_body], index[second_body]), len(pairs))
         for place, record in enumerate(group.laws):
             rest = getattr(record, "free_length", None)
-            code = laws.CODES[record.type]
+            kernels, code = laws.kernels_of(type(record)), laws.code_of(type(record))
             begin = -np.inf if record.active_from is None else record.active_from
             until = np.inf if record.active_until is None else record.active_until
             middle = 0.5 * (times[:-1] + times[1:])
-            known = segment_values(record.table, times) if isinstance(record, TableLaw) else np.zeros((segments, 2))
+            known = np.zeros((segments, 2)) if kernels.signal is None else segment_values(kernels.signal(record), times)
             parts = np.arange(len(group))[:, None] if each_member(case, group, place) else np.arange(len(group))[None]
             for part in parts:
                 count = len(part)
@@ -222,7 +221,8 @@ def _joints(
     for joint in case.joints:
         a, b = (index[name] for name in joint.bodies)
         pair = pairs.setdefault((a, b), len(pairs))
-        codes.append([joints.CODES[joint.type], a, b, pair, joints.ROWS[joint.type]])
+        kind = type(joint)
+        codes.append([joints.code_of(kind), a, b, pair, joints.kernels_of(kind).rows])
         rows.append(joints.parameters(joint, float(q0[3 * a + 2]), float(q0[3 * b + 2])))
     return (
         np.array(codes, dtype=np.int64).reshape(-1, 5),
@@ -305,14 +305,13 @@ def _responses(
 
 def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, ...]) -> bool:
     """Whether anything depends on velocity: then the steps' stages need velocities that are right."""
-    forces = any(laws.depends_on_rate(law) for group in case.members for law in group.laws)
-    forces = forces or any(variable.parameter in RATES for variable in case.variables)
+    forces = any(law.depends_on_rate for group in case.members for law in group.laws)
     bushed = any(any(bushing.damping) for bushing in case.bushings)
     looks = any(
         over_time in ("mean", "rms", "integral") and response.kind not in ("energy", "displacement", "angle")
         for response, over_time in zip(responses, reductions, strict=True)
     )
-    return forces or bushed or looks or bool(case.joints) or bool(case.contacts)
+    return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
 
 
 def _skipped(case: Case, load_case: LoadCase, damped: bool) -> tuple[str, ...]:

@@ -10,13 +10,13 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.balance import make_desk
-from mdstopo.general.crush import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.duties import step_forward
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import INERTER, unpack_general
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
+from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.track import carve_track, restore_modes
 from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
@@ -90,7 +90,7 @@ def through_step(  # type: ignore[no-untyped-def]
     """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
 
     The last column sums up the derivative of an integral (`step_map`). sets (slots, M_padded): those of the sets
-    (`crush`), whose part in the integral's stages is sets_bar (s, slots).
+    (`permanent_sets`), whose part in the integral's stages is sets_bar (s, slots).
     """
     n = model.mass.shape[0]
     o = track.index[w, 0]

@@ -25,8 +25,8 @@ from mdstopo.integrators.steps import deflection
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
 from mdstopo.mechanics.geometry import relative_pose
 from mdstopo.mechanics.laws.table import (
-    CURVE,
     law_grazes,
+    law_has_pieces,
     law_margin,
     law_margin_slopes,
     law_next,
@@ -44,7 +44,7 @@ def has_switches(model, knots):  # type: ignore[no-untyped-def]
     """Whether any member can switch at all; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
-        if code != INERTER and law_switches(code, model.law[k]) and (knots or code != CURVE):
+        if code != INERTER and law_switches(code, model.law[k]) and (knots or not law_has_pieces(code)):
             return True
     return model.contact_pair.shape[0] > 0
 
@@ -285,7 +285,7 @@ def switch_any(model, segment, strength, rel, q, v, a, who, slopes):  # type: ig
     x -= strength[2, who]
     first = strength[0, who] != 0.0 and strength[2, who] == 0.0
     kind = law_grazes(code, model.law[k], x, old) if first else 0
-    if code == CURVE:  # nothing jumps at a knot: when it is passed makes no difference
+    if law_has_pieces(code):  # nothing jumps at a knot: when it is passed makes no difference
         slopes[:] = 0.0
     return new, beyond, kind, by_set, law_set(code, model.law[k], x, old, new)
 

@@ -15,13 +15,13 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.forces import drive_state
 from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general
 from mdstopo.general.model import unpack_general
+from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_size, start_modes
 from mdstopo.general.track import carve_track, copy_vector, keep_state
 from mdstopo.integrators.generalized_alpha import FEWEST
@@ -94,7 +94,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             where[0] = singular
             return SINGULAR, 0, 0, t
         if model.varied.shape[0] > 0:
-            where[2] = begins_at_plateau(model, strength, q, v, graze)
+            where[2] = begins_divided(model, strength, q, v, graze)
     singular = balance(model, strength, np.int64(0), t, q, v, np.bool_(True), desk, a0, lam)
     if singular >= 0:
         where[0] = singular

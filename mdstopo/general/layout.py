@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mdstopo.case.model import Case
-from mdstopo.mechanics.joints.table import STEADY
+from mdstopo.mechanics.joints.table import LISTED
 from mdstopo.scene.model import FloatArray, IndexArray
 
 #: part of a row that must be its own, relative to the row, or others imply it
@@ -81,7 +81,7 @@ def arrange(
         inverse = np.where(free == 1, 1.0 / mass, 0.0)
         for entry, a, b, axis in _products(row, meet, order, envelope):
             one, two = (divmod(each // 6, 3) for each in (a, b))
-            fixed = [axis in STEADY[int(joint[j, 0])][r] for j, r in (one, two)]
+            fixed = [axis in LISTED[int(joint[j, 0])].steady[r] for j, r in (one, two)]
             slopes = [float(jac.flat[each + axis]) for each in (a, b)]
             if all(fixed):
                 body = int(joint[one[0], 1 + a % 6 // 3])

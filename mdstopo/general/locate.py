@@ -59,7 +59,7 @@ def matters(model, strength, rel, i):  # type: ignore[no-untyped-def]
 
     rel (n_pair, POSE): where.
 
-    What has been crushed before comes back to just its plateau where nothing is lost: that is no touch to be told.
+    What has a permanent set comes back to just where the set was made if nothing is lost: that is no touch to be told.
     """
     if i >= model.member.shape[1]:
         return contact_grazes(model.contact[i - model.member.shape[1]], int(strength[1, i])) == 2

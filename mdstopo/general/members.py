@@ -19,9 +19,9 @@ from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.mechanics.laws.table import CRUSH, CURVE, SPRING, law, law_first_set, law_start
+from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
-#: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that is crushed
+#: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that remembers
 SCALE, MODE, SET = range(3)
 
 #: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps
@@ -191,10 +191,10 @@ def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped
             rate = bx * r[4] + by * r[5] + bt * r[6]
             second = second_rate(model.member, i, r, acc)
             x = length - model.member[4, i]
-            whole = code == CURVE and (not knots or model.block[k, 5] > KNOTTED)
+            whole = law_has_pieces(code) and (not knots or model.block[k, 5] > KNOTTED)
             strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
-            if code == CRUSH and model.active[0, k] == 0:  # whatever it is like now, it has not been crushed
+            if law_remembers(code) and model.active[0, k] == 0:  # whatever it is like now, nothing has been done to it
                 strength[1, i] = 0.0
                 strength[2, i] = 0.0
     for j in range(model.contact_pair.shape[0]):

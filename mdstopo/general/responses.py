@@ -17,7 +17,7 @@ from mdstopo.general.model import INERTER
 from mdstopo.mechanics.geometry import add_pair_force
 from mdstopo.mechanics.joints.revolute import PLACES, turn
 from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
-from mdstopo.mechanics.joints.table import FIXED, REVOLUTE, joint_transmitted
+from mdstopo.mechanics.joints.table import joint_force_rows, joint_transmitted
 from mdstopo.mechanics.laws.table import law
 from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
 from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
@@ -247,7 +247,7 @@ def is_norm(model, j):  # type: ignore[no-untyped-def]
     """Whether response j is the Euclidean norm of a vector (2,), which has a direction of its own."""
     kind = model.response[j, 0]
     if kind == JOINT_FORCE:
-        return model.joint[model.response[j, 5], 0] in (REVOLUTE, FIXED)
+        return joint_force_rows(model.joint[model.response[j, 5], 0]) == 2
     return kind == POINT and model.response[j, 3] == NORM
 
 

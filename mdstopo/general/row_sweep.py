@@ -10,12 +10,12 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.adjoint import row_cotangents, through_events
 from mdstopo.general.balance import make_desk
-from mdstopo.general.crush import add_sets, count_sets, keep_start
 from mdstopo.general.duties import step_back
 from mdstopo.general.gather import add_designs
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
+from mdstopo.general.permanent_sets import add_sets, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
 from mdstopo.general.track import carve_track, restore_modes
 

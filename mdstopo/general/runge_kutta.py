@@ -10,13 +10,13 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
-from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
+from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.projection import project
 from mdstopo.general.singular_poses import (
     CLOSE,
@@ -262,7 +262,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             where[0] = singular
             return SINGULAR, 0, 0, t
         if model.varied.shape[0] > 0:
-            where[2] = begins_at_plateau(model, strength, q0, v0, graze)
+            where[2] = begins_divided(model, strength, q0, v0, graze)
     singular = balance(model, strength, np.int64(0), t, q0, v0, np.bool_(True), desk, a0, lam)
     work[FORCES] += 1
     if singular >= 0:

@@ -5,22 +5,16 @@ they say when a law acts, into the ends of segments. Which block a value belongs
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from mdstopo.case.laws import ActuatorLaw, InerterLaw
-from mdstopo.case.model import Case, CurveLaw, Law, LoadCase, MemberGroup, PulseLaw, SpringLaw, Variable
+from mdstopo.case.laws.law import with_role
+from mdstopo.case.model import Case, Law, LoadCase, MemberGroup, Variable
 from mdstopo.general.kinks import landed
 from mdstopo.general.model import COUNT, GROUP, START, GeneralModel
 from mdstopo.integrators.choice import choose
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import FloatArray, IndexArray
-
-#: parameters that say when something happens
-TIMES = frozenset({"active_from", "active_until", "time", "rate"})
-#: parameters by which a force may depend on velocities or accelerations
-RATES = frozenset({"damping", "derivative", "inertance"})
 
 
 def of_law(case: Case, group: MemberGroup, place: int) -> list[Variable]:
@@ -33,28 +27,24 @@ def each_member(case: Case, group: MemberGroup, place: int) -> bool:
     return any(each.each == "member" for each in of_law(case, group, place))
 
 
-def lasting(case: Case, group: MemberGroup) -> list[Law]:
-    """The laws of a group without the times that vary."""
-    found = []
-    for place, law in enumerate(group.laws):
-        names = {each.parameter for each in of_law(case, group, place)}
-        without: dict[str, Any] = dict.fromkeys(names & {"active_from", "active_until"})
-        if isinstance(law, PulseLaw) and names & {"time", "rate"}:
-            without["rate"] = 0.0
-        found.append(replace(law, **without) if without else law)
-    return found
+def lasting_times(case: Case, fine: bool) -> list[float]:
+    """Times at which laws have steps end, without those that vary; fine: as of `laws.landings`."""
+    return [
+        time
+        for group in case.members
+        for place, law in enumerate(group.laws)
+        for time in laws.landings(law, fine, frozenset(each.parameter for each in of_law(case, group, place)))
+    ]
 
 
-def carries(law: Law) -> bool:
-    """Whether a law may hold something at rest."""
-    match law:
-        case InerterLaw():
-            return False
-        case SpringLaw():
-            return law.stiffness != 0.0 or law.preload != 0.0
-        case ActuatorLaw():
-            return law.proportional != 0.0
-    return True
+def adds_damping(case: Case) -> bool:
+    """Whether a force may depend on velocities or accelerations by a parameter that varies."""
+    groups = {group.name: group for group in case.members}
+    return any(
+        variable.parameter in with_role(type(groups[name].laws[law]), "of_rate")
+        for variable in case.variables
+        for name, law in zip(variable.groups, variable.laws, strict=True)
+    )
 
 
 def _blocks(case: Case, block: IndexArray) -> dict[tuple[str, int], list[int]]:
@@ -80,8 +70,8 @@ def varied(case: Case, block: IndexArray) -> IndexArray:
     for variable in case.variables:
         for group, law in zip(variable.groups, variable.laws, strict=True):
             own = blocks[group, law]
-            code = case.members[int(block[own[0], GROUP])].laws[law].type
-            place = {**laws.COMMON, **laws.PLACES[code]}[variable.parameter]
+            record = case.members[int(block[own[0], GROUP])].laws[law]
+            place = laws.place_of(type(record), variable.parameter)
             for i, k in enumerate(own):
                 rows.append([k, place, first + (i if variable.each == "member" else 0), 0])
         first += variable.count
@@ -118,17 +108,17 @@ class Placing:
         for k, (record, taken) in self._taken.items():
             changed = {name: float(values[c]) for name, c in taken.items()}
             now = replace(record, **changed)
-            if not isinstance(now, CurveLaw):
+            if laws.kernels_of(type(now)).data is None:
                 law[k] = laws.parameters(now, [])
             if "free_length" in changed:
                 first = int(model.block[k, START])
                 member[4, first : first + int(model.block[k, COUNT])] = changed["free_length"]
-            if TIMES & changed.keys():
+            if changed.keys() & with_role(type(now), "is_time"):
                 times |= {t for t in laws.landings(now, self._fine) if start < t < end}
                 begin = -np.inf if now.active_from is None else now.active_from
                 until = np.inf if now.active_until is None else now.active_until
                 acts[k] = begin, until
-                if self._settles and carries(now):
+                if self._settles and now.holds:
                     held.add(k)
         model = landed(model._replace(law=law, member=member), sorted(times))
         if not acts:

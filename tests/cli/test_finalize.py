@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mdstopo.case.laws import LAWS
+from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Table
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.cli.group import run_group
@@ -17,7 +18,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
-from mdstopo.finalize.scaled_laws import SCALED, sized
+from mdstopo.finalize.scaled_laws import sized
 from mdstopo.finalize.text import text_of
 
 SPRINGS = """\
@@ -106,9 +107,8 @@ def call(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str
 
 
 def test_every_law_says_which_keys_are_forces() -> None:
-    assert set(SCALED) == set(LAWS)
-    for name, keys in SCALED.items():
-        assert set(keys) <= set(LAWS[name].__dataclass_fields__)
+    for name, law in LAWS.items():
+        assert with_role(law, "scales"), name
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -128,7 +128,7 @@ def test_a_sized_law_has_its_forces_scaled_and_nothing_else(name: str) -> None:
         elif key == "active_from":
             assert value == 0.5
         else:
-            assert value == (0.75 if key in SCALED[name] else 3.0), key
+            assert value == (0.75 if key in with_role(LAWS[name], "scales") else 3.0), key
     assert set(found) == set(given)
 
 

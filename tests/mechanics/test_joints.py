@@ -12,12 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mdstopo.case.model import DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
+from mdstopo.case.model import JOINTS, DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
 from mdstopo.mechanics.joints import table
 from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.revolute import turn as fill
-from mdstopo.mechanics.joints.table import CODES, ROWS, WIDTH, describe, parameters
+from mdstopo.mechanics.joints.table import CODES, WIDTH, describe, kernels_of, parameters
 
+#: how many rows each has
+ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
 RECORDS = {cls.type: cls for cls in (RevoluteJoint, PrismaticJoint, FixedJoint, DistanceJoint)}
 KINDS = tuple(RECORDS)
 UNTOUCHED = -77.0
@@ -499,9 +501,9 @@ def test_a_very_short_link_still_has_its_direction():
 
 # From the case.
 def test_codes_and_rows_know_every_joint_of_the_format():
-    assert set(CODES) == set(ROWS) == set(KINDS)
+    assert set(CODES) == set(JOINTS) == set(KINDS) == set(ROWS)
     assert len(set(CODES.values())) == len(CODES)
-    assert ROWS == {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
+    assert {word: kernels_of(joint).rows for word, joint in JOINTS.items()} == ROWS
 
 
 @every_kind

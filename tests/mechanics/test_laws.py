@@ -26,12 +26,13 @@ from mdstopo.case.model import (
     CurveLaw,
     GapLaw,
     InerterLaw,
+    Law,
     PulseLaw,
     SpringLaw,
     TableLaw,
 )
 from mdstopo.mechanics.laws import actuator, gap, table
-from mdstopo.mechanics.laws.table import CODES, PARAMETERS, depends_on_rate, landings, parameters
+from mdstopo.mechanics.laws.table import CODES, PARAMETERS, landings, parameters
 from mdstopo.scene.signals import breakpoints
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -374,7 +375,7 @@ def test_active_laws_store_nothing(kind, seed):
 @given(seeds)
 def test_a_law_depends_on_the_rate_exactly_where_its_slope_says_so(kind, seed):
     kernel, x, xd, _ = drawn(kind, seed)
-    assert depends_on_rate(kernel.record) == any(kernel.at(x, xd, mode)[2] != 0.0 for mode in kernel.modes)
+    assert kernel.record.depends_on_rate == any(kernel.at(x, xd, mode)[2] != 0.0 for mode in kernel.modes)
 
 
 @pytest.mark.parametrize("field", ["damping", "derivative"])
@@ -382,12 +383,12 @@ def test_laws_without_damping_do_not_depend_on_the_rate(field):
     for kind in MAKERS:
         record = MAKERS[kind](np.random.default_rng(1))
         if hasattr(record, field):
-            assert not depends_on_rate(dataclasses.replace(record, **{field: 0.0}))
+            assert not dataclasses.replace(record, **{field: 0.0}).depends_on_rate
 
 
 def test_an_inerter_makes_a_scene_depend_on_velocities():
     # its acceleration along the member has terms in the velocities
-    assert depends_on_rate(InerterLaw(inertance=1.0))
+    assert InerterLaw(inertance=1.0).depends_on_rate
 
 
 # --- switches
@@ -779,6 +780,12 @@ def test_a_table_lands_on_its_rows():
     assert inside(law, 0.0, 2.0) == pytest.approx([0.0, 0.3, 0.9, 2.0])
 
 
+class Wormhole(Law):
+    """A law without kernels."""
+
+    type = "wormhole"
+
+
 def test_a_record_without_a_kernel_is_a_programming_mistake():
     with pytest.raises(TypeError, match="no kernel"):
-        parameters(SimpleNamespace(type="wormhole"), [])
+        parameters(Wormhole(), [])

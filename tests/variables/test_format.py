@@ -2,10 +2,11 @@
 
 import pytest
 
-from mdstopo.case.design_variables import PARAMETERS
 from mdstopo.case.errors import CaseError
+from mdstopo.case.laws import LAWS
+from mdstopo.case.laws.law import with_role
 from mdstopo.case.reader import read_case
-from mdstopo.mechanics.laws.table import COMMON, PLACES
+from mdstopo.mechanics.laws.table import COMMON, kernels_of, place_of
 
 SCENE = """
 format: 1
@@ -31,9 +32,12 @@ def read(variable, row="all", limit="100"):
 
 
 def test_the_engine_has_a_place_for_every_parameter_that_can_vary():
-    for law, names in PARAMETERS.items():
-        assert set(names) <= {*PLACES[law], *COMMON}, law
-        assert set(PLACES[law]) <= set(names), law
+    for law in LAWS.values():
+        names = with_role(law, "varies")
+        places = [place_of(law, name) for name in names]
+        assert len(set(places)) == len(names)
+        kernels = kernels_of(law)
+        assert set(names) <= set(COMMON) or kernels.slopes is not None or kernels.inertial, law
 
 
 def test_what_is_left_out_is_taken_from_the_law_and_the_only_law_that_has_the_parameter_is_meant():

@@ -9,6 +9,7 @@ Parameters: s_A (2), s_B (2), -, -, -, L.
 import math
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.mechanics.joints.kernels import JointKernels
 from mdstopo.mechanics.joints.revolute import arms
 
 
@@ -137,3 +138,14 @@ def _across(i, ex, ey, px, py, cx, cy):  # type: ignore[no-untyped-def]
     if i == 4:
         return ex
     return ey * cy + ex * cx
+
+
+KERNELS = JointKernels(
+    steady=((),),
+    phi=distance_rows,
+    gamma=distance_gamma,
+    velocity_slope=distance_velocity_slope,
+    acceleration_slopes=distance_acceleration_slopes,
+    stiffness=distance_stiffness,
+    force_rows=1,
+)

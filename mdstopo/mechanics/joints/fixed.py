@@ -4,10 +4,12 @@ Parameters: s_A (2), s_B (2), -, -, theta_0.
 """
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.mechanics.joints.kernels import JointKernels
 from mdstopo.mechanics.joints.revolute import (
     revolute_acceleration_slopes,
     revolute_gamma,
     revolute_rows,
+    revolute_stiffness,
     revolute_velocity_slope,
 )
 
@@ -45,3 +47,23 @@ def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-u
     for i in range(6):
         by_q[2, i] = 0.0
         by_v[2, i] = 0.0
+
+
+@kernel
+def fixed_moment(lam, by_lam):  # type: ignore[no-untyped-def]
+    """The multiplier of the angle's row."""
+    by_lam[2] = 1.0
+    return lam[2]
+
+
+KERNELS = JointKernels(
+    steady=((0, 1), (0, 1), (0, 1, 2)),
+    phi=fixed_rows,
+    gamma=fixed_gamma,
+    velocity_slope=fixed_velocity_slope,
+    acceleration_slopes=fixed_acceleration_slopes,
+    stiffness=revolute_stiffness,
+    force_rows=2,
+    moment=fixed_moment,
+    is_point=True,
+)

@@ -9,6 +9,7 @@ Parameters: s_A (2), s_B (2), n_0 (2), theta_0.
 """
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.mechanics.joints.kernels import JointKernels
 from mdstopo.mechanics.joints.revolute import arms
 
 
@@ -135,3 +136,15 @@ def prismatic_moment(par, w, lam, by_lam, by_q):  # type: ignore[no-untyped-def]
     by_q[4] = -lam[0] * nx
     by_q[5] = -lam[0] * (nx * cx + ny * cy)
     return lam[1] - lam[0] * lever
+
+
+KERNELS = JointKernels(
+    steady=((), ()),
+    phi=prismatic_rows,
+    gamma=prismatic_gamma,
+    velocity_slope=prismatic_velocity_slope,
+    acceleration_slopes=prismatic_acceleration_slopes,
+    stiffness=prismatic_stiffness,
+    force_rows=1,
+    moment=prismatic_moment,
+)

@@ -6,6 +6,7 @@ Parameters: s_A (2), s_B (2). Used by the fixed joint too, which adds a row of i
 import math
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.joints.kernels import JointKernels
 
 #: places of w: x, y, psi of both bodies, then cos and sin of both angles, which many joints share
 PLACES = 10
@@ -119,3 +120,15 @@ def revolute_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
     px, py, cx, cy = arms(par, w)
     k[2, 2] += lam[0] * px + lam[1] * py
     k[5, 5] -= lam[0] * cx + lam[1] * cy
+
+
+KERNELS = JointKernels(
+    steady=((0, 1), (0, 1)),
+    phi=revolute_rows,
+    gamma=revolute_gamma,
+    velocity_slope=revolute_velocity_slope,
+    acceleration_slopes=revolute_acceleration_slopes,
+    stiffness=revolute_stiffness,
+    force_rows=2,
+    is_point=True,
+)

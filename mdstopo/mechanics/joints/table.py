@@ -1,64 +1,64 @@
-"""The joints: what each contributes to the constrained equations, by its code, and its parameters from the case.
+"""The joints: by code in kernels, by record in Python. All of it follows from `JointKernels` of each joint.
 
 w (PLACES,): coordinates of the first and the second body, with the turns of `revolute.turn`; wd, wdd (6,): their time
 derivatives. The equations of motion are
-M a + Phi_q^T lam = F, so the force of a joint on its first body is -Phi_q^T lam.
+M a + Phi_q^T lam = F, so the force of a joint on its first body is -Phi_q^T lam. Codes follow the order of
+`case.joints.JOINTS`; the branches by code are made by `compiler.choice`.
 """
 
+import importlib
 import math
 
 import numpy as np
 
-from mdstopo.case.model import DistanceJoint, Joint, PrismaticJoint
+from mdstopo.case.joints import JOINTS, Joint
+from mdstopo.compiler import store
+from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.joints.distance import (
-    distance_acceleration_slopes,
-    distance_gamma,
-    distance_rows,
-    distance_stiffness,
-    distance_velocity_slope,
-)
-from mdstopo.mechanics.joints.fixed import (
-    fixed_acceleration_slopes,
-    fixed_gamma,
-    fixed_rows,
-    fixed_velocity_slope,
-)
-from mdstopo.mechanics.joints.prismatic import (
-    prismatic_acceleration_slopes,
-    prismatic_gamma,
-    prismatic_moment,
-    prismatic_rows,
-    prismatic_stiffness,
-    prismatic_velocity_slope,
-)
-from mdstopo.mechanics.joints.revolute import (
-    arms,
-    revolute_acceleration_slopes,
-    revolute_gamma,
-    revolute_rows,
-    revolute_stiffness,
-    revolute_velocity_slope,
-)
+from mdstopo.mechanics.joints.kernels import JointKernels
+from mdstopo.mechanics.joints.revolute import arms
 
-REVOLUTE, PRISMATIC, FIXED, DISTANCE = range(4)
-CODES = {"revolute": REVOLUTE, "prismatic": PRISMATIC, "fixed": FIXED, "distance": DISTANCE}
-ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
 WIDTH = 12
+#: place of the bodies' angle at the start in the parameters
+ANGLE = 6
 #: what a joint transmits (`joint_transmitted`)
 FORCE, MOMENT, ACROSS = range(3)
-#: slopes of Phi, by row, that are the same wherever the bodies are: columns of either body
-STEADY = {REVOLUTE: ((0, 1), (0, 1)), PRISMATIC: ((), ()), FIXED: ((0, 1), (0, 1), (0, 1, 2)), DISTANCE: ((),)}
+
+LISTED: Listed[JointKernels] = Listed()
+#: of the joints that are known so far, by their word
+CODES: dict[str, int] = {}
+
+
+def kernels_of(joint: type[Joint]) -> JointKernels:
+    """The kernels of a joint."""
+    if joint.type not in CODES:
+        enter(joint)
+        store.include(joint.kernels)
+    return LISTED[CODES[joint.type]]
+
+
+def code_of(joint: type[Joint]) -> int:
+    """The code of a joint."""
+    kernels_of(joint)
+    return CODES[joint.type]
+
+
+def enter(joint: type[Joint]) -> None:
+    """Give a joint its code."""
+    CODES[joint.type] = LISTED.add(importlib.import_module(joint.kernels).KERNELS)
+
+
+for _joint in JOINTS.values():
+    if _joint.kernels.startswith("mdstopo."):
+        enter(_joint)
 
 
 def parameters(joint: Joint, angle_first: float, angle_second: float) -> list[float]:
     """The parameter row (WIDTH,) of a joint between bodies that start at these angles (rad)."""
-    row = [*joint.at_first, *joint.at_second, 0.0, 0.0, angle_second - angle_first]
-    row += [0.0] * (WIDTH - len(row))
-    if isinstance(joint, PrismaticJoint):
-        row[4], row[5] = -joint.axis[1], joint.axis[0]
-    elif isinstance(joint, DistanceJoint):
-        row[7] = joint.length
+    row = [*joint.at_first, *joint.at_second] + [0.0] * (WIDTH - 4)
+    row[ANGLE] = angle_second - angle_first
+    for place, value in joint.row().items():
+        row[place] = value
     return row
 
 
@@ -68,67 +68,56 @@ def describe(joint: Joint) -> str:
     return f"joint {name}({joint.type}, between {joint.bodies[0]} and {joint.bodies[1]})"
 
 
-@part
+@chosen(LISTED, lambda each: each.phi, part)
 def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
     """phi (3,) and jac (3, 6) = Phi_q; rows that the joint has not are left as they are."""
-    if code == REVOLUTE:
-        revolute_rows(par, w, phi, jac)
-    elif code == PRISMATIC:
-        prismatic_rows(par, w, phi, jac)
-    elif code == FIXED:
-        fixed_rows(par, w, phi, jac)
-    else:
-        distance_rows(par, w, phi, jac)
 
 
-@part
+@chosen(LISTED, lambda each: each.gamma, part)
 def joint_gamma(code, par, w, wd, gamma):  # type: ignore[no-untyped-def]
     """gamma (3,) of Phi_q a + gamma = 0."""
-    if code == REVOLUTE:
-        revolute_gamma(par, w, wd, gamma)
-    elif code == FIXED:
-        fixed_gamma(par, w, wd, gamma)
-    elif code == PRISMATIC:
-        prismatic_gamma(par, w, wd, gamma)
-    else:
-        distance_gamma(par, w, wd, gamma)
+    for r in range(3):
+        gamma[r] = 0.0
 
 
-@part
+@chosen(LISTED, lambda each: each.velocity_slope, part)
 def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
     """out (3, 6) = d(Phi_q v)/dq."""
-    if code == REVOLUTE:
-        revolute_velocity_slope(par, w, wd, out)
-    elif code == FIXED:
-        fixed_velocity_slope(par, w, wd, out)
-    elif code == PRISMATIC:
-        prismatic_velocity_slope(par, w, wd, out)
-    else:
-        distance_velocity_slope(par, w, wd, out)
+    for r in range(3):
+        for i in range(6):
+            out[r, i] = 0.0
 
 
-@part
+@chosen(LISTED, lambda each: each.acceleration_slopes, part)
 def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
     """by_q, by_v (3, 6): slopes of Phi_q a + gamma at fixed a."""
-    if code == REVOLUTE:
-        revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
-    elif code == FIXED:
-        fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
-    elif code == PRISMATIC:
-        prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
-    else:
-        distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
+    for r in range(3):
+        for i in range(6):
+            by_q[r, i] = 0.0
+            by_v[r, i] = 0.0
 
 
-@part
+@chosen(LISTED, lambda each: each.stiffness, part)
 def joint_stiffness(code, par, w, lam, k):  # type: ignore[no-untyped-def]
     """k (6, 6) += d(Phi_q^T lam)/dq."""
-    if code in (REVOLUTE, FIXED):
-        revolute_stiffness(par, w, lam, k)
-    elif code == PRISMATIC:
-        prismatic_stiffness(par, w, lam, k)
-    else:
-        distance_stiffness(par, w, lam, k)
+
+
+@chosen(LISTED, lambda each: each.is_point or None, part)
+def joint_is_point(code):  # type: ignore[no-untyped-def]
+    """Whether a joint's rows are those of the revolute one, and linear ones behind them."""
+    return False
+
+
+@chosen(LISTED, lambda each: each.force_rows or None, part)
+def joint_force_rows(code):  # type: ignore[no-untyped-def]
+    """Of how many of the first rows the multipliers are components of the force that is transmitted."""
+    return 0
+
+
+@chosen(LISTED, lambda each: each.moment, part)
+def _moment(code, par, w, lam, by_lam, by_q):  # type: ignore[no-untyped-def]
+    """The moment that is transmitted, by_lam (3,), by_q (6,): its slopes, zero before."""
+    return 0.0
 
 
 @kernel
@@ -154,28 +143,26 @@ def joint_transmitted(code, par, w, lam, which, by_lam, by_q):  # type: ignore[n
     """
     by_lam[:] = 0.0
     by_q[:] = 0.0
-    if which != MOMENT:
-        if code in (REVOLUTE, FIXED):
-            size = math.hypot(lam[0], lam[1])
-            if size > 0.0 and which == FORCE:
-                by_lam[0] = lam[0] / size
-                by_lam[1] = lam[1] / size
-            elif size > 0.0:
-                by_lam[0] = -lam[1] / size
-                by_lam[1] = lam[0] / size
-            return size
-        if which == FORCE:
-            by_lam[0] = np.sign(lam[0])
-        return abs(lam[0])
-    if code == FIXED:
-        by_lam[2] = np.sign(lam[2])
-        return abs(lam[2])
-    if code == PRISMATIC:
-        moment = prismatic_moment(par, w, lam, by_lam, by_q)
+    if which == MOMENT:
+        moment = _moment(code, par, w, lam, by_lam, by_q)
         sign = np.sign(moment)
         for i in range(3):
             by_lam[i] *= sign
         for i in range(6):
             by_q[i] *= sign
         return abs(moment)
-    return 0.0
+    rows = joint_force_rows(code)
+    if rows == 0:
+        return 0.0
+    if rows == 1:
+        if which == FORCE:
+            by_lam[0] = np.sign(lam[0])
+        return abs(lam[0])
+    size = math.hypot(lam[0], lam[1])
+    if size > 0.0 and which == FORCE:
+        by_lam[0] = lam[0] / size
+        by_lam[1] = lam[1] / size
+    elif size > 0.0:
+        by_lam[0] = -lam[1] / size
+        by_lam[1] = lam[0] / size
+    return size

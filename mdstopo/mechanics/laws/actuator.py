@@ -3,7 +3,10 @@
 Modes: linear, held at +limit, held at -limit.
 """
 
+import numpy as np
+
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels, Modes
 
 LINEAR, UPPER, LOWER = range(3)
 
@@ -20,7 +23,9 @@ def actuator_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 @inline
 def actuator_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
-    """How far the mode is from its end, in parts of the limit."""
+    """How far the mode is from its end, in parts of the limit; infinite where there is none."""
+    if p[3] <= 0.0:
+        return np.inf
     f = (p[0] * (x - p[2]) + p[1] * xd) / p[3]
     if mode == UPPER:
         return f - 1.0
@@ -32,6 +37,8 @@ def actuator_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
 @inline
 def actuator_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
     """Slopes of the margin by x and xd."""
+    if p[3] <= 0.0:
+        return 0.0, 0.0
     f = p[0] * (x - p[2]) + p[1] * xd
     sign = 1.0 / p[3]
     if mode == LOWER or (mode == LINEAR and f >= 0.0):
@@ -40,34 +47,38 @@ def actuator_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_slopes(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_slopes(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
     """df/dp, dV/dp."""
     if mode != LINEAR:
-        return ((1.0 if mode == UPPER else -1.0) if slot == 3 else 0.0), 0.0
-    if slot == 0:
+        return ((1.0 if mode == UPPER else -1.0) if place == 3 else 0.0), 0.0
+    if place == 0:
         return x - p[2], 0.0
-    if slot == 1:
+    if place == 1:
         return xd, 0.0
-    return (-p[0] if slot == 2 else 0.0), 0.0
+    return (-p[0] if place == 2 else 0.0), 0.0
 
 
 @inline
-def actuator_margin_slope(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_margin_slope(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
     """Slope of the margin by a parameter."""
+    if p[3] <= 0.0:
+        return 0.0
     f = p[0] * (x - p[2]) + p[1] * xd
     sign = 1.0 / p[3]
     if mode == LOWER or (mode == LINEAR and f >= 0.0):
         sign = -sign
-    if slot == 0:
+    if place == 0:
         return sign * (x - p[2])
-    if slot == 1:
+    if place == 1:
         return sign * xd
-    return -sign * p[0] if slot == 2 else -sign * f / p[3]
+    return -sign * p[0] if place == 2 else -sign * f / p[3]
 
 
 @inline
 def actuator_start(p, x, xd):  # type: ignore[no-untyped-def]
     """The mode by the force alone: it is continuous at both limits."""
+    if p[3] <= 0.0:
+        return LINEAR
     f = p[0] * (x - p[2]) + p[1] * xd
     if f > p[3]:
         return UPPER
@@ -82,3 +93,23 @@ def actuator_next(p, x, xd, mode):  # type: ignore[no-untyped-def]
     if mode != LINEAR:
         return LINEAR
     return UPPER if p[0] * (x - p[2]) + p[1] * xd > 0.0 else LOWER
+
+
+@inline
+def actuator_switches(p):  # type: ignore[no-untyped-def]
+    """Whether there is a limit."""
+    return p[3] > 0.0
+
+
+KERNELS = LawKernels(
+    force=actuator_force,
+    slopes=actuator_slopes,
+    modes=Modes(
+        margin=actuator_margin,
+        margin_slopes=actuator_margin_slopes,
+        margin_slope=actuator_margin_slope,
+        next_mode=actuator_next,
+        first_mode=actuator_start,
+        switches=actuator_switches,
+    ),
+)

@@ -7,6 +7,7 @@ grows with its elongation; it is written down when crushing ends, where y is F /
 """
 
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels, Modes, PermanentSet
 
 OPEN, ELASTIC, CRUSHING = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
@@ -47,40 +48,40 @@ def crush_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_slopes(p, slot, x, mode):  # type: ignore[no-untyped-def]
+def crush_slopes(p, place, x, mode):  # type: ignore[no-untyped-def]
     """df/dp, dV/dp at a fixed set."""
     if mode == OPEN:
         return 0.0, 0.0
     if mode == CRUSHING:
-        if slot == 1:
+        if place == 1:
             return p[3], p[1] / p[0]
-        return 0.0, (-0.5 * p[1] * p[1] / (p[0] * p[0]) if slot == 0 else 0.0)
+        return 0.0, (-0.5 * p[1] * p[1] / (p[0] * p[0]) if place == 0 else 0.0)
     y = p[3] * x - p[2]
-    if slot == 0:
+    if place == 0:
         return p[3] * y, 0.5 * y * y
-    return (-p[3] * p[0], -p[0] * y) if slot == 2 else (0.0, 0.0)
+    return (-p[3] * p[0], -p[0] * y) if place == 2 else (0.0, 0.0)
 
 
 @inline
-def crush_margin_slope(p, slot, x, mode):  # type: ignore[no-untyped-def]
+def crush_margin_slope(p, place, x, mode):  # type: ignore[no-untyped-def]
     """Slope of the margin by a parameter, at a fixed set."""
     if mode == CRUSHING:
         return 0.0
     if mode == OPEN:
-        return 1.0 if slot == 2 else 0.0
+        return 1.0 if place == 2 else 0.0
     if p[3] * x - p[2] <= 0.5 * p[1] / p[0]:
-        return -1.0 if slot == 2 else 0.0
-    if slot == 2:
+        return -1.0 if place == 2 else 0.0
+    if place == 2:
         return 1.0
-    return 1.0 / p[0] if slot == 1 else -p[1] / (p[0] * p[0])
+    return 1.0 / p[0] if place == 1 else -p[1] / (p[0] * p[0])
 
 
 @inline
-def crush_set_slope(p, slot):  # type: ignore[no-untyped-def]
+def crush_set_slope(p, place):  # type: ignore[no-untyped-def]
     """Slope by a parameter of the set that `crush_set` or `crush_first_set` makes at a given elongation."""
-    if slot == 2:
+    if place == 2:
         return -p[3]
-    return -p[3] / p[0] if slot == 1 else p[3] * p[1] / (p[0] * p[0])
+    return -p[3] / p[0] if place == 1 else p[3] * p[1] / (p[0] * p[0])
 
 
 @inline
@@ -120,3 +121,36 @@ def crush_first_set(p, x, mode):  # type: ignore[no-untyped-def]
 def crush_grazes(p, x, mode):  # type: ignore[no-untyped-def]
     """As `gap_grazes`: a plateau that is only just reached leaves a set on one side and none on the other (2)."""
     return 2 if mode == ELASTIC and p[3] * x - p[2] > 0.5 * p[1] / p[0] else 0
+
+
+@inline
+def crush_makes_set(old, new):  # type: ignore[no-untyped-def]
+    """Whether the set is written down: where crushing ends."""
+    return old == CRUSHING and new == ELASTIC
+
+
+@inline
+def crush_divides(p, x, xd, mode, near):  # type: ignore[no-untyped-def]
+    """Whether a member begins at its plateau and moves back: had it begun beyond, it would have been crushed."""
+    return mode == ELASTIC and p[3] * xd <= 0.0 and abs(p[3] * x - p[2] - p[1] / p[0]) <= near
+
+
+KERNELS = LawKernels(
+    force=crush_force,
+    slopes=crush_slopes,
+    modes=Modes(
+        margin=crush_margin,
+        margin_slopes=crush_margin_slopes,
+        margin_slope=crush_margin_slope,
+        next_mode=crush_next,
+        first_mode=crush_start,
+        grazes=crush_grazes,
+    ),
+    permanent_set=PermanentSet(
+        growth=crush_set,
+        first=crush_first_set,
+        is_made=crush_makes_set,
+        slope=crush_set_slope,
+        divides=crush_divides,
+    ),
+)

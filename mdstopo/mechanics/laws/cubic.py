@@ -1,6 +1,7 @@
 """`cubic`: f = k1 x + k3 x^3, V = k1 x^2/2 + k3 x^4/4. Parameters: k1, k3."""
 
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
@@ -12,8 +13,11 @@ def cubic_force(p, x):  # type: ignore[no-untyped-def]
 
 
 @inline
-def cubic_slopes(p, slot, x):  # type: ignore[no-untyped-def]
+def cubic_slopes(p, place, x):  # type: ignore[no-untyped-def]
     """df/dp, dV/dp."""
-    if slot == 0:
+    if place == 0:
         return x, 0.5 * x * x
     return x * x * x, 0.25 * x * x * x * x
+
+
+KERNELS = LawKernels(force=cubic_force, slopes=cubic_slopes)

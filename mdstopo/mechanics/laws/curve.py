@@ -10,11 +10,11 @@ knot; mode 0, where steps need not end at knots, is whichever piece x is in. For
 knot: accelerations do not jump there, and derivatives do not feel when it is passed.
 """
 
-from typing import Any
-
 import numpy as np
 
+from mdstopo.case.laws import CurveLaw
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels, Modes
 
 #: how far a piece goes on beyond its ends, relative to the narrowest: what rests on a knot does not change its mode by
 #: rounding, and the force is off by no more than the square of it
@@ -99,11 +99,11 @@ def curve_margin_slopes(p, x, mode, curves):  # type: ignore[no-untyped-def]
     return 1.0, 0.0
 
 
-def curve_data(points: Any, at: int) -> tuple[list[float], list[float]]:
-    """Parameters and data of a curve (n, 2) whose data begin at place `at`."""
+def curve_data(record: CurveLaw, at: int) -> tuple[list[float], list[float]]:
+    """Parameters and data of a curve whose data begin at place `at`."""
     from scipy.interpolate import PchipInterpolator
 
-    x, f = np.asarray(points, dtype=np.float64).T
+    x, f = record.curve.T
     pieces = PchipInterpolator(x, f)
     # SciPy's coefficients fall in power
     c = pieces.c[::-1].T
@@ -116,3 +116,16 @@ def curve_data(points: Any, at: int) -> tuple[list[float], list[float]]:
     parameters[2] = curve_force.py_func(parameters, 0.0, piece, data)[3]  # type: ignore[attr-defined]
     parameters[0] = at
     return parameters.tolist(), data.tolist()
+
+
+KERNELS = LawKernels(
+    force=curve_force,
+    modes=Modes(
+        margin=curve_margin,
+        margin_slopes=curve_margin_slopes,
+        next_mode=curve_piece,
+        first_mode=curve_start,
+        pieces=True,
+    ),
+    data=curve_data,
+)

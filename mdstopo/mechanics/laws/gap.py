@@ -6,6 +6,7 @@ clip holds at zero, because damping would reverse it. In each mode the formula g
 """
 
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels, Modes
 
 OPEN, CLOSED, CLIPPED = range(3)
 #: an elongation this near to the gap, relative to 1 m or the gap, is at the switch: rates decide
@@ -63,30 +64,30 @@ def gap_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_slopes(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_slopes(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
     """df/dp, dV/dp."""
     if mode == OPEN:
         return 0.0, 0.0
     y = p[3] * x - p[2]
     acts = 0.0 if mode == CLIPPED else 1.0
-    if slot == 0:
+    if place == 0:
         return acts * p[3] * y, 0.5 * y * y
-    if slot == 1:
+    if place == 1:
         return acts * xd, 0.0
     return -acts * p[3] * p[0], -p[0] * y
 
 
 @inline
-def gap_margin_slope(p, slot, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_margin_slope(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
     """Slope of the margin by a parameter."""
     y = p[3] * x - p[2]
     unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1]) if _clips(p) else y
     if mode == OPEN or not _clips(p) or y <= (unclipped if mode == CLOSED else -unclipped):
-        return (0.0 if slot != 2 else 1.0) if mode == OPEN else (0.0 if slot != 2 else -1.0)
+        return (0.0 if place != 2 else 1.0) if mode == OPEN else (0.0 if place != 2 else -1.0)
     sign = (1.0 if mode == CLOSED else -1.0) / (p[0] + p[1])
-    if slot == 2:
+    if place == 2:
         return -sign * p[0]
-    return sign * ((y if slot == 0 else p[3] * xd) - unclipped)
+    return sign * ((y if place == 0 else p[3] * xd) - unclipped)
 
 
 @inline
@@ -145,3 +146,17 @@ def gap_grazes(p, mode):  # type: ignore[no-untyped-def]
     if mode != OPEN or p[1] == 0.0:
         return 0
     return 2 if p[4] != 0.0 else 1
+
+
+KERNELS = LawKernels(
+    force=gap_force,
+    slopes=gap_slopes,
+    modes=Modes(
+        margin=gap_margin,
+        margin_slopes=gap_margin_slopes,
+        margin_slope=gap_margin_slope,
+        next_mode=gap_next,
+        first_mode=gap_start,
+        grazes=gap_grazes,
+    ),
+)

@@ -1,6 +1,7 @@
 """`spring` (Eq. 2) in scalar form: f = k x + c x' + preload, V = k x^2/2. Parameters: k, c, preload."""
 
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
@@ -11,10 +12,13 @@ def linear_force(p, x, xd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def linear_slopes(p, slot, x, xd):  # type: ignore[no-untyped-def]
+def linear_slopes(p, place, x, xd):  # type: ignore[no-untyped-def]
     """df/dp, dV/dp."""
-    if slot == 0:
+    if place == 0:
         return x, 0.5 * x * x
-    if slot == 1:
+    if place == 1:
         return xd, 0.0
     return 1.0, 0.0
+
+
+KERNELS = LawKernels(force=linear_force, slopes=linear_slopes, linear=True)

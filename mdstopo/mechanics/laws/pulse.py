@@ -2,7 +2,9 @@
 
 import math
 
+from mdstopo.case.laws import PulseLaw
 from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
@@ -13,13 +15,13 @@ def pulse_force(p, t):  # type: ignore[no-untyped-def]
 
 
 @inline
-def pulse_slopes(p, slot, t):  # type: ignore[no-untyped-def]
+def pulse_slopes(p, place, t):  # type: ignore[no-untyped-def]
     """df/dp, dV/dp."""
     s = t - p[2]
     share = math.exp(-min(p[1] * min(s * s, 1e300), 745.0))
-    if slot == 0:
+    if place == 0:
         return share, 0.0
-    if slot == 1:
+    if place == 1:
         return -min(s * s, 1e300) * p[0] * share, 0.0
     return 2.0 * p[1] * s * p[0] * share, 0.0
 
@@ -28,14 +30,17 @@ def pulse_slopes(p, slot, t):  # type: ignore[no-untyped-def]
 FINE = 16
 
 
-def pulse_landings(rate: float, time: float, fine: bool = False) -> list[float]:
+def pulse_landings(record: PulseLaw, fine: bool) -> list[float]:
     """Times that integrators land on, so that no step passes over a narrow pulse.
 
     fine: for steps of low order and given length, which have to follow the pulse itself.
     """
-    if not rate > 0.0:
+    if not record.rate > 0.0:
         return []
-    width = 1.0 / math.sqrt(rate)
+    width, time = 1.0 / math.sqrt(record.rate), record.time
     if fine:
         return [time + i / FINE * width for i in range(-6 * FINE, 6 * FINE + 1)]
     return [time + side * part * width for part in (1.0, 2.5, 4.0, 6.0) for side in (-1.0, 1.0)] + [time]
+
+
+KERNELS = LawKernels(force=pulse_force, slopes=pulse_slopes, landings=pulse_landings)

@@ -1,12 +1,12 @@
-"""What the permanent sets of crushed members do to derivatives.
+"""What permanent sets do to derivatives: those of members with a law that remembers.
 
-A set p stays what it is from the event that ended the crushing to the next such event, and shifts the elongation:
+A set p stays what it is from one event that makes it to the next such event, and shifts the elongation:
 f* = s f(Delta - p), V = V(Delta - p). So over that time it collects, as a parameter would,
 
     dG/dp = - s (f_Delta (b . u) + weight V_Delta),   u = -T z,
 
 from every stage with its virtual displacement z. At the event p = Delta(q(t_e)) - const with dDelta/dt = 0, so the time
-of the event adds nothing and dp = B dq. Before it the member carried its plateau, which no set changes. The time at
+of the event adds nothing and dp = B dq. Before it the member carried a plateau, which no set changes. The time at
 which a member reaches its plateau, or loses contact, depends on its set as well: dt_e = -(s_q dq + s_v dv + s_p dp)/s'.
 
 A parameter of the law stands in that constant too: the set begins with the parameter's own slope, `law_set_slope`, and
@@ -22,8 +22,15 @@ from mdstopo.general.events import member_rows
 from mdstopo.general.members import direction
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
-from mdstopo.mechanics.laws.crush import CRUSHING, ELASTIC
-from mdstopo.mechanics.laws.table import ACTIVE_FROM, CRUSH, FREE_LENGTH, law, law_set_slope
+from mdstopo.mechanics.laws.table import (
+    ACTIVE_FROM,
+    FREE_LENGTH,
+    law,
+    law_divides,
+    law_makes_set,
+    law_remembers,
+    law_set_slope,
+)
 
 
 @kernel
@@ -31,7 +38,7 @@ def count_sets(model):  # type: ignore[no-untyped-def]
     """How many members have a set; where there are none, nothing here is asked again."""
     total = 0
     for k in range(model.block.shape[0]):
-        if model.block[k, 3] == CRUSH:
+        if law_remembers(model.block[k, 3]):
             total += model.block[k, 5]
     return total
 
@@ -41,7 +48,7 @@ def slot_of(model, i):  # type: ignore[no-untyped-def]
     """The slot of padded member i and its block, or -1, -1."""
     slot = 0
     for k in range(model.block.shape[0]):
-        if model.block[k, 3] != CRUSH:
+        if not law_remembers(model.block[k, 3]):
             continue
         if model.block[k, 1] <= i and i < model.block[k, 2]:
             return slot + i - model.block[k, 1], k
@@ -64,7 +71,7 @@ def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no
     relative_pose(model.pair, q, v, rel)
     slot = 0
     for k in range(model.block.shape[0]):
-        if model.block[k, 3] != CRUSH:
+        if not law_remembers(model.block[k, 3]):
             continue
         lo = model.block[k, 1]
         p = model.block[k, 0]
@@ -97,7 +104,7 @@ def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale,
     sign = 1.0 if along >= 0.0 else -1.0
     slot = 0
     for k in range(model.block.shape[0]):
-        if model.block[k, 3] != CRUSH:
+        if not law_remembers(model.block[k, 3]):
             continue
         own_i = who - model.block[k, 7]
         if model.block[k, 6] == group and model.active[segment, k] != 0 and own_i >= 0 and own_i < model.block[k, 5]:
@@ -120,11 +127,11 @@ def add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, o
 @kernel
 def made_set(model, track, e):  # type: ignore[no-untyped-def]
     """Slot and block of the member whose set event e has made, or -1, -1."""
-    if track.event[e, 3] != ELASTIC:
-        return -1, -1
-    old = track.event[e, 2]
     slot, k = slot_of(model, track.event[e, 1])
-    if slot >= 0 and (old == CRUSHING or track.kept[e, 0] != track.kept[e, 1]):
+    if slot < 0:
+        return -1, -1
+    made = law_makes_set(model.block[k, 3], track.event[e, 2], track.event[e, 3])
+    if made or track.kept[e, 0] != track.kept[e, 1]:
         return slot, k
     return -1, -1
 
@@ -159,23 +166,22 @@ def own_slope(model, track, e, entry, rate):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def begins_at_plateau(model, strength, q, v, near):  # type: ignore[no-untyped-def]
-    """A member (padded) with parameters that vary which begins within `near` (m) of its plateau and moves back, or -1.
-
-    It has a set that depends on them on one side only.
+def begins_divided(model, strength, q, v, near):  # type: ignore[no-untyped-def]
+    """A member (padded) that begins, within `near` (m), with a set that depends on parameters that vary on one side
+    only; or -1.
     """
     row = np.empty(6)
     row_rate = np.empty(6)
     for e in range(model.varied.shape[0]):
         k = model.varied[e, 0]
-        if model.block[k, 3] != CRUSH or model.varied[e, 1] > FREE_LENGTH or model.active[0, k] == 0:
+        if not law_remembers(model.block[k, 3]) or model.varied[e, 1] > FREE_LENGTH or model.active[0, k] == 0:
             continue
         p = model.law[k]
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            if strength[0, i] == 0.0 or int(strength[1, i]) != ELASTIC:
+            if strength[0, i] == 0.0:
                 continue
             x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-            if p[3] * rate <= 0.0 and abs(p[3] * x - p[2] - p[1] / p[0]) <= near:
+            if law_divides(model.block[k, 3], p, x, rate, int(strength[1, i]), near):
                 return i
     return -1
 
@@ -245,7 +251,7 @@ def through_sets(model, strength, track, w, matrix, out):  # type: ignore[no-unt
     row_rate = np.empty(6)
     slot = 0
     for k in range(model.block.shape[0]):
-        if model.block[k, 3] != CRUSH:
+        if not law_remembers(model.block[k, 3]):
             continue
         p = model.block[k, 0]
         lo = model.block[k, 1]

@@ -1,0 +1,23 @@
+"""The joints that a case file may name: what is declared of each, one file a joint.
+
+What a joint does stands in `mdstopo.mechanics.joints`, in the module that its record names.
+"""
+
+from mdstopo.case.joints.distance import DistanceJoint
+from mdstopo.case.joints.fixed import FixedJoint
+from mdstopo.case.joints.joint import Joint
+from mdstopo.case.joints.prismatic import PrismaticJoint
+from mdstopo.case.joints.revolute import RevoluteJoint
+
+#: the joints by their word; their codes in kernels follow this order
+JOINTS: dict[str, type[Joint]] = {
+    joint.type: joint
+    for joint in (
+        RevoluteJoint,
+        PrismaticJoint,
+        FixedJoint,
+        DistanceJoint,
+    )
+}
+
+__all__ = ["JOINTS", "DistanceJoint", "FixedJoint", "Joint", "PrismaticJoint", "RevoluteJoint"]

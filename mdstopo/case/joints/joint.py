@@ -1,0 +1,70 @@
+"""What is declared of a joint, and what follows from it."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, NamedTuple
+
+from mdstopo.case.arrays import Pair
+from mdstopo.case.kinds import NUMBER, Name, Ref, Word
+from mdstopo.case.reading import Fields, Reading
+from mdstopo.case.records import ByName, ByShape, Key, Record, Vector
+from mdstopo.case.value import Value, frozen
+
+PAIR = Vector(2, NUMBER)
+_OWN = ByName("body", PAIR, "[x, y]")
+#: a point that both bodies share, or each body's own
+POINT = ByShape("[x, y] or {body: [x, y], body: [x, y]}", sequence=PAIR, mapping=_OWN)
+#: a point of each body
+TWO_POINTS = ByShape("[[x, y], [x, y]] or {body: [x, y], body: [x, y]}", sequence=Vector(2, PAIR), mapping=_OWN)
+BODIES = Key("bodies", Vector(2, Ref("body")), "the first and the second of the two bodies", required=True)
+_NAME = Key("name", Name(), "what responses and results call the joint", otherwise="its index in the list, from 0")
+
+
+class Stated(NamedTuple):
+    """A joint as a case file states it.
+
+    fields: its keys; first, second: its point on each body in global coordinates; angle: the first body's at the start.
+    """
+
+    fields: Fields
+    first: Pair
+    second: Pair
+    angle: float
+
+
+@frozen(kw_only=True)
+class Joint(Value):
+    """What all joints have in common.
+
+    type: the word of the YAML key ``type``; doc: a sentence for the case reference; keys: beside type, name and bodies.
+    kernels: the module with the joint's `KERNELS` (`mechanics.joints.kernels`).
+    index: its place in the file, from 0; name: as stated, else the index as text.
+    bodies: first and second; at_first, at_second: the joint's point on each, in body coordinates.
+    """
+
+    type: ClassVar[str]
+    doc: ClassVar[str]
+    keys: ClassVar[tuple[Key, ...]]
+    kernels: ClassVar[str]
+
+    name: str
+    index: int
+    bodies: tuple[str, str]
+    at_first: Pair
+    at_second: Pair
+
+    @classmethod
+    def own_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
+        """Values of the fields that a subclass adds; None where something is a mistake, which is noted."""
+        del stated, reading
+        return {}
+
+    def row(self) -> dict[int, float]:
+        """Numbers of its own for the kernels, by their place in the parameters: 4, 5 and 7 to 11."""
+        return {}
+
+
+def record_of(joint: type[Joint]) -> Record:
+    """The joint as the case file has it."""
+    tag = Key("type", Word((joint.type,)), "which joint it is", required=True)
+    return Record(f"a {joint.type} joint", (tag, _NAME, BODIES, *joint.keys), doc=joint.doc)

@@ -1,0 +1,23 @@
+"""A pin."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mdstopo.case.joints.joint import POINT, Joint
+from mdstopo.case.records import Key
+from mdstopo.case.value import frozen
+
+
+@frozen(kw_only=True)
+class RevoluteJoint(Joint):
+    """The two points coincide."""
+
+    type: ClassVar[str] = "revolute"
+    doc: ClassVar[str] = (
+        "A pin: a point of the one body and a point of the other stay together; the bodies turn freely."
+    )
+    keys: ClassVar[tuple[Key, ...]] = (
+        Key("at", POINT, "the common point, or each body's own, which may then misfit", required=True, unit="m"),
+    )
+    kernels: ClassVar[str] = "mdstopo.mechanics.joints.revolute"

@@ -1,0 +1,49 @@
+"""A drive that steers to an elongation."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER
+from mdstopo.case.laws.law import Law
+from mdstopo.case.value import frozen, stated
+
+
+@frozen(kw_only=True)
+class ActuatorLaw(Law):
+    """f = clip(proportional (Delta - target) + derivative dDelta/dt, -limit, limit); limit None: no clip."""
+
+    type: ClassVar[str] = "actuator"
+    kind: ClassVar[str] = "active"
+    doc: ClassVar[str] = (
+        "Active: f = kp (Delta - target) + kd dDelta/dt, kept between -limit and limit; stores no energy."
+    )
+    kernels: ClassVar[str] = "mdstopo.mechanics.laws.actuator"
+
+    proportional: float = stated(NOT_NEGATIVE, "kp at alpha = 1", unit="N/m", scales=True, varies=True)
+    derivative: float = stated(
+        NOT_NEGATIVE, "kd at alpha = 1", unit="N s/m", default=0.0, scales=True, varies=True, of_rate=True
+    )
+    target: float = stated(NUMBER, "the elongation that it steers to", unit="m", default=0.0, varies=True)
+    # a limit of 0 means another law, no force at all: one that varies stays above it
+    limit: float | None = stated(
+        NOT_NEGATIVE,
+        "largest force at alpha = 1",
+        unit="N",
+        default=None,
+        otherwise="none",
+        scales=True,
+        varies=True,
+        varies_above=0.0,
+    )
+
+    def row(self) -> list[float]:
+        """kp, kd, target, limit, which is 0 where there is none; all 0 where it is clipped to nothing."""
+        if self.limit == 0.0:
+            return []
+        return [self.proportional, self.derivative, self.target, 0.0 if self.limit is None else self.limit]
+
+    @property
+    def holds(self) -> bool:
+        """A damper alone holds nothing."""
+        return self.proportional != 0.0

@@ -1,0 +1,41 @@
+"""A belt with slack, or a contact."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mdstopo.case.kinds import NUMBER, Flag
+from mdstopo.case.laws.law import Law, damping_key, free_length_key, side_key, sign_of, stiffness_key
+from mdstopo.case.value import frozen, stated
+
+
+@frozen(kw_only=True)
+class GapLaw(Law):
+    """f = 0 until Delta >= gap, then stiffness (Delta - gap) + damping dDelta/dt (Eq. 3).
+
+    side: tension | compression; compression mirrors the law. clip: damping cannot reverse the force.
+    """
+
+    type: ClassVar[str] = "gap"
+    kind: ClassVar[str] = "reactive"
+    doc: ClassVar[str] = (
+        "Reactive, a belt with slack or a contact: f = 0 until Delta >= gap, then k (Delta - gap) + c dDelta/dt "
+        "(Eq. 3); energy k (Delta - gap)^2 / 2 while closed."
+    )
+    kernels: ClassVar[str] = "mdstopo.mechanics.laws.gap"
+
+    stiffness: float = stiffness_key()
+    damping: float = damping_key()
+    gap: float = stated(NUMBER, "elongation at which it closes", unit="m", default=0.0, varies=True)
+    free_length: float | None = free_length_key()
+    side: str = side_key(
+        "closes where the member has become longer: Delta >= gap",
+        "closes where it has become shorter: k (Delta + gap) + c dDelta/dt for Delta <= -gap",
+        "on which side it acts",
+        "tension",
+    )
+    clip: bool = stated(Flag(), "true: damping cannot reverse the force; false: Eq. 3 to the letter", default=False)
+
+    def row(self) -> list[float]:
+        """Stiffness, damping, gap, side, clip."""
+        return [self.stiffness, self.damping, self.gap, sign_of(self.side), float(self.clip)]

@@ -1,0 +1,141 @@
+"""What is declared of a member law, and what follows from it: keys, units, design variables, scaling, parameters.
+
+A law is one class. Its fields are the keys of the case file in their order, each with `stated`: what it may be, its
+description and unit, and what part it plays. Delta is the elongation |Q - P| - l0, tension is positive (Eq. 5, 34).
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import MISSING, Field, fields
+from typing import Any, ClassVar, cast
+
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Number, Word, explained
+from mdstopo.case.records import Key, Record
+from mdstopo.case.value import Value, frozen, stated
+
+
+@frozen(kw_only=True)
+class Law(Value):
+    """What all laws have in common.
+
+    type: the word of the YAML key ``type``; kind: passive | reactive | active; doc: a sentence for the case reference.
+    kernels: the module with the law's `KERNELS` (`mechanics.laws.kernels`). active_from, active_until: it acts in
+    [active_from, active_until), times in s; None leaves that side open. A law with a free length l0 has the field
+    ``free_length``, None for each member's initial length.
+    """
+
+    type: ClassVar[str]
+    kind: ClassVar[str]
+    doc: ClassVar[str]
+    kernels: ClassVar[str]
+
+    active_from: float | None = stated(
+        NUMBER, "acts from this time on", unit="s", default=None, otherwise="always", varies=True, is_time=True
+    )
+    active_until: float | None = stated(
+        NUMBER, "acts until this time, not at it", unit="s", default=None, otherwise="always", varies=True, is_time=True
+    )
+
+    def row(self) -> list[float]:
+        """Parameters for the kernels: the law's numbers in the order of `numbers`, then what a subclass adds."""
+        return [getattr(self, name) for name in numbers(type(self))]
+
+    @property
+    def depends_on_rate(self) -> bool:
+        """Whether the force depends on velocities or accelerations."""
+        return any(getattr(self, name) != 0.0 for name in with_role(type(self), "of_rate"))
+
+    @property
+    def holds(self) -> bool:
+        """Whether it may hold something at rest."""
+        return True
+
+
+def stiffness_key(doc: str = "k at alpha = 1", positive: bool = False) -> Any:
+    """A field: a stiffness that grows with the member."""
+    return stated(POSITIVE if positive else NOT_NEGATIVE, doc, unit="N/m", scales=True, varies=True)
+
+
+def damping_key() -> Any:
+    """A field: the damping c, which grows with the member."""
+    return stated(NOT_NEGATIVE, "c at alpha = 1", unit="N s/m", default=0.0, scales=True, varies=True, of_rate=True)
+
+
+def free_length_key() -> Any:
+    """A field: the free length l0."""
+    return stated(
+        POSITIVE,
+        "l0, the length at which Delta = 0",
+        unit="m",
+        default=None,
+        otherwise="each member's initial length",
+        varies=True,
+    )
+
+
+def side_key(tension: str, compression: str, doc: str, default: str) -> Any:
+    """A field: tension or compression, with what either means; `sign_of` is its parameter."""
+    words = {"tension": tension, "compression": compression}
+    order = sorted(words, key=lambda word: word != default)
+    return stated(explained({word: words[word] for word in order}), doc, default=default)
+
+
+def sign_of(side: str) -> float:
+    """1 for a law that acts in tension, -1 in compression."""
+    return {"tension": 1.0, "compression": -1.0}[side]
+
+
+def with_role(law: type[Law], role: str) -> tuple[str, ...]:
+    """The fields of a law that have a role (`value.stated`): scales, varies, of_rate, is_time."""
+    return _with_role(cast(Any, law), role)
+
+
+def numbers(law: type[Law]) -> tuple[str, ...]:
+    """The numbers of a law that are parameters of its kernels, in their order there.
+
+    A free length shifts Delta and times say when a law acts: kernels have no use for either.
+    """
+    return _numbers(cast(Any, law))
+
+
+# cached by the class, which mypy takes for no key
+@functools.cache
+def _own_fields(law: Any) -> tuple[Field[Any], ...]:
+    """The law's fields as the case file has them: those of all laws come last."""
+    common = {field.name for field in fields(Law)}
+    return tuple(sorted(fields(law), key=lambda field: field.name in common))
+
+
+@functools.cache
+def _with_role(law: Any, role: str) -> tuple[str, ...]:
+    return tuple(field.name for field in _own_fields(law) if field.metadata.get(role))
+
+
+@functools.cache
+def _numbers(law: Any) -> tuple[str, ...]:
+    outside = {"free_length", *(field.name for field in fields(Law))}
+    return tuple(
+        field.name
+        for field in _own_fields(law)
+        if isinstance(field.metadata["kind"], Number) and field.name not in outside
+    )
+
+
+def record_of(law: type[Law]) -> Record:
+    """The law as the case file has it."""
+    tag = Key("type", Word((law.type,)), "which law it is", required=True)
+    article = "an" if law.type[0] in "aeiou" else "a"
+    keys = [
+        Key(
+            field.name,
+            field.metadata["kind"],
+            field.metadata["doc"],
+            required=field.default is MISSING,
+            default=None if field.default is MISSING else field.default,
+            unit=field.metadata["unit"],
+            otherwise=field.metadata["otherwise"],
+        )
+        for field in _own_fields(cast(Any, law))
+    ]
+    return Record(f"{article} {law.type} law", (tag, *keys), doc=law.doc)

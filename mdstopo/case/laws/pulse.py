@@ -1,0 +1,23 @@
+"""A bell of force over time."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER
+from mdstopo.case.laws.law import Law
+from mdstopo.case.value import frozen, stated
+
+
+@frozen(kw_only=True)
+class PulseLaw(Law):
+    """f = peak exp(-rate (t - time)^2) (Eq. 4)."""
+
+    type: ClassVar[str] = "pulse"
+    kind: ClassVar[str] = "active"
+    doc: ClassVar[str] = "Active: f = f0 exp(-sigma (t - t0)^2) (Eq. 4); stores no energy."
+    kernels: ClassVar[str] = "mdstopo.mechanics.laws.pulse"
+
+    peak: float = stated(NUMBER, "f0, the largest tension at alpha = 1", unit="N", scales=True, varies=True)
+    rate: float = stated(NOT_NEGATIVE, "sigma; larger is shorter", unit="1/s^2", varies=True, is_time=True)
+    time: float = stated(NUMBER, "t0, when the peak is", unit="s", varies=True, is_time=True)

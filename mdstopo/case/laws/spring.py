@@ -1,0 +1,31 @@
+"""The linear spring with damping and preload."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from mdstopo.case.kinds import NUMBER
+from mdstopo.case.laws.law import Law, damping_key, free_length_key, stiffness_key
+from mdstopo.case.value import frozen, stated
+
+
+@frozen(kw_only=True)
+class SpringLaw(Law):
+    """f = stiffness Delta + damping dDelta/dt + preload (Eq. 2); V = stiffness Delta^2 / 2."""
+
+    type: ClassVar[str] = "spring"
+    kind: ClassVar[str] = "passive"
+    doc: ClassVar[str] = "Passive: f = k Delta + c dDelta/dt + preload (Eq. 2); energy k Delta^2 / 2."
+    kernels: ClassVar[str] = "mdstopo.mechanics.laws.linear"
+
+    stiffness: float = stiffness_key()
+    damping: float = damping_key()
+    free_length: float | None = free_length_key()
+    preload: float = stated(
+        NUMBER, "tension at Delta = 0, at alpha = 1", unit="N", default=0.0, scales=True, varies=True
+    )
+
+    @property
+    def holds(self) -> bool:
+        """A damper alone holds nothing."""
+        return self.stiffness != 0.0 or self.preload != 0.0

@@ -1,0 +1,26 @@
+"""`table`: f is given over time, as a table whose present value the scene knows. No parameters."""
+
+from mdstopo.case.arrays import Table
+from mdstopo.case.laws import TableLaw
+from mdstopo.compiler.jit import inline
+from mdstopo.mechanics.laws.kernels import LawKernels
+
+
+@inline
+def given_force(value):  # type: ignore[no-untyped-def]
+    """f, f_x, f_xd, V, V_x."""
+    return value, 0.0, 0.0, 0.0, 0.0
+
+
+def given_table(record: TableLaw) -> Table:
+    """Force over time."""
+    return record.table
+
+
+def given_landings(record: TableLaw, _: bool) -> list[float]:
+    """The times of its rows."""
+    times: list[float] = record.table.times.tolist()
+    return times
+
+
+KERNELS = LawKernels(force=given_force, signal=given_table, landings=given_landings)
