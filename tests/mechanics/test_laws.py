@@ -19,6 +19,7 @@ from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 
 from mdstopo.case.arrays import Table
+from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import (
     LAWS,
     ActuatorLaw,
@@ -49,6 +50,16 @@ many = settings(max_examples=60, deadline=None, derandomize=True)
 @numba.njit
 def _law(code, p, x, xd, mode, t, value, curves):
     return table.law(code, p, x, xd, mode, t, value, curves)
+
+
+@numba.njit
+def _by_parameter(code, p, place, x, xd, mode, t, value, curves):
+    return table.law_slopes(code, p, place, x, xd, mode, t, value, curves)
+
+
+@numba.njit
+def _margin_by_parameter(code, p, place, x, xd, mode, curves):
+    return table.law_margin_slope(code, p, place, x, xd, mode, curves)
 
 
 @numba.njit
@@ -94,6 +105,13 @@ class Kernel:
     def at(self, x, xd=0.0, mode=0, t=0.0, value=0.0):
         """f, f_x, f_xd, V, V_x."""
         return np.array(_law(self.code, self.p, float(x), float(xd), mode, float(t), float(value), self.curves))
+
+    def by_parameter(self, place, x, xd, mode, t, value):
+        """df/dp, dV/dp."""
+        return _by_parameter(self.code, self.p, place, float(x), float(xd), mode, t, value, self.curves)
+
+    def margin_by_parameter(self, place, x, xd, mode):
+        return _margin_by_parameter(self.code, self.p, place, float(x), float(xd), mode, self.curves)
 
     def margin(self, x, xd, mode):
         return _margin(self.code, self.p, float(x), float(xd), mode, self.curves)
@@ -344,6 +362,34 @@ def test_slopes_are_those_of_the_kernel_in_the_same_mode(kind, seed):
         by_rate = difference(lambda s, mode=mode: kernel.at(x, s, mode, t, value), xd, 0.05)
         assert (f_x, v_x) == pytest.approx((by_x[0], by_x[3]), rel=1e-7, abs=1e-7)
         assert (f_xd, 0.0) == pytest.approx((by_rate[0], by_rate[3]), rel=1e-7, abs=1e-7)
+
+
+@every_kind
+@many
+@given(seeds)
+def test_slopes_by_parameters_are_differences_of_laws_with_other_parameters(kind, seed):
+    kernel, x, xd, rng = drawn(kind, seed)
+    record, t, value = kernel.record, signed(rng), signed(rng, 10.0)
+    names = [name for name in with_role(type(record), "varies") if name not in table.COMMON]
+    for name, mode in itertools.product(names, kernel.modes):
+        place, own = table.place_of(type(record), name), getattr(record, name)
+        if own is None:  # an actuator without a limit has none to vary
+            continue
+
+        def changed(number, name=name):
+            return Kernel(dataclasses.replace(record, **{name: number}))
+
+        h = 1e-3 * (1.0 + abs(own))
+        wanted = difference(lambda p, mode=mode: changed(p).at(x, xd, mode, t, value), own, h)
+        found = kernel.by_parameter(place, x, xd, mode, t, value)
+        assert found == pytest.approx((wanted[0], wanted[3]), rel=1e-6, abs=1e-6)
+        if kernel.switches:
+            h = 1e-6 * (1.0 + abs(own))
+            below, here, above = (changed(own + side * h).margin(x, xd, mode) for side in (-4.0, 0.0, 4.0))
+            if abs(above - 2.0 * here + below) > 1e-3 * h:
+                continue  # the smaller of two margins changes hands here
+            by_p = difference(lambda p, mode=mode: changed(p).margin(x, xd, mode), own, h)
+            assert kernel.margin_by_parameter(place, x, xd, mode) == pytest.approx(by_p, rel=1e-5, abs=1e-5)
 
 
 @pytest.mark.parametrize("kind", ["spring", *GAPS, "cubic", "curve"])
