@@ -15,6 +15,7 @@ from mdstopo.case.design_space import DesignSpace
 from mdstopo.case.errors import CaseError
 from mdstopo.case.exchange import Side, exchange_ends
 from mdstopo.case.model import Objective, ResponseRow, VolumeRow
+from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Evaluation, Peak, Rows
 from mdstopo.optimizer.problem import Floats, Ints, LinearRows, Sample
 from mdstopo.optimizer.scalarisation import ROWS, NotPositiveError, Part, Scalarisation
@@ -74,10 +75,10 @@ class DesignProblem:
         self.competes = (
             bool(self._responses)
             or self.even > 0
-            or any(objective.response.kind != "energy" for objective in self._objectives)
+            or any(not kind_of(objective.response).is_energy for objective in self._objectives)
         )
         looked: list[Objective | ResponseRow] = [*self._objectives, *(row for _, row in self._responses)]
-        members = any(each.response.kind == "member_force" for each in looked)
+        members = any(kind_of(each.response).of_members for each in looked)
         # of very many variables all rows are lines: what makes norms of them costs as much as the rows themselves
         cones = len(self.initial) < WIDE
         few, many = Rows(*NEAR, cones=cones), Rows(*ALL, cones=cones)
@@ -255,7 +256,7 @@ def sign_of(objective: Objective) -> float:
 
 def competes(looked: Objective | ResponseRow, sign: float) -> bool:
     """Whether all peaks of what is looked at bound sign times its value from above."""
-    if looked.response.kind == "member_force" and looked.over_time == "final":
+    if kind_of(looked.response).of_members and looked.over_time == "final":
         return sign > 0.0  # members compete at the end, too
     return looked.over_time in (("max", "max_abs") if sign > 0.0 else ("min",))
 

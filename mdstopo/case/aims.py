@@ -19,9 +19,8 @@ def _none() -> FloatArray:
 class Response(Value):
     """A scalar seen over time.
 
-    kind: energy | displacement | velocity | acceleration | angle | angular_velocity | angular_acceleration |
-    member_force | joint_force | joint_moment. Fields that a kind does not use are None.
-    at_local is in body coordinates of `body`; component: x | y | norm.
+    kind: the word of its record (`case.responses`). Fields that a kind does not use are None.
+    at_local is in body coordinates of `body`; component: x | y | norm. numbers: up to four of its own for its kernels.
     """
 
     kind: str
@@ -31,6 +30,7 @@ class Response(Value):
     component: str | None = None
     group: str | None = None
     joint: str | None = None
+    numbers: tuple[float, ...] = ()
 
 
 @frozen

@@ -13,6 +13,7 @@ from mdstopo.case.design_variables import prices
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.responses import RESPONSES
 from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
 from mdstopo.case.start_geometry import Frames
@@ -127,31 +128,16 @@ def _load_case(fields: Fields, top: Fields, reading: Reading) -> str | None:
 def build_response(fields: Fields, frames: Frames, reading: Reading) -> Response | None:
     """What an objective or a constraint looks at."""
     stated = fields["response"]
-    if stated == "energy":
-        return Response("energy")
+    if isinstance(stated, str):
+        return Response(stated)
     if not isinstance(stated, Fields) or len(stated.stated) != 1:
         return None
-    (kind,) = stated.stated
-    keys = stated[kind]
+    (word,) = stated.stated
+    keys = stated[word]
     if keys is BAD or not keys.good():
         return None
-    if kind == "member_force":
-        return Response(kind, group=keys["group"])
-    if kind in ("joint_force", "joint_moment"):
-        return Response(kind, joint=keys["joint"])
-    body, observer = keys["body"], keys["relative_to"]
-    if body == observer:
-        message = f"found {shown(observer)}, the body itself; seen from there it never moves"
-        reading.mistake(inside(keys.path, "relative_to"), message)
-        return None
-    if kind.startswith("ang"):
-        return Response(kind, body=body, relative_to=observer)
-    if body not in frames.bodies:
-        return None
-    at = frames.local_point(body, keys["at"], keys["frame"], inside(keys.path, "at"), reading)
-    if at is BAD:
-        return None
-    return Response(kind, body=body, at_local=at, relative_to=observer, component=keys["component"])
+    made = RESPONSES[word].made
+    return made(word, keys, frames, reading) if made is not None else Response(word)
 
 
 def build_constraints(

@@ -11,12 +11,11 @@ from typing import Any
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Number, Ref, Text, Version, explained
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
+from mdstopo.case.responses import RESPONSES, key_of
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_scene import (
-    BODY,
     BODY_KEYS,
     BUSHING,
-    FRAME,
     GROUP,
     GROUP_KEYS,
     JOINT,
@@ -109,57 +108,16 @@ DESIGN = Record(
     doc="The design variables: alpha, one for each member with `design: true`, and parameters of laws. In `initial`, "
     "`lower`, `upper` and `power` groups left out have the default.",
 )
-_RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
-_OF_BODY = Key("body", BODY, "whose motion it is", required=True)
-_COMPONENTS = explained({"x": "along x", "y": "along y", "norm": "the length of the vector"})
-_AT_POINT = Record(
-    "the motion of a point",
-    (
-        _OF_BODY,
-        Key("at", PAIR, "the point, which rides on the body", unit="m", otherwise="the centre of mass"),
-        FRAME,
-        _RELATIVE,
-        Key("component", _COMPONENTS, "which part of the vector", default="norm"),
-    ),
-    doc="What an observer riding on `relative_to` sees: the change of the point's coordinates in that body's frame "
-    "since the start, or their time derivatives.",
-)
-_OF_ANGLE = Record(
-    "the rotation of a body",
-    (_OF_BODY, _RELATIVE),
-    doc="psi of the body less psi of `relative_to`, not wrapped, or its time derivatives.",
-)
-_OF_GROUP = Record(
-    "forces in members",
-    (Key("group", GROUP, "whose members are looked at", required=True),),
-    doc="The largest |f*| in the group at each time.",
-)
-_OF_JOINT = Record(
-    "what a joint transmits",
-    (Key("joint", Ref("joint", index=True), "name of the joint, or its index", required=True),),
-    doc="The norm of what the joint transmits. Not for joints that repeat others.",
-)
-RESPONSES = {
-    "displacement": (_AT_POINT, "of a point, in m"),
-    "velocity": (_AT_POINT, "of a point, in m/s"),
-    "acceleration": (_AT_POINT, "of a point, in m/s^2"),
-    "angle": (_OF_ANGLE, "of a body, in rad"),
-    "angular_velocity": (_OF_ANGLE, "of a body, in rad/s"),
-    "angular_acceleration": (_OF_ANGLE, "of a body, in rad/s^2"),
-    "member_force": (_OF_GROUP, "the largest force in a group's members, in N"),
-    "joint_force": (_OF_JOINT, "the force that a joint transmits, in N"),
-    "joint_moment": (_OF_JOINT, "the couple that a joint transmits, in N m"),
-}
 _RESPONSE = ByShape(
     "energy | a mapping such as {displacement: {body: b}}",
     scalar=explained(
-        {"energy": "stored energy, in J: the sum of alpha^mu V over the design members whose laws act"},
+        {kind.word: kind.doc for kind in RESPONSES.values() if kind.keys is None},
         " | a mapping such as {displacement: {body: b}}",
     ),
     mapping=Record(
         "a response",
-        tuple(Key(name, kind, doc) for name, (kind, doc) in RESPONSES.items()),
-        one_of=(tuple(RESPONSES),),
+        tuple(key_of(kind) for kind in RESPONSES.values() if kind.keys is not None),
+        one_of=(tuple(kind.word for kind in RESPONSES.values() if kind.keys is not None),),
         doc="Exactly one of these.",
     ),
 )

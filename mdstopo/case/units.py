@@ -1,24 +1,12 @@
 """Units of what is looked at, for axes and attributes."""
 
 from mdstopo.case.aims import Objective, Response
-
-_UNITS = {
-    "energy": "J",
-    "displacement": "m",
-    "velocity": "m/s",
-    "acceleration": "m/s^2",
-    "angle": "rad",
-    "angular_velocity": "rad/s",
-    "angular_acceleration": "rad/s^2",
-    "member_force": "N",
-    "joint_force": "N",
-    "joint_moment": "N m",
-}
+from mdstopo.case.responses import kind_of
 
 
 def unit_of(response: Response) -> str:
     """The unit of a response."""
-    return _UNITS[response.kind]
+    return kind_of(response).unit
 
 
 def unit_of_value(objective: Objective) -> str:

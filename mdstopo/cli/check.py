@@ -183,7 +183,9 @@ def _say_variables(output: Output, case: "Case") -> None:
 
 def _say_frequencies(output: Output, case: "Case", found: list[dict[str, Any]]) -> None:
     # on which side of the criterion a case stands is a question of stored energy alone
-    energetic = {objective.load_case for objective in case.objectives if objective.response.kind == "energy"}
+    from mdstopo.case.responses import kind_of
+
+    energetic = {objective.load_case for objective in case.objectives if kind_of(objective.response).is_energy}
     for entry in found:
         output.say(
             f"natural frequencies at the start, load case {entry['load_case']}, "

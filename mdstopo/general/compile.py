@@ -8,11 +8,12 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow
+from mdstopo.case.responses import kind_of
+from mdstopo.general import responses as responses_of
 from mdstopo.general.contact_compile import contact_rows
 from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import GeneralModel
-from mdstopo.general.responses import KINDS, POINT
 from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied
 from mdstopo.integrators.choice import choose
 from mdstopo.mechanics.contact import PX, PY
@@ -283,23 +284,24 @@ def _responses(
     groups = [group.name for group in case.members]
     named = [joint.name for joint in case.joints]
     for response in responses:
-        kind, order = KINDS[response.kind]
+        record = kind_of(response)
+        code = responses_of.code_of(record)
+        kernels = responses_of.LISTED[code]
         body = index[response.body or GROUND]
         reference = index[response.relative_to or GROUND]
+        component = COMPONENTS[response.component or "norm"]
         subject = 0
         if response.group is not None:
             subject = groups.index(response.group)
         if response.joint is not None:
             subject = named.index(response.joint)
-        codes.append([kind, body, reference, COMPONENTS[response.component or "norm"], order, subject])
-        point = np.array(response.at_local or (0.0, 0.0))
-        start = np.zeros(2)
-        if kind == POINT:
-            qb, qr = q0[3 * body : 3 * body + 3], q0[3 * reference : 3 * reference + 3]
-            turn = np.array([[np.cos(qb[2]), -np.sin(qb[2])], [np.sin(qb[2]), np.cos(qb[2])]])
-            back = np.array([[np.cos(qr[2]), np.sin(qr[2])], [-np.sin(qr[2]), np.cos(qr[2])]])
-            start = back @ (qb[:2] + turn @ point - qr[:2])
-        rows.append([*point, *start])
+            if joints.kernels_of(type(case.joints[subject])).force_rows < 2:  # along a line there is no norm
+                component = COMPONENTS["x"]
+        codes.append([code, body, reference, component, record.order, subject])
+        row = list(response.numbers)
+        if kernels.row is not None:
+            row = list(kernels.row(response, q0[3 * body : 3 * body + 3], q0[3 * reference : 3 * reference + 3]))
+        rows.append(row + [0.0] * (4 - len(row)))
     return np.array(codes, dtype=np.int64).reshape(-1, 6), np.array(rows, dtype=np.float64).reshape(-1, 4)
 
 
@@ -308,7 +310,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
     forces = any(law.depends_on_rate for group in case.members for law in group.laws)
     bushed = any(any(bushing.damping) for bushing in case.bushings)
     looks = any(
-        over_time in ("mean", "rms", "integral") and response.kind not in ("energy", "displacement", "angle")
+        over_time in ("mean", "rms", "integral") and kind_of(response).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
     )
     return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.kinks import kinks
-from mdstopo.general.responses import ANGLE, POINT, kinked
+from mdstopo.general.responses import LISTED, has_kinks
 from mdstopo.general.start import size_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.model import FloatArray
@@ -54,7 +54,7 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
     t = driver.states()[0][: count + 1].copy()
     if not driver.landings:
         for j, _ in looked:
-            if kinked.py_func(model, j):  # type: ignore[attr-defined]
+            if has_kinks(model, j):
                 found += kinks(driver, j, t)
     if driver.method.name != "runge_kutta" or driver.settings[2] > 0.0:
         return found
@@ -79,9 +79,10 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
 def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
     """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
     kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
-    if kind not in (POINT, ANGLE):
+    kernels = LISTED[kind]
+    if kernels.needs_balance:
         return 0.0
-    return float(NOUGHT * (size_of(driver.case) if kind == POINT else 1.0) / span**order)
+    return float(NOUGHT * (1.0 if kernels.vector is None else size_of(driver.case)) / span**order)
 
 
 def halves(

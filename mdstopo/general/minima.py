@@ -29,7 +29,7 @@ from mdstopo.general.extremes import (
     sample,
 )
 from mdstopo.general.leading_members import Lead, changes, is_led, leads
-from mdstopo.general.responses import kinked
+from mdstopo.general.responses import has_kinks
 from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -103,7 +103,7 @@ def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> list[FloatArray]:
     samples = pieces.samples
     rows = peaks(samples, pieces.see, -1.0, CLOSENESS)
     highest = float(np.abs(samples.value).max())
-    bent = bool(kinked.py_func(driver.scene.model, j))  # type: ignore[attr-defined]
+    bent = bool(has_kinks(driver.scene.model, j))
     for row in rows:
         k, c = int(row[STEP]), float(row[FRACTION])
         between = k if c <= 0.0 else k + 1  # which boundary, where it is one

@@ -1,41 +1,39 @@
 """What can be looked at in a general scene: g(q, v, a, lam, alpha) of Eq. 16, its slopes and its rate.
 
 A response is evaluated at a state whose balance has just been made (`balance`), so poses, forces, accelerations and
-multipliers are at hand. A new response is one more kind here, with its slopes.
+multipliers are at hand. Of each kind there is a record, `ResponseKernels`; the branches by code are made from them.
 """
 
+import importlib
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.case.aims import Response
+from mdstopo.case.responses import RESPONSES, ResponseKind
+from mdstopo.compiler import store
+from mdstopo.compiler.choice import Listed, chosen
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.balance import balance, gather, gather_multipliers
 from mdstopo.general.duties import beside, derivatives
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
-from mdstopo.general.model import INERTER
+from mdstopo.general.model import INERTER, GeneralModel
+from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
 from mdstopo.mechanics.geometry import add_pair_force
 from mdstopo.mechanics.joints.revolute import PLACES, turn
 from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
-from mdstopo.mechanics.joints.table import joint_force_rows, joint_transmitted
+from mdstopo.mechanics.joints.table import FORCE, MOMENT, joint_transmitted
 from mdstopo.mechanics.laws.table import law
 from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
 from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
+from mdstopo.scene.model import FloatArray
 
-#: kinds, column KIND of `GeneralModel.response`
-ENERGY, POINT, ANGLE, MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT = range(6)
-KINDS = {
-    "energy": (ENERGY, 0),
-    "displacement": (POINT, 0),
-    "velocity": (POINT, 1),
-    "acceleration": (POINT, 2),
-    "angle": (ANGLE, 0),
-    "angular_velocity": (ANGLE, 1),
-    "angular_acceleration": (ANGLE, 2),
-    "member_force": (MEMBER_FORCE, 0),
-    "joint_force": (JOINT_FORCE, 0),
-    "joint_moment": (JOINT_MOMENT, 1),
-}
+#: the kernels of responses by their code, column KIND of `GeneralModel.response`; `enter` fills it, at the end
+LISTED: Listed[ResponseKernels] = Listed()
+#: codes of the two responses that depend on the design at fixed motion: stored energy, forces of members
+ENERGY, MEMBER_FORCE = 0, 3
 #: forces of several members that differ by less than this, relative, are the same force: they share what the largest of
 #: them does to derivatives
 TIE = 1e-9
@@ -43,11 +41,31 @@ TIE = 1e-9
 APART = 3e-4
 
 
+@chosen(LISTED, lambda each: each.absolute or None, part)
+def _is_absolute(kind):  # type: ignore[no-untyped-def]
+    return False
+
+
+@chosen(LISTED, lambda each: True if each.vector else None, part)
+def _is_vector(kind):  # type: ignore[no-untyped-def]
+    return False
+
+
+@chosen(LISTED, lambda each: True if each.needs_balance else None, part)
+def needs_balance(kind):  # type: ignore[no-untyped-def]
+    """Whether responses of a kind need more than the state: accelerations, multipliers, sums of forces."""
+    return False
+
+
+@chosen(LISTED, lambda each: True if each.by_state else None, part)
+def _is_by_state(kind):  # type: ignore[no-untyped-def]
+    return False
+
+
 @kernel
 def kinked(model, j):  # type: ignore[no-untyped-def]
     """Whether response j is a norm, an absolute value, or a largest one, which may have kinks in time."""
-    kind = model.response[j, 0]
-    return kind in (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT) or (kind == POINT and model.response[j, 3] == NORM)
+    return _is_absolute(model.response[j, 0]) or is_norm(model, j)
 
 
 @kernel
@@ -164,6 +182,11 @@ def equal_forces(model, strength, segment, t, group, stage, largest, tied):  # t
     return max(found, 1)
 
 
+@chosen(LISTED, lambda each: each.value, part)
+def _value(kind, model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):  # type: ignore[no-untyped-def]
+    return np.nan
+
+
 @kernel
 def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):  # type: ignore[no-untyped-def]
     """g_j at a balanced state; bars (3, n), row_bar (n_row,) = its slopes by q, v, a and lam (set, not added to).
@@ -172,30 +195,53 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
-    kind = model.response[j, 0]
-    if kind == ENERGY:
-        value = 0.0
-        for p in range(model.pair.shape[0]):
-            o = desk.sums[p]
-            value += o[3]
-            add_pair_force(model.pair, desk.rel, p, o[4], o[5], o[6], bars[0])
-        return value
-    if kind in (POINT, ANGLE):
-        return _motion(model, j, model.response[j, 3], q, v, a, bars)
-    if kind == MEMBER_FORCE:
-        slopes = np.empty((3, 6))
-        own = np.empty((2, 6))
-        f, pair = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
-        sign = 1.0 if f >= 0.0 else -1.0
-        inertial = False
-        for i in range(3):
-            for c in range(6):
-                bars[i, 3 * model.pair[pair, c // 3] + c % 3] += sign * slopes[i, c]
-                inertial = inertial or (i == 2 and slopes[i, c] != 0.0)
-        if inertial:
-            _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars)
-        return sign * f
-    return _transmitted(model, j, model.response[j, 4], q, lam, bars, row_bar)
+    return _value(model.response[j, 0], model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+
+
+@kernel
+def energy_value(model, desk, bars):  # type: ignore[no-untyped-def]
+    """Stored energy."""
+    value = 0.0
+    for p in range(model.pair.shape[0]):
+        o = desk.sums[p]
+        value += o[3]
+        add_pair_force(model.pair, desk.rel, p, o[4], o[5], o[6], bars[0])
+    return value
+
+
+@kernel
+def members_value(model, strength, segment, j, who, t, q, v, a, bars):  # type: ignore[no-untyped-def]
+    """|f*| of member `who` of a group."""
+    slopes = np.empty((3, 6))
+    own = np.empty((2, 6))
+    f, pair = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+    sign = 1.0 if f >= 0.0 else -1.0
+    inertial = False
+    for i in range(3):
+        for c in range(6):
+            bars[i, 3 * model.pair[pair, c // 3] + c % 3] += sign * slopes[i, c]
+            inertial = inertial or (i == 2 and slopes[i, c] != 0.0)
+    if inertial:
+        _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars)
+    return sign * f
+
+
+@kernel
+def motion_value(model, j, q, v, a, bars):  # type: ignore[no-untyped-def]
+    """The component of a point's motion, or the angle, that is asked for."""
+    return _motion(model, j, model.response[j, 3], q, v, a, bars)
+
+
+@kernel
+def joint_force_value(model, j, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+    """Norm of the force that a joint transmits."""
+    return _transmitted(model, j, FORCE, q, lam, bars, row_bar)
+
+
+@kernel
+def joint_moment_value(model, j, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+    """Norm of the couple that a joint transmits."""
+    return _transmitted(model, j, MOMENT, q, lam, bars, row_bar)
 
 
 @kernel
@@ -206,7 +252,7 @@ def _motion(model, j, component, q, v, a, bars):  # type: ignore[no-untyped-def]
     r = 3 * model.response[j, 2]
     par = model.response_par[j]
     order = model.response[j, 4]
-    if model.response[j, 0] == POINT:
+    if _is_vector(model.response[j, 0]):
         value = point_response(
             order, component, par[0:2], par[2:4], q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3],
             v[r : r + 3], a[r : r + 3], slope,
@@ -245,10 +291,22 @@ def _transmitted(model, j, which, q, lam, bars, row_bar):  # type: ignore[no-unt
 @kernel
 def is_norm(model, j):  # type: ignore[no-untyped-def]
     """Whether response j is the Euclidean norm of a vector (2,), which has a direction of its own."""
-    kind = model.response[j, 0]
-    if kind == JOINT_FORCE:
-        return joint_force_rows(model.joint[model.response[j, 5], 0]) == 2
-    return kind == POINT and model.response[j, 3] == NORM
+    return _is_vector(model.response[j, 0]) and model.response[j, 3] == NORM
+
+
+def has_norm(model: GeneralModel, j: int) -> bool:
+    """`is_norm` in Python."""
+    return LISTED[int(model.response[j, 0])].vector is not None and int(model.response[j, 3]) == NORM
+
+
+def has_kinks(model: GeneralModel, j: int) -> bool:
+    """`kinked` in Python."""
+    return LISTED[int(model.response[j, 0])].absolute or has_norm(model, j)
+
+
+@chosen(LISTED, lambda each: each.vector and each.vector.across, part)
+def _across(kind, model, j, q, v, a, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+    return np.nan
 
 
 @kernel
@@ -259,20 +317,37 @@ def across_slopes(model, j, q, v, a, lam, bars, row_bar):  # type: ignore[no-unt
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
-    if model.response[j, 0] == POINT:
-        _motion(model, j, ACROSS_MOTION, q, v, a, bars)
-    else:
-        _transmitted(model, j, ACROSS_FORCE, q, lam, bars, row_bar)
+    _across(model.response[j, 0], model, j, q, v, a, lam, bars, row_bar)
 
 
 @kernel
-def _vector(model, j, q, v, a, lam, out):  # type: ignore[no-untyped-def]
+def motion_across(model, j, q, v, a, bars):  # type: ignore[no-untyped-def]
+    """The component of a point's motion perpendicular to it."""
+    return _motion(model, j, ACROSS_MOTION, q, v, a, bars)
+
+
+@kernel
+def joint_force_across(model, j, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+    """The component of the force that a joint transmits perpendicular to it."""
+    return _transmitted(model, j, ACROSS_FORCE, q, lam, bars, row_bar)
+
+
+@chosen(LISTED, lambda each: each.vector and each.vector.components, part)
+def _components(kind, model, j, q, v, a, lam, out):  # type: ignore[no-untyped-def]
     """out (2,) = the vector whose norm response j is, in the frame in which it is formed."""
-    if model.response[j, 0] == POINT:
-        spare = np.zeros((3, q.shape[0]))
-        out[0] = _motion(model, j, X, q, v, a, spare)
-        out[1] = _motion(model, j, Y, q, v, a, spare)
-        return
+
+
+@kernel
+def motion_components(model, j, q, v, a, out):  # type: ignore[no-untyped-def]
+    """Both components of a point's motion."""
+    spare = np.zeros((3, q.shape[0]))
+    out[0] = _motion(model, j, X, q, v, a, spare)
+    out[1] = _motion(model, j, Y, q, v, a, spare)
+
+
+@kernel
+def joint_force_components(model, j, lam, out):  # type: ignore[no-untyped-def]
+    """Both components of the force that a joint transmits."""
     mine = np.empty(3)
     gather_multipliers(model, model.response[j, 5], lam, mine)
     out[0] = mine[0]
@@ -292,7 +367,7 @@ def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):  #
     vector = np.empty(2)
     aside = np.empty((2, 2))
     balance(model, strength, segment, t, q, v, no, desk, a, lam)
-    _vector(model, j, q, v, a, lam, vector)
+    _components(model.response[j, 0], model, j, q, v, a, lam, vector)
     size = np.hypot(vector[0], vector[1])
     if size == 0.0:
         return 0.0
@@ -302,7 +377,7 @@ def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):  #
         e = apart if side == 1 else -apart
         beside(tag, track, k, c, e, q, v, here, near[0], near[1])
         balance(model, strength, segment, t + e, near[0], near[1], no, desk, near[2], lam)
-        _vector(model, j, near[0], near[1], near[2], lam, aside[side])
+        _components(model.response[j, 0], model, j, near[0], near[1], near[2], lam, aside[side])
     x = aside[1, 0] - aside[0, 0]
     y = aside[1, 1] - aside[0, 1]
     return (vector[0] * y - vector[1] * x) / (2.0 * apart * size)
@@ -319,13 +394,13 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # t
             continue
         pair = model.block[k, 0]
         m = model.block[k, 1] + who - model.block[k, 7]
-        for part in range(2):
-            x = q if part == 0 else v
+        for which in range(2):
+            x = q if which == 0 else v
             for c in range(6):
                 d = 3 * model.pair[pair, c // 3] + c % 3
                 kept = x[d]
-                size = 1e-2 * (0.1 + abs(kept)) if part == 1 else 2e-3 * max(model.reach[pair], 1e-3)
-                if c % 3 == 2 and part == 0:
+                size = 1e-2 * (0.1 + abs(kept)) if which == 1 else 2e-3 * max(model.reach[pair], 1e-3)
+                if c % 3 == 2 and which == 0:
                     size = 2e-3
                 slope = 0.0
                 for n in range(3):
@@ -335,7 +410,7 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # t
                     x[d] = kept - (n + 1) * size
                     slope += weight * (plus - inerter_force(model, k, m, q, v, a, own))
                 x[d] = kept
-                bars[part, d] += sign * strength[0, m] * slope / size
+                bars[which, d] += sign * strength[0, m] * slope / size
 
 
 @kernel
@@ -373,9 +448,9 @@ def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, la
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         return np.nan, np.nan
     kind = model.response[j, 0]
-    if not rates and kind in (POINT, ANGLE) and model.response[j, 4] < 2:
+    if not rates and not needs_balance(kind) and model.response[j, 4] < 2:
         return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar), rate
-    simple = not rates or kind == ENERGY or (kind in (POINT, ANGLE) and model.response[j, 4] < derivatives(tag))
+    simple = not rates or (_is_by_state(kind) and model.response[j, 4] < derivatives(tag))
     if not simple:
         balance(model, strength, segment, t, q, v, no, desk, a, lam)
         for d in range(n):
@@ -398,3 +473,50 @@ def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, la
         for d in range(n):
             rate += bars[0, d] * v[d] + bars[1, d] * a[d]
     return value, rate
+
+
+# Records
+
+
+def point_row(response: Response, body: FloatArray, reference: FloatArray) -> Sequence[float]:
+    """The point in body coordinates, and where the observer sees it at the start."""
+    point = np.array(response.at_local or (0.0, 0.0))
+    turn = np.array([[np.cos(body[2]), -np.sin(body[2])], [np.sin(body[2]), np.cos(body[2])]])
+    back = np.array([[np.cos(reference[2]), np.sin(reference[2])], [-np.sin(reference[2]), np.cos(reference[2])]])
+    return [*point, *(back @ (body[:2] + turn @ point - reference[:2]))]
+
+
+OF_ENERGY = ResponseKernels(value=energy_value, by_state=True)
+OF_POINT = ResponseKernels(
+    value=motion_value,
+    row=point_row,
+    vector=VectorKernels(across=motion_across, components=motion_components),
+    needs_balance=False,
+    by_state=True,
+)
+OF_ANGLE = ResponseKernels(value=motion_value, needs_balance=False, by_state=True)
+OF_MEMBERS = ResponseKernels(value=members_value, absolute=True)
+OF_JOINT_FORCE = ResponseKernels(
+    value=joint_force_value,
+    vector=VectorKernels(across=joint_force_across, components=joint_force_components),
+    absolute=True,
+)
+OF_JOINT_MOMENT = ResponseKernels(value=joint_moment_value, absolute=True)
+
+#: of the responses that are known so far, by where their kernels are
+CODES: dict[str, int] = {}
+
+
+def code_of(kind: ResponseKind) -> int:
+    """The code of a response."""
+    if kind.kernels not in CODES:
+        module, _, name = kind.kernels.partition(":")
+        CODES[kind.kernels] = LISTED.add(getattr(importlib.import_module(module), name))
+        if not module.startswith("mdstopo."):
+            store.include(module)
+    return CODES[kind.kernels]
+
+
+for _kind in RESPONSES.values():
+    if _kind.kernels.startswith("mdstopo."):
+        code_of(_kind)

@@ -3,16 +3,13 @@
 from mdstopo.evaluation import Shape
 from mdstopo.general.landings import INTEGRALS
 from mdstopo.general.model import GeneralModel
-from mdstopo.general.responses import JOINT_FORCE, JOINT_MOMENT, MEMBER_FORCE, is_norm
-
-#: responses that are absolute values, whatever their reduction over time
-ABSOLUTE = (MEMBER_FORCE, JOINT_FORCE, JOINT_MOMENT)
+from mdstopo.general.responses import LISTED, has_norm
 
 
 def shape_of(model: GeneralModel, j: int, reduction: str) -> Shape:
     """The shape (`evaluation.Peak`) of the values of response j, reduced over time so."""
     if reduction in INTEGRALS:
         return "plain"
-    if is_norm.py_func(model, j):  # type: ignore[attr-defined]
+    if has_norm(model, j):
         return "norm"
-    return "absolute" if reduction == "max_abs" or int(model.response[j, 0]) in ABSOLUTE else "plain"
+    return "absolute" if reduction == "max_abs" or LISTED[int(model.response[j, 0])].absolute else "plain"

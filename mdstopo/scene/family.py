@@ -1,6 +1,7 @@
 """Which family of kernels a case needs: that of springs between free bodies, or the general one."""
 
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
+from mdstopo.case.responses import kind_of
 
 #: reductions of stored energy that the first family computes
 _REDUCTIONS = frozenset({"max", "min", "mean", "integral", "final"})
@@ -25,7 +26,7 @@ def beyond_springs(case: Case) -> str:
         if found:
             return found
     for objective in case.objectives:
-        if objective.response.kind != "energy":
+        if not kind_of(objective.response).is_energy:
             return f"the response {objective.response.kind}"
         if objective.over_time not in _REDUCTIONS:
             return f"over_time: {objective.over_time}"

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, Objective, ResponseRow, VolumeRow
+from mdstopo.case.responses import kind_of
 from mdstopo.starts.evaluator_interface import Evaluation
 from mdstopo.store.contents import Motion
 
@@ -13,7 +14,6 @@ Floats = NDArray[np.float64]
 
 _USED = 0.9  # share of a volume limit below which it is far from active
 _LARGER = 1.05  # ratio of relative motions from which one exceeds the other
-_MOTIONS = ("displacement", "angle")  # responses whose limit, or whose minimum, restrains
 #: share of the scene's size, or of a radian, by which prescribed motions of two designs differ at most
 _SAME = 1e-6
 
@@ -75,7 +75,7 @@ def without_slope(case: Case, found: Evaluation) -> tuple[str, ...]:
 
 def may_soften(case: Case, load_case: str) -> bool:
     """Whether energy is minimised in this load case and nothing there restrains the motion."""
-    energy = any(each.response.kind == "energy" and each.load_case == load_case for each in _minimised(case))
+    energy = any(kind_of(each.response).is_energy and each.load_case == load_case for each in _minimised(case))
     return energy and not is_held(case, load_case)
 
 
@@ -90,7 +90,7 @@ def is_held(case: Case, load_case: str) -> bool:
     """Whether a displacement or an angle is bounded from above, or minimised, in this load case."""
     looked: list[Objective | ResponseRow] = [*_minimised(case)]
     looked += [row for row in case.constraints if isinstance(row, ResponseRow) and row.sense in ("limit", "equals")]
-    return any(each.load_case == load_case and each.response.kind in _MOTIONS for each in looked)
+    return any(each.load_case == load_case and kind_of(each.response).is_position for each in looked)
 
 
 def _minimised(case: Case) -> list[Objective]:

@@ -15,6 +15,7 @@ from mdstopo.status import Status
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text, slopes
 
 OPEN, ELASTIC, CRUSHING = crush.OPEN, crush.ELASTIC, crush.CRUSHING
+CRUSH = table.CODES["crush"]
 
 ONE = """
 format: 1
@@ -48,33 +49,33 @@ def one(end=1.5, v=-3.0, g=-10.0, foot=-1.0, more="gap: 0.1"):
 
 @numba.njit
 def _law(p, x, mode):
-    return table.law(table.CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0))
+    return table.law(CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0))
 
 
 @numba.njit
 def _margin(p, x, xd, mode):
-    return table.law_margin(table.CRUSH, p, x, xd, mode, np.empty(0))
+    return table.law_margin(CRUSH, p, x, xd, mode, np.empty(0))
 
 
 @numba.njit
 def _slopes(p, x, xd, mode):
-    return table.law_margin_slopes(table.CRUSH, p, x, xd, mode, np.empty(0))
+    return table.law_margin_slopes(CRUSH, p, x, xd, mode, np.empty(0))
 
 
 @numba.njit
 def _next(p, x, mode):
-    return table.law_next(table.CRUSH, p, x, 0.0, 0.0, mode, np.empty(0))
+    return table.law_next(CRUSH, p, x, 0.0, 0.0, mode, np.empty(0))
 
 
 @numba.njit
 def _start(p, x, xd, xdd):
-    mode = table.law_start(table.CRUSH, p, x, xd, xdd, np.empty(0))
-    return mode, table.law_first_set(table.CRUSH, p, x, mode)
+    mode = table.law_start(CRUSH, p, x, xd, xdd, np.empty(0))
+    return mode, table.law_first_set(CRUSH, p, x, mode)
 
 
 @numba.njit
 def _set(p, x, old, new):
-    return table.law_set(table.CRUSH, p, x, old, new)
+    return table.law_set(CRUSH, p, x, old, new)
 
 
 def row_of(side, gap=0.1):

@@ -1,0 +1,180 @@
+"""What can be looked at over time: what is declared of each response, one record a response.
+
+How a response is computed stands in `mdstopo.general`, in what its record names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from mdstopo.case.aims import Response
+from mdstopo.case.joints.joint import PAIR
+from mdstopo.case.kinds import Ref, explained
+from mdstopo.case.reading import BAD, Fields, Reading
+from mdstopo.case.records import Key, Record
+from mdstopo.case.schema_scene import BODY, FRAME, GROUP
+from mdstopo.case.start_geometry import Frames
+from mdstopo.case.value import Value, frozen
+from mdstopo.case.words import inside, shown
+
+Made = Callable[[str, Fields, Frames, Reading], Response | None]
+
+
+@frozen(kw_only=True)
+class ResponseKind(Value):
+    """A response.
+
+    word: as case files have it; doc: what of what, for the case reference; unit: of its values.
+    keys: those that stand beside it, None where the word stands alone; made: the response from its keys, None where
+    something is a mistake, which is noted.
+    kernels: where its `ResponseKernels` are (`general.response_kernels`), module:name.
+    order: how many derivatives by time it has of a position; is_position: whether it is a place or an angle of a body.
+    depends_on_rate: whether it needs velocities or accelerations; is_energy: whether it is the stored energy.
+    of_members: whether it is the largest one of the members of a group.
+    """
+
+    word: str
+    doc: str
+    unit: str
+    kernels: str
+    keys: Record | None = None
+    made: Made | None = None
+    order: int = 0
+    is_position: bool = False
+    depends_on_rate: bool = True
+    is_energy: bool = False
+    of_members: bool = False
+
+
+_RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
+_OF_BODY = Key("body", BODY, "whose motion it is", required=True)
+_COMPONENTS = explained({"x": "along x", "y": "along y", "norm": "the length of the vector"})
+_AT_POINT = Record(
+    "the motion of a point",
+    (
+        _OF_BODY,
+        Key("at", PAIR, "the point, which rides on the body", unit="m", otherwise="the centre of mass"),
+        FRAME,
+        _RELATIVE,
+        Key("component", _COMPONENTS, "which part of the vector", default="norm"),
+    ),
+    doc="What an observer riding on `relative_to` sees: the change of the point's coordinates in that body's frame "
+    "since the start, or their time derivatives.",
+)
+_OF_ANGLE = Record(
+    "the rotation of a body",
+    (_OF_BODY, _RELATIVE),
+    doc="psi of the body less psi of `relative_to`, not wrapped, or its time derivatives.",
+)
+_OF_GROUP = Record(
+    "forces in members",
+    (Key("group", GROUP, "whose members are looked at", required=True),),
+    doc="The largest |f*| in the group at each time.",
+)
+_OF_JOINT = Record(
+    "what a joint transmits",
+    (Key("joint", Ref("joint", index=True), "name of the joint, or its index", required=True),),
+    doc="The norm of what the joint transmits. Not for joints that repeat others.",
+)
+
+
+def _sees_itself(keys: Fields, reading: Reading) -> bool:
+    """Whether the body is its own observer, which is a mistake."""
+    if keys["body"] != keys["relative_to"]:
+        return False
+    message = f"found {shown(keys['relative_to'])}, the body itself; seen from there it never moves"
+    reading.mistake(inside(keys.path, "relative_to"), message)
+    return True
+
+
+def _of_angle(word: str, keys: Fields, _: Frames, reading: Reading) -> Response | None:
+    return None if _sees_itself(keys, reading) else Response(word, body=keys["body"], relative_to=keys["relative_to"])
+
+
+def _at_point(word: str, keys: Fields, frames: Frames, reading: Reading) -> Response | None:
+    if _sees_itself(keys, reading) or keys["body"] not in frames.bodies:
+        return None
+    at = frames.local_point(keys["body"], keys["at"], keys["frame"], inside(keys.path, "at"), reading)
+    if at is BAD:
+        return None
+    return Response(word, body=keys["body"], at_local=at, relative_to=keys["relative_to"], component=keys["component"])
+
+
+def _of_group(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
+    return Response(word, group=keys["group"])
+
+
+def _of_joint(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
+    return Response(word, joint=keys["joint"])
+
+
+def _point(word: str, unit: str, order: int) -> ResponseKind:
+    return ResponseKind(
+        word=word, doc="of a point", unit=unit, kernels="mdstopo.general.responses:OF_POINT", keys=_AT_POINT,
+        made=_at_point, order=order, is_position=order == 0, depends_on_rate=order > 0,
+    )  # fmt: skip
+
+
+def _angle(word: str, unit: str, order: int) -> ResponseKind:
+    return ResponseKind(
+        word=word, doc="of a body", unit=unit, kernels="mdstopo.general.responses:OF_ANGLE", keys=_OF_ANGLE,
+        made=_of_angle, order=order, is_position=order == 0, depends_on_rate=order > 0,
+    )  # fmt: skip
+
+
+#: the responses by their word; their codes in kernels follow this order
+RESPONSES: dict[str, ResponseKind] = {
+    kind.word: kind
+    for kind in (
+        ResponseKind(
+            word="energy",
+            doc="stored energy, in J: the sum of alpha^mu V over the design members whose laws act",
+            unit="J",
+            kernels="mdstopo.general.responses:OF_ENERGY",
+            depends_on_rate=False,
+            is_energy=True,
+        ),
+        _point("displacement", "m", 0),
+        _point("velocity", "m/s", 1),
+        _point("acceleration", "m/s^2", 2),
+        _angle("angle", "rad", 0),
+        _angle("angular_velocity", "rad/s", 1),
+        _angle("angular_acceleration", "rad/s^2", 2),
+        ResponseKind(
+            word="member_force",
+            doc="the largest force in a group's members",
+            unit="N",
+            kernels="mdstopo.general.responses:OF_MEMBERS",
+            keys=_OF_GROUP,
+            made=_of_group,
+            of_members=True,
+        ),
+        ResponseKind(
+            word="joint_force",
+            doc="the force that a joint transmits",
+            unit="N",
+            kernels="mdstopo.general.responses:OF_JOINT_FORCE",
+            keys=_OF_JOINT,
+            made=_of_joint,
+        ),
+        ResponseKind(
+            word="joint_moment",
+            doc="the couple that a joint transmits",
+            unit="N m",
+            kernels="mdstopo.general.responses:OF_JOINT_MOMENT",
+            keys=_OF_JOINT,
+            made=_of_joint,
+        ),
+    )
+}
+
+
+def kind_of(response: Response) -> ResponseKind:
+    """The record of a response."""
+    return RESPONSES[response.kind]
+
+
+def key_of(kind: ResponseKind) -> Key:
+    """A response with keys of its own, as the case file has it."""
+    assert kind.keys is not None
+    return Key(kind.word, kind.keys, f"{kind.doc}, in {kind.unit}")

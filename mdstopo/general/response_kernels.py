@@ -1,0 +1,55 @@
+"""How a response is computed: one record of kernels, which `responses` makes the dispatch by code of.
+
+A kernel takes what it needs of the following, in any order, by these names:
+
+    model, j          the scene's arrays (`general.model`), and which of its responses it is
+    strength, segment (`general.members`), the stretch of time between two breakpoints
+    who               of a response of members the member that is looked at
+    t, q, v, a, lam   a state whose balance has just been made: time, coordinates, velocities, accelerations (n,),
+                      multipliers (n_row,)
+    desk              what the balance has left (`general.balance`)
+    bars, row_bar     (3, n) slopes by q, v, a and (n_row,) by lam: zero before, added to
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mdstopo.case.aims import Response
+from mdstopo.compiler.kernel import Kernel
+from mdstopo.scene.model import FloatArray
+
+Function = Kernel | Callable[..., Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class VectorKernels:
+    """A response that is a component or the norm of a plane vector.
+
+    across: the component perpendicular to the vector, a quarter turn ahead, with its slopes added, its direction held;
+    components (..., out): the vector itself into out (2,).
+    """
+
+    across: Function
+    components: Function
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseKernels:
+    """A response g(q, v, a, lam).
+
+    value: g_j, with its slopes added to bars and row_bar.
+    row (response, body, reference): up to four numbers for `model.response_par`, from the poses (3,) at the start of
+    the body and of the one that it is seen from; None: `Response.numbers`.
+    vector: of a component or a norm. absolute: whether it is an absolute value, or a largest one, which has kinks.
+    needs_balance: whether it needs a, lam or the desk; where not, its order (`ResponseKind`) says of how many
+    derivatives of the motion it is. by_state: whether its rate is g_q v + g_v a where the motion has the derivatives
+    that its order asks for; else the rate is differenced along the motion.
+    """
+
+    value: Function
+    row: Callable[[Response, FloatArray, FloatArray], Sequence[float]] | None = None
+    vector: VectorKernels | None = None
+    absolute: bool = False
+    needs_balance: bool = True
+    by_state: bool = False
