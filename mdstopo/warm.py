@@ -16,6 +16,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.children import command
 from mdstopo.compiler.store import cache_folder
 from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.other_kernels import include_kernels
 
 #: what the other process runs: it stands above the engine, which begins it
 PROGRAM = "mdstopo.compile_looking"
@@ -55,6 +56,7 @@ def compiling(case: Case) -> str:
 
 def compilation_due(case: Case) -> bool:
     """Whether the kernels of this version have never been compiled here for such a case."""
+    include_kernels(case)
     pattern = "mdstopo.general.*" if beyond_springs(case) else "mdstopo.integrators.*"
     return next(cache_folder().glob(pattern), None) is None
 

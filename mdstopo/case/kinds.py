@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from mdstopo.case.nodes import SCALAR, Node
@@ -163,6 +163,26 @@ class Word(Value):
         """enum, with its meanings where editors look for them."""
         schema: Schema = {"type": "string", "enum": list(self.words)}
         return {**schema, "enumDescriptions": list(self.meanings)} if any(self.meanings) else schema
+
+
+@frozen
+class OpenWord(Word):
+    """One of words to which other distributions may add.
+
+    anew (ask) gives them with their meanings; ask: whether distributions are asked for theirs.
+    """
+
+    anew: Callable[[bool], Mapping[str, str]] = lambda _: {}
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        known = self.words if value in self.words else tuple(self.anew(True))
+        return Word(known, self.instead).read(node, path, reading)
+
+    def schema(self) -> Schema:
+        """enum, with those of other distributions that have been asked for."""
+        return explained(self.anew(False), self.instead).schema()
 
 
 def explained(meanings: Mapping[str, str], instead: str = "") -> Word:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
+from mdstopo.case.distributions import Brought, BroughtError
 from mdstopo.case.kinds import Kind, Name, Schema, Word, check_name
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.reading import BAD, Fields, Reading, Reference, found
@@ -179,31 +180,40 @@ class Tagged(Value):
     what: str
     tag: str
     variants: Mapping[str, Record]
+    more: Brought[Record] | None = None
+
+    @property
+    def known(self) -> dict[str, Record]:
+        """The variants, with those of other distributions that have been asked for."""
+        return {**self.variants, **(self.more.found if self.more is not None else {})}
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """Fields (values may be BAD) or BAD."""
         if node.kind != MAPPING:
-            words = " | ".join(self.variants)
+            words = " | ".join(self.known)
             message = f"found {found(node)}, allowed is {self.what}: a mapping with `{self.tag}: {words}`"
             reading.mistake(path, message, node)
             return BAD
         entry = node.entries.get(self.tag)
         if entry is None:
             best = nearest(self.tag, node.entries)
-            known = {key.name for record in self.variants.values() for key in record.keys}
+            known = {key.name for record in self.known.values() for key in record.keys}
             if best is not None and best not in known:
                 message = f"unknown key {shown(best)}, did you mean {self.tag!r}?"
                 reading.mistake(inside(path, best), message, node.entries[best][0])
             else:
-                words = " | ".join(self.variants)
+                words = " | ".join(self.known)
                 reading.mistake(path, f"the key {self.tag!r} is missing, allowed is {words}")
             return BAD
-        word = self._word().read(entry[1], inside(path, self.tag), reading)
-        return BAD if word is BAD else self.variants[word].read(node, path, reading)
+        place = inside(path, self.tag)
+        if entry[1].kind == SCALAR and not _brought(self.more, entry[1].scalar(), self.known, place, reading):
+            return BAD
+        word = self._word().read(entry[1], place, reading)
+        return BAD if word is BAD else self.known[word].read(node, path, reading)
 
     def _word(self) -> Word:
         """The tag's value."""
-        return Word(tuple(self.variants), meanings=tuple(record.doc for record in self.variants.values()))
+        return Word(tuple(self.known), meanings=tuple(record.doc for record in self.known.values()))
 
     def schema(self) -> Schema:
         """object whose further keys depend on the tag."""
@@ -216,7 +226,7 @@ class Tagged(Value):
                     "if": {"properties": {self.tag: {"const": word}}, "required": [self.tag]},
                     "then": record.schema(),
                 }
-                for word, record in self.variants.items()
+                for word, record in self.known.items()
             ],
         }
 
@@ -260,7 +270,8 @@ class Record(Value):
     """A mapping with known keys.
 
     doc: what it stands for, a sentence. one_of: of each of these sets exactly one key is needed; any_of: at least
-    one of these; never_both: pairs; needs: a key -> the one that must stand beside it.
+    one of these; never_both: pairs; needs: a key -> the one that must stand beside it. more: keys of other
+    distributions, each of which stands for one of the first set of `one_of`.
     """
 
     what: str
@@ -270,15 +281,32 @@ class Record(Value):
     never_both: tuple[tuple[str, str], ...] = ()
     needs: tuple[tuple[str, str], ...] = ()
     doc: str = ""
+    more: Brought[Key] | None = None
+
+    @property
+    def all_keys(self) -> tuple[Key, ...]:
+        """The keys, with those of other distributions that have been asked for."""
+        return (*self.keys, *(self.more.found.values() if self.more is not None else ()))
+
+    @property
+    def sets(self) -> tuple[tuple[str, ...], ...]:
+        """`one_of`, with what other distributions have brought."""
+        if self.more is None or not self.more.found:
+            return self.one_of
+        return ((*self.one_of[0], *self.more.found), *self.one_of[1:])
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """Fields (values may be BAD) or BAD."""
         if node.kind != MAPPING:
-            words = listed(key.name for key in self.keys)
+            words = listed(key.name for key in self.all_keys)
             message = f"found {found(node)}, allowed is {self.what}, a mapping with the keys {words}"
             reading.mistake(path, message, node)
             return BAD
-        known = {key.name: key for key in self.keys}
+        known = {key.name: key for key in self.all_keys}
+        for text in node.entries if self.more is not None else ():
+            if not _brought(self.more, text, known, inside(path, text), reading):
+                return BAD
+        known = {key.name: key for key in self.all_keys}
         fields = Fields(path, (name for name in node.entries if name in known))
         meant = self._unknown(node, path, reading, known)
         for name, key in known.items():
@@ -316,7 +344,7 @@ class Record(Value):
     def _together(self, fields: Fields, meant: set[str], path: str, reading: Reading) -> None:
         """Which keys go with which."""
         given = fields.stated
-        for names in self.one_of:
+        for names in self.sets:
             here = [name for name in names if name in given]
             if len(here) == 1:
                 continue
@@ -341,7 +369,7 @@ class Record(Value):
         """object without further keys."""
         schema: Schema = {
             "type": "object",
-            "properties": {key.name: key.schema() for key in self.keys},
+            "properties": {key.name: key.schema() for key in self.all_keys},
             "additionalProperties": False,
         }
         if self.doc:
@@ -349,7 +377,7 @@ class Record(Value):
         required = [key.name for key in self.keys if key.required]
         if required:
             schema["required"] = required
-        rules: list[Schema] = [{"oneOf": [{"required": [name]} for name in names]} for names in self.one_of]
+        rules: list[Schema] = [{"oneOf": [{"required": [name]} for name in names]} for names in self.sets]
         if self.any_of:
             rules.append({"anyOf": [{"required": [name]} for name in self.any_of]})
         rules += [{"not": {"required": list(pair)}} for pair in self.never_both]
@@ -358,3 +386,15 @@ class Record(Value):
         if self.needs:
             schema["dependentRequired"] = {name: [other] for name, other in self.needs}
         return schema
+
+
+def _brought(more: Brought[Any] | None, word: Any, known: Container[str], path: str, reading: Reading) -> bool:
+    """Look for an unknown word in other distributions; False where one has it that cannot be used, which is noted."""
+    if more is None or not isinstance(word, str) or word in known:
+        return True
+    try:
+        more.find(word)
+    except BroughtError as error:
+        reading.mistake(path, str(error))
+        return False
+    return True

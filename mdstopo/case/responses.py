@@ -6,8 +6,10 @@ How a response is computed stands in `mdstopo.general`, in what its record names
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from mdstopo.case.aims import Response
+from mdstopo.case.distributions import Brought
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
 from mdstopo.case.reading import BAD, Fields, Reading
@@ -170,7 +172,9 @@ RESPONSES: dict[str, ResponseKind] = {
 
 
 def kind_of(response: Response) -> ResponseKind:
-    """The record of a response."""
+    """The record of a response; KeyError where there is none."""
+    if response.kind not in RESPONSES:  # a process that has not read the case
+        OF_OTHERS.find(response.kind)
     return RESPONSES[response.kind]
 
 
@@ -178,3 +182,16 @@ def key_of(kind: ResponseKind) -> Key:
     """A response with keys of its own, as the case file has it."""
     assert kind.keys is not None
     return Key(kind.word, kind.keys, f"{kind.doc}, in {kind.unit}")
+
+
+def enter_response(kind: Any) -> Key:
+    """Take in a response of another distribution; TypeError where it is none, or its word is taken."""
+    if not isinstance(kind, ResponseKind) or kind.keys is None or kind.made is None:
+        raise TypeError(f"found {kind!r}, needed is a ResponseKind with `keys` and `made`")
+    if RESPONSES.setdefault(kind.word, kind) is not kind:
+        raise TypeError(f"there is a response {kind.word!r} already")
+    return key_of(kind)
+
+
+#: responses of other distributions
+OF_OTHERS = Brought("mdstopo.responses", enter_response)

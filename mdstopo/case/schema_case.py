@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Any
 
 from mdstopo.case.joints.joint import PAIR
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Number, Ref, Text, Version, explained
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Number, OpenWord, Ref, Text, Version, explained
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
-from mdstopo.case.responses import RESPONSES, key_of
+from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_scene import (
     BODY_KEYS,
@@ -19,6 +19,7 @@ from mdstopo.case.schema_scene import (
     GROUP,
     GROUP_KEYS,
     JOINT,
+    LAW,
     LOAD_CASE,
     LOADS,
     MOTIONS,
@@ -52,6 +53,7 @@ _POWER = Key(
     "goes through a list, which rises, from one optimum to the next; everything else takes its last",
     default=1.0,
 )
+_PARAMETER = OpenWord(tuple(parameter_words()), "", tuple(parameter_words().values()), parameter_words)
 _VARIABLE = Record(
     "a design variable",
     (
@@ -63,7 +65,7 @@ _VARIABLE = Record(
             "whose law it is; of several groups, all have the same values",
             required=True,
         ),
-        Key("parameter", explained(parameter_words()), "which key of the law varies", required=True),
+        Key("parameter", _PARAMETER, "which key of the law varies", required=True),
         Key(
             "law",
             Number(minimum=0, whole=True),
@@ -119,6 +121,7 @@ _RESPONSE = ByShape(
         tuple(key_of(kind) for kind in RESPONSES.values() if kind.keys is not None),
         one_of=(tuple(kind.word for kind in RESPONSES.values() if kind.keys is not None),),
         doc="Exactly one of these.",
+        more=OF_OTHERS,
     ),
 )
 _REDUCERS = explained(
@@ -345,3 +348,10 @@ def json_schema() -> dict[str, Any]:
         "description": "One design problem. SI units; coordinates are global, at the start.",
         **FORMAT.schema(),
     }
+
+
+def ask_distributions() -> None:
+    """Have the schema know the laws and responses of other distributions. BroughtError where one cannot be used."""
+    for brought in (LAW.more, OF_OTHERS):
+        assert brought is not None
+        brought.find_all()

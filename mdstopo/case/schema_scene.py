@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mdstopo.case.distributions import Brought
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joint import BODIES, PAIR, POINT
 from mdstopo.case.joints.joint import record_of as record_of_joint
@@ -16,7 +17,7 @@ from mdstopo.case.kinds import (
     Ref,
     explained,
 )
-from mdstopo.case.laws import LAWS
+from mdstopo.case.laws import LAWS, enter_law
 from mdstopo.case.laws.law import record_of as record_of_law
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByShape, Key, ListOf, Record, Tagged, Vector
@@ -192,18 +193,25 @@ POINTS = Record(
 )
 
 # Members.
-LAW = Tagged("a member law", "type", {word: record_of_law(law) for word, law in LAWS.items()})
+LAW = Tagged(
+    "a member law", "type", {word: record_of_law(law) for word, law in LAWS.items()}, Brought("mdstopo.laws", enter_law)
+)
 
 
-def parameter_words() -> dict[str, str]:
-    """The numbers that laws have, each with its unit and the laws that have it."""
+def parameter_words(from_everywhere: bool = False) -> dict[str, str]:
+    """The numbers that laws have, each with its unit and the laws that have it.
+
+    from_everywhere: other distributions are asked for their laws.
+    """
+    if from_everywhere and LAW.more is not None:
+        LAW.more.find_all()
     found: dict[str, tuple[str, list[str]]] = {}
-    for law, record in LAW.variants.items():
+    for law, record in LAW.known.items():
         for key in record.keys:
             if isinstance(key.kind, Number):
                 found.setdefault(key.name, (key.unit, []))[1].append(law)
     return {
-        name: f"of {'every law' if len(laws) == len(LAW.variants) else ', '.join(laws)}, in {unit}"
+        name: f"of {'every law' if len(laws) == len(LAW.known) else ', '.join(laws)}, in {unit}"
         for name, (unit, laws) in found.items()
     }
 

@@ -16,8 +16,13 @@ def command(out: Path | None) -> int:
 
     An editor that knows it completes and checks a case while it is typed.
     """
-    from mdstopo.case.schema_case import json_schema
+    from mdstopo.case.distributions import BroughtError
+    from mdstopo.case.schema_case import ask_distributions, json_schema
 
+    try:
+        ask_distributions()
+    except BroughtError as error:
+        raise click.ClickException(str(error)) from error
     text = json.dumps(json_schema(), indent=2, ensure_ascii=False)
     if out is None:
         Output().say(text)

@@ -29,6 +29,7 @@ _PATIENCE = 600.0
 
 #: a hash of the sources that `include` has added; empty where there are none
 _foreign = ""
+_included: set[str] = set()
 
 #: the functions in the glue that Python calls: with what `Native.block_of` fills, and with what is prepared
 CALL, PREPARED = "mdstopo_call", "mdstopo_prepared"
@@ -89,6 +90,9 @@ def include(module: str) -> None:
     module: an imported module; of a package all files count. The order counts, for codes follow it.
     """
     global _foreign
+    if module in _included:
+        return
+    _included.add(module)
     top = sys.modules[module.partition(".")[0]]
     file = Path(getattr(top, "__file__", None) or sys.modules[module].__file__ or "")
     files = sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]

@@ -21,6 +21,7 @@ from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
+from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.scene.signals import breakpoints, segment_values
 
 COMPONENTS = {"x": 0, "y": 1, "norm": 2}
@@ -63,6 +64,7 @@ def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[s
 
 def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     """The arrays of one load case."""
+    include_kernels(case)
     names = (*(body.name for body in case.bodies), GROUND)
     index = {name: i for i, name in enumerate(names)}
     n = 3 * len(names)

@@ -20,6 +20,7 @@ from mdstopo.evaluators import evaluator_of
 from mdstopo.optimizer.wide import MANY
 from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, meet
 from mdstopo.warm import compiling, tiny
@@ -71,6 +72,7 @@ def compile_share() -> None:
 
 def _marker(case: Case) -> Path:
     """An empty file that says that the kernels for such cases are cached."""
+    include_kernels(case)
     family = "general" if beyond_springs(case) else "springs"
     family += "".join(f"-{many}" for many in (MANY, WIDE) if case.space.size >= many)
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"

@@ -3,16 +3,19 @@
 What a law does stands in `mdstopo.mechanics.laws`, in the module that its record names.
 """
 
+from typing import Any
+
 from mdstopo.case.laws.actuator import ActuatorLaw
 from mdstopo.case.laws.crush import CrushLaw
 from mdstopo.case.laws.cubic import CubicLaw
 from mdstopo.case.laws.curve import CurveLaw
 from mdstopo.case.laws.gap import GapLaw
 from mdstopo.case.laws.inerter import InerterLaw
-from mdstopo.case.laws.law import Law
+from mdstopo.case.laws.law import Law, record_of
 from mdstopo.case.laws.pulse import PulseLaw
 from mdstopo.case.laws.spring import SpringLaw
 from mdstopo.case.laws.table import TableLaw
+from mdstopo.case.records import Record
 
 #: the laws by their word; their codes in kernels follow this order
 LAWS: dict[str, type[Law]] = {
@@ -30,6 +33,16 @@ LAWS: dict[str, type[Law]] = {
     )
 }
 
+
+def enter_law(law: Any) -> Record:
+    """Take in a law of another distribution; TypeError where it is none, or its word is taken."""
+    if not (isinstance(law, type) and issubclass(law, Law)):
+        raise TypeError(f"found {law!r}, needed is a subclass of Law")
+    if LAWS.setdefault(law.type, law) is not law:
+        raise TypeError(f"there is a law {law.type!r} already")
+    return record_of(law)
+
+
 __all__ = [
     "LAWS",
     "ActuatorLaw",
@@ -42,4 +55,5 @@ __all__ = [
     "PulseLaw",
     "SpringLaw",
     "TableLaw",
+    "enter_law",
 ]

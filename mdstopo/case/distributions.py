@@ -1,0 +1,51 @@
+"""What other distributions bring: records that they register by entry points.
+
+Nothing is looked for until a case names something that is not known here; only then are the installed distributions
+read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Generic, TypeVar
+
+T = TypeVar("T")
+
+
+class BroughtError(Exception):
+    """A registered record cannot be used; a sentence without a full stop."""
+
+
+class Brought(Generic[T]):
+    """Records that distributions register in a group of entry points, by the word that case files have for them.
+
+    enter (record) takes one in and returns what the reader needs of it; it raises TypeError where it is no such record.
+    """
+
+    def __init__(self, group: str, enter: Callable[[Any], T]) -> None:
+        self.group = group
+        self._enter = enter
+        #: those found so far
+        self.found: dict[str, T] = {}
+
+    def find(self, word: str) -> T | None:
+        """What is registered under a word; None where nothing is. BroughtError where it cannot be used."""
+        self._look(word)
+        return self.found.get(word)
+
+    def find_all(self) -> dict[str, T]:
+        """All that are registered. BroughtError where one cannot be used."""
+        self._look()
+        return self.found
+
+    def _look(self, word: str | None = None) -> None:
+        from importlib.metadata import entry_points
+
+        for point in sorted(entry_points(group=self.group), key=lambda each: each.name):
+            if point.name in self.found or (word is not None and point.name != word):
+                continue
+            try:
+                self.found[point.name] = self._enter(point.load())
+            except Exception as error:
+                what = f"{type(error).__name__}: {error}"
+                raise BroughtError(f"{point.name!r} of {self.group} ({point.value}) cannot be used: {what}") from error

@@ -1,0 +1,18 @@
+"""Kernels of other distributions that a case needs, made known to the store of machine code before it is asked."""
+
+import importlib
+
+from mdstopo.case.model import Case, VolumeRow
+from mdstopo.case.responses import kind_of
+from mdstopo.compiler import store
+
+
+def include_kernels(case: Case) -> None:
+    """Have machine code kept apart, by their sources too, where laws or responses of a case come from elsewhere."""
+    named = [law.kernels for group in case.members for law in group.laws]
+    looked = [each.response for each in (*case.objectives, *case.constraints) if not isinstance(each, VolumeRow)]
+    named += [kind_of(response).kernels.partition(":")[0] for response in looked]
+    for module in named:
+        if not module.startswith("mdstopo."):
+            importlib.import_module(module)
+            store.include(module)
