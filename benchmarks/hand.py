@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from mdstopo import Case
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.settings.optimizer_presets import settings

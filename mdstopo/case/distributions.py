@@ -34,13 +34,14 @@ class Brought(Generic[T]):
         return self.found.get(word)
 
     def find_all(self) -> dict[str, T]:
-        """All that are registered. BroughtError where one cannot be used."""
+        """All that are registered. BroughtError where one cannot be used; the others are found then."""
         self._look()
         return self.found
 
     def _look(self, word: str | None = None) -> None:
         from importlib.metadata import entry_points
 
+        wrong = None
         for point in sorted(entry_points(group=self.group), key=lambda each: each.name):
             if point.name in self.found or (word is not None and point.name != word):
                 continue
@@ -48,4 +49,6 @@ class Brought(Generic[T]):
                 self.found[point.name] = self._enter(point.load())
             except Exception as error:
                 what = f"{type(error).__name__}: {error}"
-                raise BroughtError(f"{point.name!r} of {self.group} ({point.value}) cannot be used: {what}") from error
+                wrong = wrong or BroughtError(f"{point.name!r} of {self.group} ({point.value}) cannot be used: {what}")
+        if wrong is not None:
+            raise wrong

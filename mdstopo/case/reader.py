@@ -158,7 +158,7 @@ def _build(top: Fields, reading: Reading) -> dict[str, Any]:
         "objectives": build_objectives(top, frames, reading),
         "combine": build_combine(top, reading),
         "constraints": build_constraints(top, groups, variables, frames, reading),
-        "optimizer": build_optimizer(top["optimizer"]),
+        "optimizer": build_optimizer(top["optimizer"], reading),
         "solver": build_solver(top["solver"], times, reading),
         "variables": variables,
         **build_shared(top, groups, reading),

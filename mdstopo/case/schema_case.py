@@ -29,6 +29,7 @@ from mdstopo.case.schema_scene import (
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizer_presets import PRESETS
+from mdstopo.settings.optimizers import names
 
 # Design, objectives, constraints.
 
@@ -222,10 +223,11 @@ _PRESETS = {
     "conlin": "reciprocal where a function falls, linear where it rises (Fleury and Braibant 1986)",
     "slp": "sequential linear programming in a trust box",
 }
+_OPTIMIZERS = OpenWord(tuple(names()), "", tuple(names().values()), names)
 OPTIMIZER = Record(
     "optimizer settings",
     (
-        Key("name", explained({"gsao": "generalized sequential approximate optimization"}), "method", default="gsao"),
+        Key("name", _OPTIMIZERS, "method", default="gsao"),
         Key("preset", explained({name: _PRESETS[name] for name in PRESETS}), "named settings", default="default"),
         Key(
             "max_iterations",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from mdstopo.case.distributions import Brought
+import contextlib
+
+from mdstopo.case.distributions import Brought, BroughtError
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.joints.joint import BODIES, PAIR, POINT
 from mdstopo.case.joints.joint import record_of as record_of_joint
@@ -204,7 +206,8 @@ def parameter_words(from_everywhere: bool = False) -> dict[str, str]:
     from_everywhere: other distributions are asked for their laws.
     """
     if from_everywhere and LAW.more is not None:
-        LAW.more.find_all()
+        with contextlib.suppress(BroughtError):  # whoever names such a law is told
+            LAW.more.find_all()
     found: dict[str, tuple[str, list[str]]] = {}
     for law, record in LAW.known.items():
         for key in record.keys:

@@ -9,8 +9,9 @@ from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.loading import Window
 from mdstopo.case.model import OptimizerSettings, SolverSettings
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.words import count_text, inside, number_text
+from mdstopo.case.words import count_text, inside, listed, number_text
 from mdstopo.settings.optimizer_options import OPTIONS
+from mdstopo.settings.optimizers import OPTIMIZERS
 
 MOST_STEPS = 10**8
 """Fixed steps in one load case; more would neither end nor fit in memory."""
@@ -93,10 +94,16 @@ def warn_assemble(top: Fields, reading: Reading) -> None:
         reading.warning(inside(solver.path, "assemble"), "ignored: there are no joints and no motions")
 
 
-def build_optimizer(fields: Any) -> OptimizerSettings:
+def build_optimizer(fields: Any, reading: Reading) -> OptimizerSettings:
     """The optimizer's settings; the defaults where they could not be read."""
     if fields is None or fields is BAD or not fields.good():
         return OptimizerSettings()
+    kind = OPTIMIZERS[fields["name"]]
+    for name in OPTIONS:
+        if name in fields.stated and name not in kind.options:
+            reading.mistake(inside(fields.path, name), f"{kind.name} has no such setting")
+    if fields["preset"] not in kind.presets:
+        reading.mistake(inside(fields.path, "preset"), f"{kind.name} has {listed(sorted(kind.presets))}")
     options = FrozenDict({name: fields[name] for name in OPTIONS if name in fields.stated})
     return OptimizerSettings(
         fields["name"],

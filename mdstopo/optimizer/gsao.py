@@ -1,7 +1,6 @@
 """The driver loop, as the paper's Figure 2: evaluate, judge, adapt, approximate, solve, and again.
 
-One step is one evaluation. Between two steps everything is in `State`, so that the loop can be stopped,
-stored and resumed anywhere without a difference in any bit.
+The duties are those of `interface`.
 """
 
 import time
@@ -10,15 +9,15 @@ from typing import Protocol
 
 import numpy as np
 
-from mdstopo.optimizer.bundle import Bundle
 from mdstopo.optimizer.bundle_method import RESET_TRUST, BundleMethod
 from mdstopo.optimizer.competing_rows import DenseModel, FeasibleSet
+from mdstopo.optimizer.interface import first_state
 from mdstopo.optimizer.nearest_feasible import project
 from mdstopo.optimizer.problem import Floats, Problem, Sample
-from mdstopo.optimizer.safeguards import better, failure, no_cuts, plain_violation, scaled_violation, verdict
+from mdstopo.optimizer.safeguards import better, failure, plain_violation, scaled_violation, verdict
 from mdstopo.optimizer.separable import SeparableMethod
 from mdstopo.optimizer.shifts import Shifts
-from mdstopo.optimizer.state import History, RowDetails, State, Step
+from mdstopo.optimizer.state import State
 from mdstopo.optimizer.wide import Measures, Space, ranges
 from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.optimizer.wide_rows import WideModel
@@ -120,63 +119,21 @@ class Gsao:
         change, _ = self._measures.change(tried, origin)
         return self._finish(state, sample, tried, change, accepted, began)
 
-    def reopen(self, state: State) -> State:
-        """The state under the present limits: a run that a moved limit or tolerance ended goes on."""
-        state = state.copy()
-        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
-        return state
+    def terminate(self, state: State) -> tuple[RunStatus, str]:
+        """Whether a state goes on, and if not why."""
+        return verdict(state, self._is_stuck(state), self.settings)
 
     # The steps of the loop.
 
     def _first_state(self, alpha: Floats, sample: Sample, failed: bool) -> State:
         """The state at a first design, before a method begins."""
-        n = len(alpha)
-        violation, plain = (float("inf"),) * 2 if failed else (scaled_violation(sample), plain_violation(sample))
-        return State(
-            alpha=alpha,
-            objective=sample.objective,
-            rows=sample.rows,
-            gradients=sample.gradients,
-            constraint_rows=sample.constraint_rows,
-            constraint_gradients=sample.constraint_gradients,
-            violation=violation,
-            cuts=no_cuts(n)[0],
-            cut_gradients=no_cuts(n)[1],
-            forgotten=float("inf"),
-            trial=alpha,
-            predicted=0.0,
-            kkt=float("nan"),
-            shift=Shifts(np.full(n, self.settings.number("shift_start"))),
-            step=Step(alpha, alpha),
+        return first_state(
+            alpha,
+            sample,
+            failed,
+            shift=Shifts(np.full(len(alpha), self.settings.number("shift_start"))),
             trust=self.settings.number("trust_start") if self.settings.flag("trust_region") else 1.0,
             convex=self.settings.number("convex_start"),
-            penalty=np.zeros(0),
-            merit_penalty=np.zeros(0),
-            row_details=RowDetails.of(sample),
-            bundle=Bundle.empty(n),
-            multipliers=np.zeros(0),
-            steps=np.zeros((0, n)),
-            changes=np.zeros((0, n)),
-            uses_bundle=False,
-            restoring=False,
-            resets=0,
-            concavity=np.zeros(1),
-            stagnation=0,
-            violation_mark=float("inf"),
-            dropped=False,
-            largest_gradient=0.0,
-            iteration=0,
-            evaluations=1,
-            small=0,
-            failed=0,
-            seconds=0.0,
-            best_alpha=alpha,
-            best_objective=sample.objective,
-            best_violation=violation,
-            best_plain=plain,
-            status=RunStatus.RUNNING,
-            reason="",
-            history=History(),
         )
 
     def _judge(self, state: State, sample: Sample) -> bool:
@@ -249,7 +206,7 @@ class Gsao:
             state.kkt,
             accepted,
         )
-        state.status, state.reason = verdict(state, self._is_stuck(state), self.settings)
+        state.status, state.reason = self.terminate(state)
         if state.status is RunStatus.CONVERGED:
             self._report_iterate(state)
         return state
@@ -260,28 +217,3 @@ class Gsao:
         if abs(state.objective - state.best_objective) <= EQUAL * abs(state.best_objective):
             state.best_alpha, state.best_objective = state.alpha, state.objective
             state.best_violation, state.best_plain = state.violation, plain_violation(state.sample)
-
-
-def run(
-    optimizer: Gsao,
-    state: State | None = None,
-    *,
-    on_iteration: Callable[[State], None] | None = None,
-    stop_requested: Callable[[], bool] | None = None,
-) -> State:
-    """Drive an optimiser to its end, from `state` or from the start.
-
-    on_iteration sees every new state, the first included. Between iterations stop_requested is asked; if it
-    says yes the state is returned still running, and `run` continues from it as if nothing had been.
-    """
-    if state is None:
-        state = optimizer.start()
-        if on_iteration is not None:
-            on_iteration(state)
-    while state.running:
-        if stop_requested is not None and stop_requested():
-            break
-        state = optimizer.step(state)
-        if on_iteration is not None:
-            on_iteration(state)
-    return state

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from mdstopo._version import __version__
 from mdstopo.case.model import Case
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.interface import Optimizer, make, run
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
@@ -171,15 +171,21 @@ def _is_there(task: Task, state: State) -> bool:
     return task.is_through(state) or (task.iterate >= 0 and state.iteration >= task.iterate - 1)
 
 
-def _optimizer(case: Case, problem: Problem, task: Task) -> Gsao:
+def _optimizer(case: Case, problem: Problem, task: Task) -> Optimizer:
     chosen = case.optimizer
-    return Gsao(
+    return make(
         problem,
-        settings(chosen.preset, dict(chosen.options), max_iterations=task.iterations, tolerance=chosen.tolerance),
+        settings(
+            chosen.preset,
+            dict(chosen.options),
+            max_iterations=task.iterations,
+            tolerance=chosen.tolerance,
+            optimizer=chosen.name,
+        ),
     )
 
 
-def _first(optimizer: Gsao, task: Task, stop: Callable[[], bool] | None) -> State:
+def _first(optimizer: Optimizer, task: Task, stop: Callable[[], bool] | None) -> State:
     """The state with which a task begins. Raises StoppedError where it is stopped before there is one."""
     if not (task.softened and hasattr(optimizer.problem, "softened")):
         return optimizer.start(task.start)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mdstopo.case.errors import Mistake
-from mdstopo.case.model import Case
+from mdstopo.case.model import Case, VolumeRow
 from mdstopo.scene.family import beyond_springs
+from mdstopo.settings.optimizers import OPTIMIZERS
 
 #: methods of the general kernels
 INTEGRATORS = frozenset({"auto", "runge_kutta", "generalized_alpha"})
@@ -34,5 +35,11 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
             "solver.integrator",
             f"{solver.integrator} does not compute {beyond}; runge_kutta does, and auto takes it",
         )
+    optimizer = OPTIMIZERS[case.optimizer.name]
+    for i, row in enumerate(case.constraints):
+        volume = isinstance(row, VolumeRow)
+        if not (optimizer.takes_volumes if volume else optimizer.takes_limits):
+            what = "volumes" if volume else "responses"
+            yield f"constraints[{i}]", f"the optimiser {optimizer.name} takes no limits on {what}; gsao does"
     if case.variables and solver.sensitivity not in BY_PARAMETERS:
         yield "solver.sensitivity", no_parameters(solver.sensitivity)

@@ -51,12 +51,14 @@ class Settings:
     """All settings of one run, resolved.
 
     max_iterations: evaluations after the first one. tolerance: bound on the projected KKT residual relative
-    to the largest |dU/dalpha|. options: every name of `OPTIONS`; build it with `resolve`.
+    to the largest |dU/dalpha|. options: every name of `OPTIONS`; build it with `resolve`. optimizer: which one, a name
+    of `optimizers.OPTIMIZERS`.
     """
 
     max_iterations: int = 200
     tolerance: float = 1e-6
     options: Mapping[str, Value] = field(default_factory=lambda: resolve("default", {}))
+    optimizer: str = "gsao"
 
     def number(self, name: str) -> float:
         """The option `name` as a float."""
@@ -112,12 +114,13 @@ def settings(
     *,
     max_iterations: int = 200,
     tolerance: float = 1e-6,
+    optimizer: str = "gsao",
 ) -> Settings:
     """`Settings` from a preset and single settings. Raises ValueError as `resolve` does, and for a count
     below zero."""
     if max_iterations < 0 or not tolerance >= 0.0:
         raise ValueError("max_iterations and tolerance must not be negative")
-    return Settings(max_iterations, tolerance, resolve(preset, overrides or {}))
+    return Settings(max_iterations, tolerance, resolve(preset, overrides or {}), optimizer)
 
 
 def _mistake(name: str, value: object) -> str:

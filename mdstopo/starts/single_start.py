@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.interface import Optimizer, make, reopen, run
 from mdstopo.optimizer.nearest_feasible import InfeasibleRows, project
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.start_families import SOFT_STRENGTH, Family, design_of_family
@@ -29,17 +29,18 @@ Keep = Callable[[int, State], None]
 Stop = Callable[[], bool]
 
 
-def make_optimizer(case: Case, problem: Problem, family: Family = Family.STATED) -> Gsao:
+def make_optimizer(case: Case, problem: Problem, family: Family = Family.STATED) -> Optimizer:
     """The optimiser that the case asks for, with the first steps of a family of starts."""
     chosen = case.optimizer
     own = {"trust_start": LONG_FIRST_STEPS} if family is Family.RANDOM else {}
-    return Gsao(
+    return make(
         problem,
         settings(
             chosen.preset,
             own | dict(chosen.options),
             max_iterations=chosen.max_iterations,
             tolerance=chosen.tolerance,
+            optimizer=chosen.name,
         ),
     )
 
@@ -119,7 +120,7 @@ def run_start(
         state = counted(optimizer.start(first), before)
         keep(task.index, state)
     elif not state.dropped:
-        state = optimizer.reopen(state)
+        state = reopen(optimizer, state)
     latest = state
 
     def reached(new: State) -> None:
@@ -137,7 +138,7 @@ def run_start(
 
 def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
     """The end of a short run with a quarter of the strengths; None where it was stopped."""
-    optimizer = Gsao(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
+    optimizer = make(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
     state = optimizer.start(first)
     while state.running and state.iteration < SOFT_ITERATIONS:
         if stop():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mdstopo.optimizer.bundle import Bundle
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import Sample
 from mdstopo.optimizer.state import State
 from mdstopo.settings.optimizer_presets import settings

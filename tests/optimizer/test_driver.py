@@ -5,7 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import reopen, run
 from mdstopo.optimizer.nearest_feasible import InfeasibleRows
 from mdstopo.optimizer.problem import LinearRows
 from mdstopo.optimizer.state import State
@@ -350,7 +351,7 @@ def test_a_raised_limit_continues_a_finished_run_exactly():
     problem, _ = compliance_problem()
     short = run(Gsao(problem, settings(max_iterations=4, tolerance=0.0)))
     longer = Gsao(problem, settings(max_iterations=9, tolerance=0.0))
-    reopened = longer.reopen(State.from_arrays(short.to_arrays()))
+    reopened = reopen(longer, State.from_arrays(short.to_arrays()))
     assert reopened.status is RunStatus.RUNNING
     same(run(longer, reopened), run(longer))
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import run
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from tests.optimizer.toys import Toy

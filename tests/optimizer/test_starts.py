@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.nearest_feasible import satisfied
 from mdstopo.optimizer.start_families import (
     Family,

@@ -6,7 +6,8 @@ import pytest
 from mdstopo.compiler.threads import VARIABLE
 from mdstopo.optimizer import conic, wide_numbers
 from mdstopo.optimizer.curvature import Curvature, learnt
-from mdstopo.optimizer.gsao import Gsao, run
+from mdstopo.optimizer.gsao import Gsao
+from mdstopo.optimizer.interface import run
 from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.optimizer.stack import Stack
 from mdstopo.optimizer.state import State

@@ -1,0 +1,48 @@
+"""The optimisers that a case file may name: what is declared of each, one record an optimiser.
+
+The duties of what a record names are those of `optimizer.interface`. Imports nothing heavy: the reader uses it too.
+"""
+
+from typing import NamedTuple
+
+from mdstopo.settings.optimizer_options import OPTIONS
+from mdstopo.settings.optimizer_presets import PRESETS
+
+
+class OptimizerKind(NamedTuple):
+    """An optimiser.
+
+    name: as case files have it; doc: a sentence for the case reference. made_by: module:class, called with the problem
+    and `Settings`. options, presets: names of the single settings and of the named ones that it takes; `max_iterations`
+    and `tolerance` all do. takes_limits: whether it keeps limits on responses; takes_volumes: on linear rows.
+    """
+
+    name: str
+    doc: str
+    made_by: str
+    options: frozenset[str] = frozenset()
+    presets: frozenset[str] = frozenset({"default"})
+    takes_limits: bool = False
+    takes_volumes: bool = False
+
+
+#: the optimisers by their name
+OPTIMIZERS: dict[str, OptimizerKind] = {
+    kind.name: kind
+    for kind in (
+        OptimizerKind(
+            "gsao",
+            "generalized sequential approximate optimization",
+            "mdstopo.optimizer.gsao:Gsao",
+            frozenset(OPTIONS),
+            frozenset(PRESETS),
+            takes_limits=True,
+            takes_volumes=True,
+        ),
+    )
+}
+
+
+def names(_: bool = False) -> dict[str, str]:
+    """The optimisers with what they are."""
+    return {kind.name: kind.doc for kind in OPTIMIZERS.values()}
