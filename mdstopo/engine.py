@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from mdstopo.case.errors import CaseError
+from mdstopo.case.integrators import AUTO
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
@@ -68,8 +69,8 @@ class Evaluator:
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         self._method = method_of(self.integrator, case.solver)
         # whether `auto` has to give way to the steps that the iterative method is defined on
-        self._gives_way = case.solver.integrator == "auto" and self.integrator != "generalized_alpha"
-        self._may_be_coarse = case.solver.step is not None and self.integrator == "generalized_alpha"
+        self._gives_way = case.solver.integrator == AUTO and not self._method.kind.iterative
+        self._may_be_coarse = case.solver.step is not None and self._method.kind.finds_step
         self._compiles_beside = beside
         self._beside = Beside(self.integrator, share) if beside and not self.beyond else None
         #: what the scenes' coordinates are measured from, and the case in these
@@ -319,7 +320,7 @@ class Evaluator:
                 from mdstopo.general.driver import GeneralDriver
 
                 driver = GeneralDriver(self._near, scene, self._method, tolerance, step)
-            if self.integrator == "generalized_alpha" and solver.step is None:
+            if self._method.kind.finds_step and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
 
                 driver.settings[2] = default_step(driver, self.case.start)

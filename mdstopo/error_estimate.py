@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.evaluation import Evaluation, FloatArray
 
 if TYPE_CHECKING:
@@ -48,14 +49,14 @@ class Estimator:
         """Of an evaluation of alpha (N,), by objective; empty where it failed, or the finer one."""
         if not found.status.usable:
             return {}
-        second_order = self._evaluator.integrator == "generalized_alpha"
-        if second_order or self._evaluator.case.solver.step is not None:
+        kind = INTEGRATORS[self._evaluator.integrator]
+        if not kind.adaptive or self._evaluator.case.solver.step is not None:
             finer = self._halved.evaluate(alpha, bool(found.gradients), sensitivity)
         else:
             finer = self._finer(alpha, found, sensitivity)
         if not finer.status.usable:
             return {}
-        factor = 4.0 / 3.0 if second_order else 1.0
+        factor = 1.0 if kind.adaptive else 2.0**kind.order / (2.0**kind.order - 1.0)
         rounded = self._rounded(alpha, found, sensitivity)
         return {
             name: _sum(_difference(found, finer, name, factor), [_difference(found, each, name) for each in rounded])
@@ -66,7 +67,7 @@ class Estimator:
         """The same evaluation with other roundings, those that can be used."""
         own = self._evaluator
         others = [own.otherwise(sample=sample, integrator=own.integrator) for sample in SAMPLES]
-        if own.integrator == "generalized_alpha" and own.case.solver.step is None:
+        if INTEGRATORS[own.integrator].finds_step and own.case.solver.step is None:
             for other in others:  # a step that is chosen would be another one
                 for load_case in other.scenes:
                     other.driver(load_case).settings[2] = own.driver(load_case).settings[2]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mdstopo.case.integrators import names as integrators
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Number, OpenWord, Ref, Text, Version, explained
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
@@ -29,7 +30,7 @@ from mdstopo.case.schema_scene import (
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizer_presets import PRESETS
-from mdstopo.settings.optimizers import names
+from mdstopo.settings.optimizers import names as optimizers
 
 # Design, objectives, constraints.
 
@@ -223,7 +224,7 @@ _PRESETS = {
     "conlin": "reciprocal where a function falls, linear where it rises (Fleury and Braibant 1986)",
     "slp": "sequential linear programming in a trust box",
 }
-_OPTIMIZERS = OpenWord(tuple(names()), "", tuple(names().values()), names)
+_OPTIMIZERS = OpenWord(tuple(optimizers()), "", tuple(optimizers().values()), optimizers)
 OPTIMIZER = Record(
     "optimizer settings",
     (
@@ -252,14 +253,7 @@ OPTIMIZER = Record(
     ),
     doc="How the design is improved. Single settings override the preset's.",
 )
-_INTEGRATORS = explained(
-    {
-        "auto": "gauss for springs between free bodies and their energy, else runge_kutta; the reason is printed",
-        "gauss": "adaptive collocation at Gauss nodes; for springs between free bodies and their energy",
-        "runge_kutta": "explicit and adaptive; for everything",
-        "generalized_alpha": "implicit, fixed steps; for stiff scenes and the paper's figures",
-    }
-)
+_INTEGRATORS = OpenWord(tuple(integrators()), "", tuple(integrators().values()), integrators)
 _SENSITIVITIES = explained(
     {
         "auto": "adjoint",

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.integrators import AUTO, INTEGRATORS
 from mdstopo.case.loading import Window
 from mdstopo.case.model import OptimizerSettings, SolverSettings
 from mdstopo.case.reading import BAD, Fields, Reading
@@ -27,7 +28,7 @@ def build_solver(fields: Any, times: dict[str, Window], reading: Reading) -> Sol
         return SolverSettings()
     integrator, sensitivity = fields["integrator"], fields["sensitivity"]
     step, tolerance = fields["step"], fields["tolerance"]
-    if sensitivity == "iterative" and integrator in ("gauss", "runge_kutta"):
+    if sensitivity == "iterative" and integrator in INTEGRATORS and not INTEGRATORS[integrator].iterative:
         reading.mistake(
             inside(fields.path, "sensitivity"),
             f"iterative does not go with the integrator {integrator}: it needs generalized_alpha (or auto)",
@@ -69,9 +70,11 @@ def _check_step(fields: Fields, spans: list[float], reading: Reading) -> None:
 
 
 def _is_damped(fields: Fields) -> bool:
-    """Whether the integrator is generalized_alpha."""
+    """Whether the integrator is one with a spectral radius."""
     integrator: str = fields["integrator"]
-    return integrator == "generalized_alpha" or (integrator == "auto" and str(fields["sensitivity"]) == "iterative")
+    if integrator == AUTO:
+        return str(fields["sensitivity"]) == "iterative"
+    return integrator in INTEGRATORS and INTEGRATORS[integrator].has_radius
 
 
 def _warn_ignored(fields: Fields, reading: Reading) -> None:

@@ -127,6 +127,7 @@ def command(
 def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str, ...], history: bool) -> "Case":
     """The case as the methods need it; raises CaseError where they cannot be applied."""
     from mdstopo.case.errors import CaseError
+    from mdstopo.case.integrators import AUTO, FIXED, having
     from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters
 
     refused = [method for method in methods if method not in BY_PARAMETERS]
@@ -138,12 +139,12 @@ def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str,
         raise CaseError([case.marks.mistake(key, words)], str(case_path))
     if history and "direct" not in methods:
         raise click.UsageError("--history needs --method direct")
-    if "iterative" in methods and case.solver.integrator not in ("auto", "generalized_alpha"):
+    if "iterative" in methods and case.solver.integrator not in (AUTO, *having("iterative")):
         words = f"the iterative method does not go with {case.solver.integrator}, only with generalized_alpha"
         raise CaseError([case.marks.mistake("solver.integrator", words)], str(case_path))
-    if "iterative" in methods and case.solver.integrator == "auto":
+    if "iterative" in methods and case.solver.integrator == AUTO:
         output.notice("iterative belongs to generalized_alpha: all methods use that integrator, to be comparable")
-        return replace(case, solver=replace(case.solver, integrator="generalized_alpha"))
+        return replace(case, solver=replace(case.solver, integrator=FIXED))
     return case
 
 
@@ -194,13 +195,14 @@ def _difference(
     """Add differences of some members to the results; why there are none, where there are none."""
     import numpy as np
 
+    from mdstopo.case.integrators import AUTO, INTEGRATORS
     from mdstopo.cli.gradient_numbers import chosen_members, differences, ranges, value_differences
     from mdstopo.evaluators import evaluator_of
 
     members = chosen_members(case.n_design, count, case.optimizer.seed)
     tight = replace(case, solver=replace(case.solver, tolerance=min(case.solver.tolerance, _TIGHT)))
     # fixed steps are differenced as they are: the tolerance would choose others, and too many
-    fixed = case.solver.integrator == "generalized_alpha"
+    fixed = case.solver.integrator != AUTO and not INTEGRATORS[case.solver.integrator].adaptive
     exact = evaluator_of(case if fixed else tight)
 
     def objectives(x: "NDArray[np.float64]") -> "Mapping[str, float]":

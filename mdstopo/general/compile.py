@@ -15,7 +15,7 @@ from mdstopo.general.drives import drives, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied
-from mdstopo.integrators.choice import choose
+from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
@@ -74,7 +74,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         q0[3 * i : 3 * i + 3] = *body.position, body.angle
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
-    fine = choose(case.solver, "laws")[0] == "generalized_alpha"
+    fine = has_coarse_steps(case.solver)
     more = lasting_times(case, fine) + motion_times(load_case)
     times = breakpoints(load_case, more)
     driven, drive = drives(load_case, times, q0, v0)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.errors import CaseError
+from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.evaluation import USUAL, Rows, Shape
@@ -47,9 +48,9 @@ ROWS = 6
 SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
 
 
-def load_method(name: str) -> ModuleType:
+def load_method(kind: IntegratorKind) -> ModuleType:
     """The compiled entries of a method for general scenes."""
-    return import_module(f"mdstopo.general.{name}_entry")
+    return import_module(kind.general)
 
 
 class GeneralDriver:
@@ -111,12 +112,12 @@ class GeneralDriver:
     def entry(self) -> Any:
         """The method's compiled entries, imported when first used."""
         if self._entry is None:
-            self._entry = load_method(self.method.name)
+            self._entry = load_method(self.method.kind)
         return self._entry
 
     def _make_room(self, steps: int, stages: int, events: int) -> None:
         # factors are of use again where stages are no implicit ones and the mass is diagonal
-        factors = self.method.name == "runge_kutta" and not self._inertial
+        factors = self.method.kind.explicit and not self._inertial
         self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, factors], dtype=np.int64)
         floats, ints = track_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)

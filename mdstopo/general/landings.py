@@ -56,7 +56,7 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
         for j, _ in looked:
             if has_kinks(model, j):
                 found += kinks(driver, j, t)
-    if driver.method.name != "runge_kutta" or driver.settings[2] > 0.0:
+    if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
         return found
     ends = np.unique(np.concatenate([t, found, driver.landings]))
     ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]

@@ -12,7 +12,7 @@ from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case, Law, LoadCase, MemberGroup, Variable
 from mdstopo.general.kinks import landed
 from mdstopo.general.model import COUNT, GROUP, START, GeneralModel
-from mdstopo.integrators.choice import choose
+from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -84,7 +84,7 @@ class Placing:
     def __init__(self, case: Case, load_case: LoadCase, model: GeneralModel) -> None:
         self._load_case = load_case
         self._settles = case.solver.settle
-        self._fine = choose(case.solver, "laws")[0] == "generalized_alpha"
+        self._fine = has_coarse_steps(case.solver)
         #: block -> its law, and which value each parameter takes
         self._taken: dict[int, tuple[Law, dict[str, int]]] = {}
         blocks = _blocks(case, model.block)

@@ -1,9 +1,11 @@
-"""Which integrator a case gets, and why: the table of methods and the rule of `auto`."""
+"""Which integrator a case gets, and why: the rule of `auto`, and the methods that the records name."""
 
+import importlib
 from types import ModuleType
 
 import numpy as np
 
+from mdstopo.case.integrators import ADAPTIVE, AUTO, FIXED, INTEGRATORS, SMOOTH
 from mdstopo.case.model import SolverSettings
 from mdstopo.integrators.driver import Method
 
@@ -13,23 +15,30 @@ def choose(solver: SolverSettings, beyond: str = "") -> tuple[str, str]:
 
     beyond: what in the case goes beyond springs between free bodies, in words.
     """
-    if solver.integrator != "auto":
+    if solver.integrator != AUTO:
         return solver.integrator, "as the case says"
     if solver.sensitivity == "iterative":
-        return "generalized_alpha", "the iterative sensitivity method is defined on its steps"
+        return FIXED, "the iterative sensitivity method is defined on its steps"
     if solver.spectral_radius is not None:
-        return "generalized_alpha", "a spectral radius is given, which no other method has"
+        return FIXED, "a spectral radius is given, which no other method has"
     if beyond:
-        return "runge_kutta", f"explicit steps of high order that carry {beyond}"
-    return "gauss", "adaptive collocation needs the fewest passes over the members on smooth motion"
+        return ADAPTIVE, f"explicit steps of high order that carry {beyond}"
+    return SMOOTH, "adaptive collocation needs the fewest passes over the members on smooth motion"
 
 
 def method_of(name: str, solver: SolverSettings) -> Method:
     """The method of that name with the case's settings."""
-    return METHODS[name](solver)
+    module, _, function = INTEGRATORS[name].made_by.partition(":")
+    made: Method = getattr(importlib.import_module(module), function)(solver)
+    return made
 
 
-def _gauss(solver: SolverSettings) -> Method:
+def has_coarse_steps(solver: SolverSettings) -> bool:
+    """Whether steps of a general scene are of low order and do not follow the tolerance."""
+    return not INTEGRATORS[choose(solver, "laws")[0]].adaptive
+
+
+def gauss(_: SolverSettings) -> Method:
     from mdstopo.integrators.gauss_tables import gauss_tables
 
     def load() -> ModuleType:
@@ -37,20 +46,20 @@ def _gauss(solver: SolverSettings) -> Method:
 
         return gauss_entry
 
-    return Method("gauss", load, gauss_tables(), steps=32, stages=256)
+    return Method(INTEGRATORS["gauss"], load, gauss_tables(), steps=32, stages=256, collocates=True)
 
 
-def _generalized_alpha(solver: SolverSettings) -> Method:
+def generalized_alpha(solver: SolverSettings) -> Method:
     def load() -> ModuleType:
         from mdstopo.integrators import generalized_alpha_entry
 
         return generalized_alpha_entry
 
     radius = 0.8 if solver.spectral_radius is None else solver.spectral_radius
-    return Method("generalized_alpha", load, np.array([radius]), steps=1024, stages=1100)
+    return Method(INTEGRATORS["generalized_alpha"], load, np.array([radius]), steps=1024, stages=1100)
 
 
-def _runge_kutta(solver: SolverSettings) -> Method:
+def runge_kutta(_: SolverSettings) -> Method:
     from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 
     def load() -> ModuleType:
@@ -58,7 +67,4 @@ def _runge_kutta(solver: SolverSettings) -> Method:
 
         return runge_kutta_entry
 
-    return Method("runge_kutta", load, runge_kutta_tables(), steps=64, stages=1200)
-
-
-METHODS = {"gauss": _gauss, "generalized_alpha": _generalized_alpha, "runge_kutta": _runge_kutta}
+    return Method(INTEGRATORS["runge_kutta"], load, runge_kutta_tables(), steps=64, stages=1200)

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import holds_steps
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, landings
@@ -30,15 +31,21 @@ ROWS = 4
 class Method:
     """An integrator as the engine sees it.
 
-    name: as in the case file. load: imports its compiled entries (simulate). tables: its constant arrays. steps,
-    stages: room to begin with.
+    kind: its record. load: imports its compiled entries (simulate). tables: its constant arrays. steps, stages: room to
+    begin with. collocates: whether its stages are the nodes of Gauss's rules.
     """
 
-    name: str
+    kind: IntegratorKind
     load: Callable[[], ModuleType]
     tables: FloatArray
     steps: int
     stages: int
+    collocates: bool = False
+
+    @property
+    def name(self) -> str:
+        """As in the case file."""
+        return self.kind.name
 
 
 class Compiling(Protocol):
@@ -102,7 +109,7 @@ class Driver:
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         #: coordinates, pairs, whether anything depends on velocity, whether loads turn: what room is made for
         self.shape = n, n_pair, scene.damped, len(scene.model.load_body) > 0
-        fixed = step > 0.0 or method.name == "generalized_alpha"
+        fixed = step > 0.0 or not method.kind.adaptive
         newton = NEWTON_TOLERANCE if fixed else min(max(tolerance, NEWTON_TOLERANCE), LOOSE_NEWTON)
         self.settings = np.array([tolerance, newton, step, CLOSENESS])
         self.reductions = reductions

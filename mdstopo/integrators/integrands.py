@@ -54,7 +54,7 @@ def landings(driver: "Driver", count: int) -> tuple[list[float], float, float]:
     left = np.zeros(count)
     whole = 0.0
     for w in range(count):
-        rule, used, order = _rule(driver.method.name, damped, int(first[w + 1] - first[w]))
+        rule, used, order = _rule(driver.method.collocates, damped, int(first[w + 1] - first[w]))
         terms = rule @ energy[first[w] + used]
         whole += width[w] * terms[0]
         sizes = np.abs(terms)
@@ -66,9 +66,9 @@ def landings(driver: "Driver", count: int) -> tuple[list[float], float, float]:
 
 
 @cache
-def _rule(method: str, damped: bool, stages: int) -> tuple[FloatArray, IndexArray, int]:
+def _rule(collocates: bool, damped: bool, stages: int) -> tuple[FloatArray, IndexArray, int]:
     """What turns values at some stages into Legendre coefficients over the step, which stages, the rule's order."""
-    if method == "gauss":
+    if collocates:
         return gauss_tables()[LEVELS.index(stages), LEGENDRE, :stages, :stages], np.arange(stages), 2 * stages
     which = GENERAL if damped else NYSTROEM
     vectors = runge_kutta_tables()[which, VECTORS, :, :stages]

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from mdstopo.case.errors import Mistake
+from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, VolumeRow
 from mdstopo.scene.family import beyond_springs
 from mdstopo.settings.optimizers import OPTIMIZERS
-
-#: methods of the general kernels
-INTEGRATORS = frozenset({"auto", "runge_kutta", "generalized_alpha"})
 
 #: methods that differentiate by parameters of laws
 BY_PARAMETERS = frozenset({"auto", "adjoint", "direct"})
@@ -30,11 +28,12 @@ def refusals(case: Case) -> list[Mistake]:
 def _refused(case: Case) -> Iterator[tuple[str, str]]:
     beyond = beyond_springs(case)
     solver = case.solver
-    if beyond and solver.integrator not in INTEGRATORS:
-        yield (
-            "solver.integrator",
-            f"{solver.integrator} does not compute {beyond}; runge_kutta does, and auto takes it",
-        )
+    kind = INTEGRATORS.get(solver.integrator)
+    if kind is not None and not (kind.general if beyond else kind.springs):
+        what = beyond or "springs between free bodies"
+        yield "solver.integrator", f"{kind.name} does not compute {what}; runge_kutta does, and auto takes it"
+    if kind is not None and not (kind.adaptive or kind.finds_step) and solver.step is None:
+        yield "solver.integrator", f"{kind.name} needs a `step`, which is not given"
     optimizer = OPTIMIZERS[case.optimizer.name]
     for i, row in enumerate(case.constraints):
         volume = isinstance(row, VolumeRow)

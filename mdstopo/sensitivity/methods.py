@@ -44,7 +44,7 @@ def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: "Loo
     """
     if method not in ("direct", "iterative", "constant_load"):
         raise ValueError(f"no sensitivity method {method!r} here")
-    if method == "iterative" and driver.method.name != "generalized_alpha":
+    if method == "iterative" and not driver.method.kind.iterative:
         raise ValueError("the iterative method is defined on the steps of generalized_alpha")
     gradients = np.zeros_like(looked.gradients)
     if method == "constant_load":

@@ -1,0 +1,82 @@
+"""The integrators that a case file may name: what is declared of each, one record an integrator.
+
+The duties of what a record names are those of `integrators.contract` and `general.duties`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class IntegratorKind(NamedTuple):
+    """An integrator.
+
+    name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called with the
+    solver's settings, which returns the `integrators.driver.Method`.
+    springs: whether it computes springs between free bodies by their own kernels. general: the module with its entries
+    for all other scenes (`general.duties`); empty where there are none.
+    adaptive: whether it chooses steps by the tolerance where none is given. finds_step: whether it finds a fixed step
+    by itself. order: of the error of fixed steps in their length.
+    explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:
+    whether the iterative sensitivity method is defined on its steps.
+    """
+
+    name: str
+    doc: str
+    made_by: str
+    springs: bool = False
+    general: str = ""
+    adaptive: bool = False
+    finds_step: bool = False
+    order: int = 2
+    explicit: bool = False
+    has_radius: bool = False
+    iterative: bool = False
+
+
+#: the integrators by their name
+INTEGRATORS: dict[str, IntegratorKind] = {
+    kind.name: kind
+    for kind in (
+        IntegratorKind(
+            "gauss",
+            "adaptive collocation at Gauss nodes; for springs between free bodies and their energy",
+            "mdstopo.integrators.choice:gauss",
+            springs=True,
+            adaptive=True,
+        ),
+        IntegratorKind(
+            "runge_kutta",
+            "explicit and adaptive; for everything",
+            "mdstopo.integrators.choice:runge_kutta",
+            springs=True,
+            general="mdstopo.general.runge_kutta_entry",
+            adaptive=True,
+            explicit=True,
+        ),
+        IntegratorKind(
+            "generalized_alpha",
+            "implicit, fixed steps; for stiff scenes and the paper's figures",
+            "mdstopo.integrators.choice:generalized_alpha",
+            springs=True,
+            general="mdstopo.general.generalized_alpha_entry",
+            finds_step=True,
+            has_radius=True,
+            iterative=True,
+        ),
+    )
+}
+#: the word for the integrator that suits the case, and the ones that it is in the end
+AUTO = "auto"
+SMOOTH, ADAPTIVE, FIXED = "gauss", "runge_kutta", "generalized_alpha"
+
+
+def names(_: bool = False) -> dict[str, str]:
+    """The words of `solver.integrator` with what they mean."""
+    auto = "gauss for springs between free bodies and their energy, else runge_kutta; the reason is printed"
+    return {AUTO: auto, **{kind.name: kind.doc for kind in INTEGRATORS.values()}}
+
+
+def having(capability: str) -> list[str]:
+    """The integrators that have a capability, in words."""
+    return [kind.name for kind in INTEGRATORS.values() if getattr(kind, capability)]
