@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Text, Version, Word
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
-from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record, Tagged, Vector
+from mdstopo.case.records import ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
 
@@ -146,6 +146,8 @@ def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
     if isinstance(kind, Tagged):
         links = [f"[`{word}`](#{anchors.get(id(each), f'{path}.{word}')}-keys)" for word, each in kind.variants.items()]
         return f"{kind.what}: {', '.join(links)}"
+    if isinstance(kind, Direction):
+        kind = kind.pair
     if isinstance(kind, Vector):
         return _several(kind)
     if isinstance(kind, ListOf):

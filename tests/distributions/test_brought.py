@@ -158,7 +158,7 @@ def mdstopo(folder: Path, *words: str, status: int = 0, known: bool = True) -> s
         text=True, timeout=900, check=False,
     )  # fmt: skip
     assert done.returncode == status, done.stdout + done.stderr
-    return done.stdout + done.stderr
+    return done.stdout if status == 0 else done.stdout + done.stderr
 
 
 @pytest.mark.slow
@@ -175,7 +175,7 @@ def test_gradients_with_a_law_and_a_response_from_elsewhere_are_differences(fold
             f"solver.integrator={integrator}",
             *step,
         )
-        methods = json.loads(said[said.index("{") :])["methods"]
+        methods = json.loads(said)["methods"]
         for method in ("adjoint", "direct"):
             assert set(methods[method]["differences"]) == {"V", "G"}
             assert max(methods[method]["differences"].values()) < 1e-6

@@ -16,11 +16,13 @@ from .test_pages import check_console
 
 PAGE = DOCS / "extending.md"
 EXAMPLES = [block for block in blocks(PAGE.read_text(encoding="utf-8")) if block.example]
-#: the tests that the new law and the new joint join: their own in the long ones, all of the short ones
+#: the tests that what is new joins: its own in the long ones, all of the short ones
 JOINED = [
     ["tests/mechanics/test_laws.py", "-k", "saturating or law"],
     ["tests/mechanics/test_joints.py", "-k", "parallel or codes"],
     ["tests/cli/test_finalize.py", "-k", "which_keys_are_forces or forces_scaled"],
+    ["tests/general/test_random_scenes.py", "-k", "gradients"],
+    ["tests/general/test_orders.py", "-k", "classical"],
     ["tests/docs/test_generated.py"],
 ]
 
