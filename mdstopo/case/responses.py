@@ -31,6 +31,7 @@ class ResponseKind(Value):
     something is a mistake, which is noted.
     kernels: where its `ResponseKernels` are (`general.response_kernels`), module:name.
     order: how many derivatives by time it has of a position; is_position: whether it is a place or an angle of a body.
+    of_point: whether it is the motion of a point, seen from a body, as a component or a norm.
     depends_on_rate: whether it needs velocities or accelerations; is_energy: whether it is the stored energy.
     of_members: whether it is the largest one of the members of a group.
     """
@@ -43,6 +44,7 @@ class ResponseKind(Value):
     made: Made | None = None
     order: int = 0
     is_position: bool = False
+    of_point: bool = False
     depends_on_rate: bool = True
     is_energy: bool = False
     of_members: bool = False
@@ -113,7 +115,7 @@ def _of_joint(word: str, keys: Fields, _: Frames, __: Reading) -> Response:
 def _point(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
         word=word, doc="of a point", unit=unit, kernels="mdstopo.general.responses:OF_POINT", keys=_AT_POINT,
-        made=_at_point, order=order, is_position=order == 0, depends_on_rate=order > 0,
+        made=_at_point, order=order, is_position=order == 0, of_point=True, depends_on_rate=order > 0,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from mdstopo.case.aims import Objective
 from mdstopo.case.model import Case
+from mdstopo.case.responses import kind_of
 from mdstopo.case.units import unit_of_value, words
 from mdstopo.limiting.force_limits import restrictions
 from mdstopo.limiting.program import ImpossibleError, Program
@@ -71,7 +72,7 @@ def _goal_words(objective: Objective) -> str:
 def _others(objective: Objective) -> str:
     """What has to be limited for the objective to have a bound."""
     response = objective.response
-    return f"{'peak acceleration' if response.kind == 'displacement' else 'travel'} of {response.body}"
+    return f"{'peak acceleration' if kind_of(response).is_position else 'travel'} of {response.body}"
 
 
 def _what(limits: Limits, forces: list[str], goal: str) -> str:

@@ -19,17 +19,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.laws.law import Ranges
 from mdstopo.case.model import (
-    ActuatorLaw,
     Case,
-    CrushLaw,
-    GapLaw,
     Law,
     MemberGroup,
-    PrismaticJoint,
-    PulseLaw,
     Table,
-    TableLaw,
     VolumeRow,
 )
 from mdstopo.limiting.known import Cubics, Floats, with_second_derivative
@@ -76,9 +71,9 @@ def _directions(system: System, name: str) -> Floats:
     for joint in system.case.joints:
         if name not in joint.bodies:
             continue
-        if not isinstance(joint, PrismaticJoint) or joint.bodies[0] not in system.angles:
+        if joint.slide is None or joint.bodies[0] not in system.angles:
             return np.zeros((0, 2))
-        axis = turned(joint.axis, system.angles[joint.bodies[0]])
+        axis = turned(joint.slide, system.angles[joint.bodies[0]])
         held.append(np.array([-axis[1], axis[0]]))
     if any(name in bushing.bodies for bushing in system.case.bushings) or any(
         name in (contact.body, contact.edge_body) for contact in system.case.contacts
@@ -106,18 +101,20 @@ def _strength(case: Case, group: MemberGroup) -> float | None:
     """The largest force of a whole member of a group, N; None where it has no limit."""
     total = 0.0
     for index, law in enumerate(group.laws):
-        if isinstance(law, PulseLaw):
-            most = _largest(case, group, index, "peak", law.peak)
-        elif isinstance(law, ActuatorLaw) and law.limit is not None:
-            most = _largest(case, group, index, "limit", law.limit)
-        elif isinstance(law, CrushLaw):
-            most = _largest(case, group, index, "force", law.force)
-        elif isinstance(law, TableLaw):
-            most = float(np.abs(law.table.values).max())
-        else:
+        most = law.strength(_ranges(case, group, index))
+        if most is None:
             return None
         total += most
     return total
+
+
+def _ranges(case: Case, group: MemberGroup, index: int) -> Ranges:
+    """Between what the numbers of a law are."""
+
+    def between(parameter: str) -> tuple[float, float]:
+        return _range(case, group, index, parameter, getattr(group.laws[index], parameter))
+
+    return between
 
 
 def _range(case: Case, group: MemberGroup, index: int, parameter: str, stated: float) -> tuple[float, float]:
@@ -127,10 +124,6 @@ def _range(case: Case, group: MemberGroup, index: int, parameter: str, stated: f
         if own and each.parameter == parameter:
             return each.lower, each.upper
     return stated, stated
-
-
-def _largest(case: Case, group: MemberGroup, index: int, parameter: str, stated: float) -> float:
-    return max(abs(value) for value in _range(case, group, index, parameter, stated))
 
 
 def _most(case: Case, groups: list[MemberGroup], single: list[float]) -> float:
@@ -240,23 +233,8 @@ def cone_of(middles: Floats, halves: Floats, directions: Floats) -> Floats | Non
 
 def _side(case: Case, group: MemberGroup) -> int:
     """+1 where members of a group only pull, -1 where they only push, 0 where neither is certain."""
-    sides = {_law_side(case, group, index, law) for index, law in enumerate(group.laws)}
+    sides = {law.side_of_force(_ranges(case, group, index)) for index, law in enumerate(group.laws)}
     return sides.pop() if len(sides) == 1 else 0
-
-
-def _law_side(case: Case, group: MemberGroup, index: int, law: Law) -> int:
-    if isinstance(law, GapLaw):
-        damped = _largest(case, group, index, "damping", law.damping) > 0.0
-        return 0 if damped and not law.clip else (1 if law.side == "tension" else -1)
-    if isinstance(law, CrushLaw):
-        return 1 if law.side == "tension" else -1
-    if isinstance(law, PulseLaw):
-        low, high = _range(case, group, index, "peak", law.peak)
-    elif isinstance(law, TableLaw):
-        low, high = float(law.table.values.min()), float(law.table.values.max())
-    else:
-        return 0
-    return 1 if low >= 0.0 else (-1 if high <= 0.0 else 0)
 
 
 def travel(system: System, limits: Limits, name: str, other: str) -> float:
@@ -280,12 +258,8 @@ def travel(system: System, limits: Limits, name: str, other: str) -> float:
         else:
             strips.append((seen[0], -math.inf if row.one_sided else -row.radius, row.radius))
     for joint in system.case.joints:
-        if (
-            isinstance(joint, PrismaticJoint)
-            and set(joint.bodies) == {name, other}
-            and joint.bodies[0] in system.angles
-        ):
-            axis = turned(joint.axis, system.angles[joint.bodies[0]])
+        if joint.slide is not None and set(joint.bodies) == {name, other} and joint.bodies[0] in system.angles:
+            axis = turned(joint.slide, system.angles[joint.bodies[0]])
             strips.append((np.array([-axis[1], axis[0]]), 0.0, 0.0))
     return min(radius, _box(strips))
 
@@ -347,16 +321,10 @@ def _slack(case: Case, group: MemberGroup, start: float) -> float:
     for index, law in enumerate(group.laws):
         if _from(case, group, index, law) > start:
             continue
-        if not isinstance(law, (GapLaw, CrushLaw)):
+        slack = law.slack(_ranges(case, group, index), group.length)
+        if slack is None:
             return 0.0
-        gap = _range(case, group, index, "gap", law.gap)[0]
-        stated = law.free_length
-        low, high = (0.0, 0.0) if stated is None else _range(case, group, index, "free_length", stated)
-        if stated is None:
-            own = np.zeros(len(group))
-        else:
-            own = low - group.length if law.side == "tension" else group.length - high
-        least = min(least, float((own + gap).min()))
+        least = min(least, float(slack.min()))
     return least
 
 

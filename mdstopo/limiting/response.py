@@ -9,12 +9,10 @@ import numpy as np
 
 from mdstopo.case.aims import Objective, Response, ResponseRow
 from mdstopo.case.model import GROUND
+from mdstopo.case.responses import kind_of
 from mdstopo.case.units import words
 from mdstopo.limiting.known import Cubics, Floats
 from mdstopo.limiting.system import System
-
-#: responses that are linear in the motion of centres of mass, and the order of the derivative of position
-ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
 
 
 class NoBoundError(Exception):
@@ -106,14 +104,15 @@ _SENSES = {"limit": "at most", "equals": "equal to", "at_least": "at least"}
 
 
 def _translates(response: Response) -> None:
-    if response.kind == "energy":
+    kind = kind_of(response)
+    if kind.is_energy:
         raise NoBoundError("stored energy depends on what the members are: no bound over all members is known")
-    if response.kind in ("member_force", "joint_force", "joint_moment"):
+    if response.body is None:
         raise NoBoundError(
             f"a {response.kind.replace('_', ' ')} depends on which members share the load: only the motion of centres "
             "of mass is bounded"
         )
-    if response.kind not in ORDERS:
+    if not kind.of_point:
         raise NoBoundError("an angle depends on where forces act: only the motion of centres of mass is bounded")
 
 
@@ -138,7 +137,7 @@ def _row(system: System, response: Response) -> Bounded:
     matrix = rotation @ (system.at(response.body) - system.at(other))
     if response.component in ("x", "y"):
         matrix = matrix[["x", "y"].index(response.component)][None]
-    order = ORDERS[response.kind]
+    order = kind_of(response).order
     start = matrix @ system.start if order == 0 else np.zeros(len(matrix))
     zero = Cubics(system.times, np.zeros((len(system.times) - 1, len(matrix), 4)))
     return Bounded(order, matrix, zero.minus(start), None)
@@ -147,7 +146,7 @@ def _row(system: System, response: Response) -> Bounded:
 def _limit_rows(system: System, row: ResponseRow, turns: dict[str, float]) -> tuple[list[Bounded], str]:
     """The limit as rows with a radius, and a remark where it had to be widened. Raises NoBoundError."""
     response, over = row.response, row.over_time
-    if response.kind not in ORDERS:
+    if not kind_of(response).of_point:
         raise NoBoundError("not a matter of the motion of centres of mass")
     if over in ("mean", "rms", "integral"):
         raise NoBoundError("neither a peak nor a final value")
@@ -208,7 +207,8 @@ def arm_travel(arm: float, turn: float) -> float:
 def _note_angle(system: System, row: ResponseRow, found: Limits) -> bool:
     """Whether a row limits how far a body turns against one that does not; then it is noted."""
     response = row.response
-    if response.kind != "angle" or row.over_time != "max_abs" or row.sense == "at_least":
+    kind = kind_of(response)
+    if not kind.is_position or kind.of_point or row.over_time != "max_abs" or row.sense == "at_least":
         return False
     if response.relative_to not in system.angles or response.body is None:
         return False

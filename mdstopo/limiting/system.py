@@ -25,13 +25,10 @@ import numpy as np
 from mdstopo.case.model import (
     GROUND,
     Case,
-    FixedJoint,
     Joint,
     Load,
     LoadCase,
     Motion,
-    PrismaticJoint,
-    RevoluteJoint,
     Table,
 )
 from mdstopo.general.drives import drives, motion_times
@@ -121,12 +118,12 @@ class System:
         """(2 n,) each: the components of X that a joint keeps as they are at the start."""
         first, second = joint.bodies
         between = self.at(second) - self.at(first)
-        if isinstance(joint, PrismaticJoint):
+        if joint.slide is not None:
             if first not in self.angles:
                 return []
-            axis = turned(joint.axis, self.angles[first])
+            axis = turned(joint.slide, self.angles[first])
             return [np.array([-axis[1], axis[0]]) @ between]
-        if isinstance(joint, (RevoluteJoint, FixedJoint)) and all(
+        if joint.keeps_point and all(
             name in self.angles or math.hypot(*at) == 0.0
             for name, at in zip(joint.bodies, (joint.at_first, joint.at_second), strict=True)
         ):
@@ -187,7 +184,7 @@ class System:
         for pair in _ties(self.case):
             held += [*(self.at(pair[1]) - self.at(pair[0]))]
         for joint in self.case.joints:
-            slides = isinstance(joint, PrismaticJoint) and joint.bodies[0] in self.angles
+            slides = joint.slide is not None and joint.bodies[0] in self.angles
             held += self.joint_vectors(joint) if slides else [*(self.at(joint.bodies[1]) - self.at(joint.bodies[0]))]
         loads: list[Floats] = []
         for name in self.names:
@@ -257,7 +254,7 @@ def _unturned(case: Case, load_case: LoadCase) -> dict[str, float]:
     while grown:
         grown = False
         for joint in case.joints:
-            if isinstance(joint, (PrismaticJoint, FixedJoint)) and sum(name in found for name in joint.bodies) == 1:
+            if joint.keeps_angle and sum(name in found for name in joint.bodies) == 1:
                 found |= {name: angle[name] for name in joint.bodies}
                 grown = True
     return found

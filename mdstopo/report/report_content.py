@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, GapLaw, MemberGroup, SpringLaw
+from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared
@@ -174,16 +174,13 @@ def _forces(
 ) -> Floats | None:
     """f* (T, K) of the members that are drawn, pull positive.
 
-    None where a law is no spring or gap that always acts, and where laws vary.
+    None where a law's force depends on more than elongation and rate, or acts for a time, and where laws vary.
     """
     slices, columns = case.group_slices, []
     if case.variables:
         return None
     for group, chosen in kept:
-        if not all(
-            isinstance(law, (SpringLaw, GapLaw)) and law.active_from is None and law.active_until is None
-            for law in group.laws
-        ):
+        if not all(law.active_from is None and law.active_until is None for law in group.laws):
             return None
         p = points_at(case, group.body_from, group.p_local[chosen], q)
         r = points_at(case, group.body_to, group.q_local[chosen], q) - p
@@ -195,23 +192,13 @@ def _forces(
         scale = alpha[slices[group.name]][chosen] ** group.power if group.design else np.ones(len(chosen))
         total = np.zeros_like(length)
         for law in group.laws:
-            assert isinstance(law, (SpringLaw, GapLaw))
-            free = group.length[chosen] if law.free_length is None else law.free_length
-            total += _spring(law, length - free, rate) if isinstance(law, SpringLaw) else _gap(law, length - free, rate)
+            stated = getattr(law, "free_length", None)
+            force = law.force_at(length - (group.length[chosen] if stated is None else stated), rate)
+            if force is None:
+                return None
+            total += force
         columns.append(scale * total)
     return np.concatenate(columns, axis=1) if columns else np.zeros((len(q), 0))
-
-
-def _spring(law: SpringLaw, stretch: Floats, rate: Floats) -> Floats:
-    return law.stiffness * stretch + law.damping * rate + law.preload
-
-
-def _gap(law: GapLaw, stretch: Floats, rate: Floats) -> Floats:
-    side = -1.0 if law.side == "compression" else 1.0
-    force = law.stiffness * (side * stretch - law.gap) + law.damping * side * rate
-    if law.clip:
-        force = np.maximum(force, 0.0)
-    return np.where(side * stretch >= law.gap, side * force, 0.0)
 
 
 def _rounded(array: Any, digits: int = 6) -> Any:

@@ -25,3 +25,5 @@ class FixedJoint(Joint):
         ),
     )
     kernels: ClassVar[str] = "mdstopo.mechanics.joints.fixed"
+    keeps_angle: ClassVar[bool] = True
+    keeps_point: ClassVar[bool] = True

@@ -37,7 +37,8 @@ class Joint(Value):
     """What all joints have in common.
 
     type: the word of the YAML key ``type``; doc: a sentence for the case reference; keys: beside type, name and bodies.
-    kernels: the module with the joint's `KERNELS` (`mechanics.joints.kernels`).
+    kernels: the module with the joint's `KERNELS` (`mechanics.joints.kernels`). keeps_angle: whether the bodies do not
+    turn against each other; keeps_point: whether its points stay together.
     index: its place in the file, from 0; name: as stated, else the index as text.
     bodies: first and second; at_first, at_second: the joint's point on each, in body coordinates.
     """
@@ -46,6 +47,8 @@ class Joint(Value):
     doc: ClassVar[str]
     keys: ClassVar[tuple[Key, ...]]
     kernels: ClassVar[str]
+    keeps_angle: ClassVar[bool] = False
+    keeps_point: ClassVar[bool] = False
 
     name: str
     index: int
@@ -58,6 +61,11 @@ class Joint(Value):
         """Values of the fields that a subclass adds; None where something is a mistake, which is noted."""
         del stated, reading
         return {}
+
+    @property
+    def slide(self) -> Pair | None:
+        """The direction, a unit vector in the first body's coordinates, in which alone its point may move there."""
+        return None
 
     def row(self) -> dict[int, float]:
         """Numbers of its own for the kernels, by their place in the parameters: 4, 5 and 7 to 11."""

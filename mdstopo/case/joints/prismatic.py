@@ -23,6 +23,7 @@ class PrismaticJoint(Joint):
         Key("axis", Direction(PAIR), "direction of the slide at the start; the first body carries it", required=True),
     )
     kernels: ClassVar[str] = "mdstopo.mechanics.joints.prismatic"
+    keeps_angle: ClassVar[bool] = True
 
     axis: Pair
 
@@ -39,3 +40,8 @@ class PrismaticJoint(Joint):
     def row(self) -> dict[int, float]:
         """The normal of the axis."""
         return {4: -self.axis[1], 5: self.axis[0]}
+
+    @property
+    def slide(self) -> Pair:
+        """The axis."""
+        return self.axis

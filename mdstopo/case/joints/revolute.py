@@ -21,3 +21,4 @@ class RevoluteJoint(Joint):
         Key("at", POINT, "the common point, or each body's own, which may then misfit", required=True, unit="m"),
     )
     kernels: ClassVar[str] = "mdstopo.mechanics.joints.revolute"
+    keeps_point: ClassVar[bool] = True

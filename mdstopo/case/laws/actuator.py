@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER
-from mdstopo.case.laws.law import Law
+from mdstopo.case.laws.law import Law, Ranges, largest
 from mdstopo.case.value import frozen, stated
 
 
@@ -47,3 +47,7 @@ class ActuatorLaw(Law):
     def holds(self) -> bool:
         """A damper alone holds nothing."""
         return self.proportional != 0.0
+
+    def strength(self, ranges: Ranges) -> float | None:
+        """The limit, where there is one."""
+        return None if self.limit is None else largest(ranges("limit"))

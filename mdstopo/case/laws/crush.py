@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import NUMBER, POSITIVE
-from mdstopo.case.laws.law import Law, free_length_key, side_key, sign_of, stiffness_key
+from mdstopo.case.laws.law import Law, Ranges, free_length_key, largest, side_key, sign_of, slack_before, stiffness_key
 from mdstopo.case.value import frozen, stated
 
 
@@ -40,3 +41,16 @@ class CrushLaw(Law):
     def row(self) -> list[float]:
         """Stiffness, plateau, gap, side."""
         return [self.stiffness, self.force, self.gap, sign_of(self.side)]
+
+    def strength(self, ranges: Ranges) -> float:
+        """The plateau."""
+        return largest(ranges("force"))
+
+    def side_of_force(self, ranges: Ranges) -> int:
+        """That in which it is crushed."""
+        del ranges
+        return int(sign_of(self.side))
+
+    def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray:
+        """Until the gap is used up."""
+        return slack_before(self.side, self.free_length, ranges, length)

@@ -4,8 +4,21 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import NUMBER, Flag
-from mdstopo.case.laws.law import Law, damping_key, free_length_key, side_key, sign_of, stiffness_key
+from mdstopo.case.laws.law import (
+    Law,
+    Ranges,
+    damping_key,
+    free_length_key,
+    largest,
+    side_key,
+    sign_of,
+    slack_before,
+    stiffness_key,
+)
 from mdstopo.case.value import frozen, stated
 
 
@@ -39,3 +52,19 @@ class GapLaw(Law):
     def row(self) -> list[float]:
         """Stiffness, damping, gap, side, clip."""
         return [self.stiffness, self.damping, self.gap, sign_of(self.side), float(self.clip)]
+
+    def side_of_force(self, ranges: Ranges) -> int:
+        """Damping may reverse the force where clip does not hold it."""
+        return 0 if largest(ranges("damping")) > 0.0 and not self.clip else int(sign_of(self.side))
+
+    def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray:
+        """Until the gap is used up."""
+        return slack_before(self.side, self.free_length, ranges, length)
+
+    def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray:
+        """Eq. 3."""
+        side = sign_of(self.side)
+        force = self.stiffness * (side * stretch - self.gap) + self.damping * side * rate
+        if self.clip:
+            force = np.maximum(force, 0.0)
+        return np.where(side * stretch >= self.gap, side * force, 0.0)

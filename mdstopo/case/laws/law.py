@@ -7,12 +7,19 @@ description and unit, and what part it plays. Delta is the elongation |Q - P| - 
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import MISSING, Field, fields
 from typing import Any, ClassVar, cast
 
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Number, Word, explained
 from mdstopo.case.records import Key, Record
 from mdstopo.case.value import Value, frozen, stated
+
+#: of a number of a law, by its name: the least and the largest value that it may take
+Ranges = Callable[[str], tuple[float, float]]
 
 
 @frozen(kw_only=True)
@@ -50,6 +57,32 @@ class Law(Value):
     def holds(self) -> bool:
         """Whether it may hold something at rest."""
         return True
+
+    def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray | None:
+        """Force in N at alpha = 1 by elongation (m) and rate (m/s) alone, for drawings; None where more is in it."""
+        del stretch, rate
+        return None
+
+    def strength(self, ranges: Ranges) -> float | None:
+        """The largest force at alpha = 1 in N, whatever the motion; None where it has no limit.
+
+        ranges: the least and the largest value that a number of the law may take.
+        """
+        del ranges
+        return None
+
+    def side_of_force(self, ranges: Ranges) -> int:
+        """1 where the law only pulls, -1 where it only pushes, 0 where neither is certain."""
+        del ranges
+        return 0
+
+    def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray | None:
+        """By how much members of initial lengths (M,) have at least to change their length before it acts, (M,) m.
+
+        None where it acts at once.
+        """
+        del ranges, length
+        return None
 
 
 def stiffness_key(doc: str = "k at alpha = 1", positive: bool = False) -> Any:
@@ -120,6 +153,26 @@ def _numbers(law: Any) -> tuple[str, ...]:
         for field in _own_fields(law)
         if isinstance(field.metadata["kind"], Number) and field.name not in outside
     )
+
+
+def largest(bounds: tuple[float, float]) -> float:
+    """The largest magnitude between two values."""
+    return max(map(abs, bounds))
+
+
+def side_between(bounds: tuple[float, float]) -> int:
+    """1 where no value is negative, -1 where none is positive, else 0."""
+    low, high = bounds
+    return 1 if low >= 0.0 else (-1 if high <= 0.0 else 0)
+
+
+def slack_before(side: str, free: float | None, ranges: Ranges, length: FloatArray) -> FloatArray:
+    """`Law.slack` of a law that acts beyond a gap, on one side; free: its free length as stated."""
+    least = ranges("gap")[0]
+    if free is None:
+        return np.full(len(length), least)
+    low, high = ranges("free_length")
+    return (low - length if side == "tension" else length - high) + least
 
 
 def record_of(law: type[Law]) -> Record:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER
-from mdstopo.case.laws.law import Law
+from mdstopo.case.laws.law import Law, Ranges, largest, side_between
 from mdstopo.case.value import frozen, stated
 
 
@@ -21,3 +21,11 @@ class PulseLaw(Law):
     peak: float = stated(NUMBER, "f0, the largest tension at alpha = 1", unit="N", scales=True, varies=True)
     rate: float = stated(NOT_NEGATIVE, "sigma; larger is shorter", unit="1/s^2", varies=True, is_time=True)
     time: float = stated(NUMBER, "t0, when the peak is", unit="s", varies=True, is_time=True)
+
+    def strength(self, ranges: Ranges) -> float:
+        """The peak."""
+        return largest(ranges("peak"))
+
+    def side_of_force(self, ranges: Ranges) -> int:
+        """That of the peak."""
+        return side_between(ranges("peak"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import NUMBER
 from mdstopo.case.laws.law import Law, damping_key, free_length_key, stiffness_key
 from mdstopo.case.value import frozen, stated
@@ -29,3 +30,7 @@ class SpringLaw(Law):
     def holds(self) -> bool:
         """A damper alone holds nothing."""
         return self.stiffness != 0.0 or self.preload != 0.0
+
+    def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray:
+        """Eq. 2."""
+        return self.stiffness * stretch + self.damping * rate + self.preload

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from mdstopo.case.arrays import Table
-from mdstopo.case.laws.law import Law
+from mdstopo.case.laws.law import Law, Ranges, side_between
 from mdstopo.case.number_rows import Rows
 from mdstopo.case.value import frozen, stated
 
@@ -20,3 +20,13 @@ class TableLaw(Law):
     kernels: ClassVar[str] = "mdstopo.mechanics.laws.given"
 
     table: Table = stated(Rows(("t", "f")), "tension over time at alpha = 1", unit="s and N", scales=True)
+
+    def strength(self, ranges: Ranges) -> float:
+        """The largest value."""
+        del ranges
+        return float(abs(self.table.values).max())
+
+    def side_of_force(self, ranges: Ranges) -> int:
+        """That of its values."""
+        del ranges
+        return side_between((float(self.table.values.min()), float(self.table.values.max())))

@@ -68,6 +68,11 @@ def describe(joint: Joint) -> str:
     return f"joint {name}({joint.type}, between {joint.bodies[0]} and {joint.bodies[1]})"
 
 
+@chosen(LISTED, lambda each: each.rows, part)
+def _row_count(code):  # type: ignore[no-untyped-def]
+    return 0
+
+
 @chosen(LISTED, lambda each: each.phi, part)
 def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
     """phi (3,) and jac (3, 6) = Phi_q; rows that the joint has not are left as they are."""
@@ -76,14 +81,14 @@ def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
 @chosen(LISTED, lambda each: each.gamma, part)
 def joint_gamma(code, par, w, wd, gamma):  # type: ignore[no-untyped-def]
     """gamma (3,) of Phi_q a + gamma = 0."""
-    for r in range(3):
+    for r in range(_row_count(code)):
         gamma[r] = 0.0
 
 
 @chosen(LISTED, lambda each: each.velocity_slope, part)
 def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
     """out (3, 6) = d(Phi_q v)/dq."""
-    for r in range(3):
+    for r in range(_row_count(code)):
         for i in range(6):
             out[r, i] = 0.0
 
@@ -91,7 +96,7 @@ def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
 @chosen(LISTED, lambda each: each.acceleration_slopes, part)
 def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
     """by_q, by_v (3, 6): slopes of Phi_q a + gamma at fixed a."""
-    for r in range(3):
+    for r in range(_row_count(code)):
         for i in range(6):
             by_q[r, i] = 0.0
             by_v[r, i] = 0.0
