@@ -28,8 +28,8 @@ from mdstopo import Case, evaluate, load_case, optimize
 from mdstopo.api import METHODS as SENSITIVITIES
 from mdstopo.bench.tables import Table, verdict
 from mdstopo.case.errors import CaseError
+from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.installed import version_of
-from mdstopo.integrators.choice import METHODS as INTEGRATORS
 
 Floats = NDArray[np.float64]
 #: what is kept of one item: arrays by name, each as `_kept` has it
