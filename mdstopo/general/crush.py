@@ -61,7 +61,7 @@ def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no
     """out (slots,) += what the sets do to the forces at a state with virtual displacement z (n,), and to weight V."""
     rel = np.empty((model.pair.shape[0], POSE))
     u = np.empty(3)
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     slot = 0
     for k in range(model.block.shape[0]):
         if model.block[k, 3] != CRUSH:

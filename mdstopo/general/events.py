@@ -203,13 +203,13 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
     for part in range(1, parts + 1):
         c = part / parts
         if part == parts:
-            relative_pose(model.pair, q1, v1, rel)
+            relative_pose(model.pair, model.home, q1, v1, rel)
         else:
             a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
             for d in range(n):
                 q[d] = a0 * q0[d] + a1 * q1[d] + h * (b0 * v0[d] + b1 * v1[d])
                 v[d] = (da0 * q0[d] + da1 * q1[d]) / h + db0 * v0[d] + db1 * v1[d]
-            relative_pose(model.pair, q, v, rel)
+            relative_pose(model.pair, model.home, q, v, rel)
             margin, _ = smallest_margin(model, segment, strength, rel)
             if margin < -noise:
                 return c, near

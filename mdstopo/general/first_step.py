@@ -64,7 +64,7 @@ def first_step(  # type: ignore[no-untyped-def]
         if singular >= 0 or not finite:
             h *= 0.1
             continue
-        relative_pose(model.pair, q, v, rel)
+        relative_pose(model.pair, model.home, q, v, rel)
         motion_scale(model.pair, rel, rel0, model.reach, motion, noise, tolerance, scale)
         motion_weights(model.pair, rel, model.reach, scale, weight)
         theta = 0.0

@@ -130,7 +130,7 @@ def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):  # type
     """out (M_padded,) += scale times the force of each law of a member at unit strength."""
     row = np.empty(6)
     rel = np.empty((model.pair.shape[0], POSE))
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
             continue

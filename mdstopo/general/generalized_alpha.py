@@ -99,7 +99,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
-    relative_pose(model.pair, q, v, rel0)
+    relative_pose(model.pair, model.home, q, v, rel0)
     extent = np.zeros((2, n_pair))
     motion = extent[0]
     noise = extent[1]
@@ -174,7 +174,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if code != OK:
                 where[0] = singular
                 return code, count, events, t
-            relative_pose(model.pair, ends[0], ends[1], rel)
+            relative_pose(model.pair, model.home, ends[0], ends[1], rel)
             happens = False
             who = nowhere
             if switching:
@@ -187,8 +187,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 copy_state(ends, beyond[0])
                 copy_state(state, left)
                 while top >= 0:  # as `runge_kutta.simulate` does
-                    relative_pose(model.pair, left[0], left[1], before)
-                    relative_pose(model.pair, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model.pair, model.home, left[0], left[1], before)
+                    relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     dip, near = first_sign(
                         model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
                         cut[top] - low, rounding,
@@ -212,7 +212,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     if code != OK:
                         where[0] = singular
                         return code, count, events, t
-                    relative_pose(model.pair, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     value, near_who = smallest_margin(model, segment, strength, rel)
                     if value < -rounding:
                         high = middle
@@ -221,7 +221,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         break
                     if value < graze and matters(model, strength, rel, near_who):
                         where[2] = near_who
-                relative_pose(model.pair, left[0], left[1], before)
+                relative_pose(model.pair, model.home, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
                     at_low, _ = smallest_margin(model, segment, strength, before)
@@ -240,7 +240,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         if code != OK:
                             where[0] = singular
                             return code, count, events, t
-                        relative_pose(model.pair, trial[0], trial[1], rel)
+                        relative_pose(model.pair, model.home, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, strength, rel)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
@@ -251,7 +251,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         model, tables[0], strength, segment, t, h, starting, state, guess, newton_tolerance, size,
                         stages, desk, track, ends, push, extent, rel0, work,
                     )  # fmt: skip
-                relative_pose(model.pair, ends[0], ends[1], rel)
+                relative_pose(model.pair, model.home, ends[0], ends[1], rel)
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
@@ -260,7 +260,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, model.reach, p))
             if where[1] < 0:
-                relative_pose(model.pair, q, v, before)
+                relative_pose(model.pair, model.home, q, v, before)
                 where[1] = meeting(model, segment, t, strength, before, rel)
             done += 1.0
             known += 1

@@ -35,9 +35,11 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     deflection,
+    gross_loads,
     keep_stage,
     keep_state,
     motion_weights,
+    rounding_of_pairs,
 )
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
@@ -197,11 +199,12 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                 work[TANGENTS] += 1
                 if count == 0 and newton == -starting:
                     for p in range(n_pair):
-                        stiffness = sums[0, p, 7] + sums[0, p, 11]
-                        if sums[0, p, 3] > 0.0 and stiffness > 0.0:
-                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # it starts strained
-                        size = np.sqrt(rel[0, p, 0] ** 2 + rel[0, p, 1] ** 2) + model.reach[p]
-                        noise[p] = 1e-15 * size + 1e-300
+                        scale[p] = sums[0, p, 7] + sums[0, p, 11]
+                        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
+                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # it starts strained
+                    gross_loads(model, delta)
+                    rounding_of_pairs(model, inv_mass, rel[0], v, delta, scale, motion, noise)
+                    for p in range(n_pair):
                         for j in range(POSE):
                             rel0[p, j] = rel[0, p, j]
                 accepted = newton < 0

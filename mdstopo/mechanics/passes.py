@@ -23,7 +23,7 @@ from mdstopo.mechanics.laws.spring import (
     viscous_tangent,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import TILE, Springs
+from mdstopo.scene.model import DAMPING, EXCESS, PRELOAD, STIFFNESS, TILE, Springs
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
 SUMS = 22
@@ -69,9 +69,8 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
     """The part start..stop of block k."""
     if block[k, 4] < 0:
         for i in range(start, stop):
-            strength[0, i] = member[5, i]
-            strength[1, i] = member[6, i]
-            strength[2, i] = member[7, i]
+            for row in range(3):
+                strength[row, i] = member[STIFFNESS + row, i]
         return
     mu = power[k]
     rows, count, first, width = _rows(block, k, start, stop)
@@ -80,7 +79,7 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
             at = start + j * width
             begin = first + j * count
             a = alpha[begin : begin + count]
-            whole = member[5 + row, at : at + width]
+            whole = member[STIFFNESS + row, at : at + width]
             scaled = strength[row, at : at + width]
             if mu == 1.0 and begin + width <= alpha.shape[0]:
                 # whole vectors: a place of padding takes some other variable times no stiffness
@@ -168,6 +167,7 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
         qx = member[2, lo:hi]
         qy = member[3, lo:hi]
         l0 = member[4, lo:hi]
+        excess = member[EXCESS, lo:hi]
         ks = strength[0, lo:hi]
         for j in range(m):
             r = rel[j, p]
@@ -184,7 +184,7 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
             ps = strength[2, lo:hi]
             if tangent:
                 (x, y, t, e, ex, ey, et, k0, k1, k2, k3, k4, k5, k6, k7, k8, c0, c1, c2, c3, c4, c5) = viscous_tangent(
-                    px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
+                    px, py, qx, qy, l0, excess, ks, cs, ps, r
                 )
                 o[7] += k0
                 o[8] += k1
@@ -203,7 +203,7 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
                 o[21] += c5
             else:
                 x, y, t, e, ex, ey, et = viscous_force(
-                    px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
+                    px, py, qx, qy, l0, excess, ks, cs, ps, r
                 )
             o[0] += x
             o[1] += y
@@ -242,7 +242,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
             if i < pose.shape[0]:
                 copy_rows(pose[i], rel[j])
             else:
-                relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
+                relative_pose(pair, model.home, stage[i, 0], stage[i, 1], rel[j])
             for p in range(n_pair):
                 pair_displacement(pair, rel[j], p, z[i], u[j, p])
                 for axis in range(3):
@@ -252,7 +252,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
     for i in range(weight.shape[0]):
         if weight[i] != 0.0:
             own[energies] = weight[i]
-            relative_pose(pair, point[i, 0], point[i, 1], rel[count + energies])
+            relative_pose(pair, model.home, point[i, 0], point[i, 1], rel[count + energies])
             energies += 1
     counter = np.zeros(1, np.int64)
     job = (counter, model.chunk, model.block, model.member, rel, u, own, out)
@@ -296,21 +296,19 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
         qx = member[2, lo:hi]
         qy = member[3, lo:hi]
         l0 = member[4, lo:hi]
-        ks = member[5, lo:hi]
+        excess = member[EXCESS, lo:hi]
+        ks = member[STIFFNESS, lo:hi]
         o = out[lo:hi]
         if block[k, 3] == 0:
-            elastic_design(px, py, qx, qy, l0, ks, rel[:many, p], u[:, p], o)
+            elastic_design(px, py, qx, qy, l0, excess, ks, rel[:many, p], u[:, p], o)
         else:
             for j in range(many):
-                r = rel[j, p]
-                w = u[j, p]
                 viscous_design(
-                    px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
-                    r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
+                    px, py, qx, qy, l0, excess, ks, member[DAMPING, lo:hi], member[PRELOAD, lo:hi], rel[j, p], u[j, p],
+                    o,
                 )  # fmt: skip
         for j in range(weight.shape[0]):
-            r = rel[many + j, p]
-            stored_energy(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], weight[j], o)
+            stored_energy(px, py, qx, qy, l0, excess, ks, rel[many + j, p], weight[j], o)
 
 
 @part
