@@ -12,6 +12,8 @@ Blocks of springs, which neither switch nor remember, take the vectors of `mecha
 
 import math
 
+import numpy as np
+
 from mdstopo.compiler.jit import inline, kernel, part
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.general.model import INERTER
@@ -152,11 +154,11 @@ def add_springs(model, k, strength, r, tangent, o):  # type: ignore[no-untyped-d
             if p[1] != 0.0:
                 alike_damping(rows, width, scale, start, stop, p, r, o)
     elif tangent:
-        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r)
+        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
         add_tangent((c * kxx, c * kxy, c * kyy, c * kxt, c * kyt, c * ktt), o)
     else:
-        x, y, t, e = elastic_force(rows, width, scale, start, stop, r)
+        x, y, t, e = elastic_force(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
 
 

@@ -30,6 +30,7 @@ def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
     return (
         Model(
             model.inv_mass, model.q0, model.v0, model.home, model.pair, model.reach, model.shortest, springs.block, model.power,
+            model.near,
             springs.member, model.times, model.force, model.load_body, model.load_follows, model.load_arm,
             model.load_force, springs.chunk, model.threads,
         ),
@@ -82,7 +83,7 @@ def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
             for row in range(MEMBER):
                 for i in range(fewer[k, 1] + fewer[k, 5], fewer[k, 2]):
                     room[row, i] = 0.0
-    return Springs(fewer, room, chunk, springs.threads), room[STIFFNESS:MEMBER], left
+    return Springs(fewer, room, chunk, springs.threads, springs.near), room[STIFFNESS:MEMBER], left
 
 
 @kernel

@@ -17,6 +17,7 @@ from mdstopo.mechanics.laws.spring import (
     elastic_design,
     elastic_force,
     elastic_tangent,
+    hardly_moved,
     stored_energy,
     viscous_design,
     viscous_force,
@@ -36,7 +37,7 @@ WORTH = 400_000
 @part
 def springs_of(model):  # type: ignore[no-untyped-def]
     """What `member_sums` needs of a model."""
-    return Springs(model.block, model.member, model.chunk, model.threads)
+    return Springs(model.block, model.member, model.chunk, model.threads, model.near)
 
 
 @kernel
@@ -125,11 +126,14 @@ def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-un
     sums[:m] = 0.0
     if springs.threads == 0:  # whole blocks: added where they belong at once
         for k in range(block.shape[0]):
-            _sum(k, block[k, 1], block[k, 2], block, springs.member, strength, rel, m, tangent, sums, block[k, 0])
+            _sum(
+                k, block[k, 1], block[k, 2], block, springs.near[k], springs.member, strength, rel, m, tangent, sums,
+                block[k, 0],
+            )  # fmt: skip
         return
     counter = np.zeros(1, np.int64)
     part = np.empty((chunk.shape[0], m, 1, SUMS))
-    job = (counter, chunk, block, springs.member, strength, rel, m, tangent, part)
+    job = (counter, chunk, block, springs.near, springs.member, strength, rel, m, tangent, part)
     shared(_sum_chunks, threads_for(springs, m), job)
     for i in range(chunk.shape[0]):
         p = block[chunk[i, 0], 0]
@@ -139,20 +143,23 @@ def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-un
 
 
 @kernel
-def _sum_chunks(counter, chunk, block, member, strength, rel, m, tangent, part):  # type: ignore[no-untyped-def]
+def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, part):  # type: ignore[no-untyped-def]
     i = taken(counter)
     while i < chunk.shape[0]:
         out = part[i]
         out[:] = 0.0
-        _sum(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, rel, m, tangent, out, np.int64(0))
+        k = chunk[i, 0]
+        _sum(
+            k, chunk[i, 1], chunk[i, 2], block, near[k], member, strength, rel, m, tangent, out, np.int64(0)
+        )
         i = taken(counter)
 
 
 @kernel
-def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
     """Add the part start..stop of block k to sums (m, columns, SUMS)."""
     if block[k, 6] > 0:
-        sum_grid(k, start, stop, block, member, strength[0], rel, m, tangent, sums, column)
+        sum_grid(k, start, stop, block, near, member, strength[0], rel, m, tangent, sums, column)
         return
     p = block[k, 0]
     viscous = block[k, 3] == 1
@@ -174,11 +181,12 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
             o = sums[j, column]
             if not viscous:
                 if tangent:
-                    found = elastic_tangent(rows, width, scale, lo, hi, r)
+                    found = elastic_tangent(rows, width, scale, lo, hi, r, hardly_moved(r, near))
                     add_forces(found[:4], counted, o)
                     add_tangent(found[4:], o)
                 else:
-                    add_forces(elastic_force(rows, width, scale, lo, hi, r), counted, o)
+                    found_force = elastic_force(rows, width, scale, lo, hi, r, hardly_moved(r, near))
+                    add_forces(found_force, counted, o)
                 continue
             cs = strength[1, lo:hi]
             ps = strength[2, lo:hi]
@@ -255,7 +263,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
             relative_pose(pair, model.home, point[i, 0], point[i, 1], rel[count + energies])
             energies += 1
     counter = np.zeros(1, np.int64)
-    job = (counter, model.chunk, model.block, model.member, rel, u, own, out)
+    job = (counter, model.chunk, model.block, model.near, model.member, rel, u, own, out)
     shared(_design_chunks, threads_for(model, count + energies), job)
 
 
@@ -269,15 +277,15 @@ def energy_gradient(model, point, weight, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _design_chunks(counter, chunk, block, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
     i = taken(counter)
     while i < chunk.shape[0]:
-        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, u, weight, out)
+        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, near[chunk[i, 0]], member, rel, u, weight, out)
         i = taken(counter)
 
 
 @kernel
-def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+def _design(k, start, stop, block, near, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
     """The part start..stop of block k: works at the first poses of rel (any, n_pair, POSE), energies at the others.
 
     u (S, n_pair, 3): changes of the first poses.
@@ -287,7 +295,7 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
     p = block[k, 0]
     many = u.shape[0]
     if block[k, 6] > 0:
-        design_grid(start, stop, block[k, 6], member, rel[:, p], u[:, p], weight, out)
+        design_grid(start, stop, block[k, 6], near, member, rel[:, p], u[:, p], weight, out)
         return
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)

@@ -21,7 +21,11 @@ from mdstopo.scene.model import (
     HOME_SIN,
     L0,
     MEMBER,
+    QX,
+    QY,
+    START,
     STIFFNESS,
+    STOP,
     VECTOR,
     FloatArray,
     IndexArray,
@@ -62,14 +66,19 @@ class Scene:
         return self.load_case.end
 
 
+#: share of the longest member by which bodies may have moved for elongations to come from displacements
+NEAR = 0.02
+
+
 @dataclass(frozen=True)
 class Members:
-    """What all load cases share, as in `Model`: pairs (n, 2), blocks, powers, member arrays; and the shortest initial
-    length of each block."""
+    """What all load cases share, as in `Model`: pairs (n, 2), blocks, powers, nearness, member arrays; and the shortest
+    initial length of each block."""
 
     pairs: IndexArray
     block: IndexArray
     power: FloatArray
+    near: FloatArray
     member: FloatArray
     shortest: FloatArray
 
@@ -101,7 +110,15 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
         power=np.array(powers, dtype=np.float64),
         member=member,
         shortest=np.array([float(group.length.min()) for group in case.members]),
+        near=np.array([_nearness(group, member, block) for group, block in zip(case.members, blocks, strict=True)]).reshape(-1, 2),
     )
+
+
+def _nearness(group: MemberGroup, member: FloatArray, block: list[int]) -> list[float]:
+    """A row of `Model.near`: up to a share of the longest member, in which digits are to be won."""
+    far = NEAR * float(group.length.max())
+    reach = float(np.hypot(*member[[QX, QY], block[START] : block[STOP]]).max())
+    return [far**2, min(far / max(reach, 1e-300), 1.0) ** 2]
 
 
 def _fill(group: MemberGroup, block: list[int], member: FloatArray) -> None:
@@ -191,6 +208,7 @@ def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
         shortest=shortest,
         block=block,
         power=shared.power,
+        near=shared.near,
         member=member,
         times=times,
         force=force,

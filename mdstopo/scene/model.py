@@ -45,6 +45,7 @@ class Springs(NamedTuple):
     member: FloatArray
     chunk: IndexArray
     threads: int
+    near: FloatArray
 
 
 class Model(NamedTuple):
@@ -60,6 +61,8 @@ class Model(NamedTuple):
     block         (n_block, 8)      pair, start, stop (padded), kind of law, first design variable or -1, count;
                                     of a grid: places in a row, members in a row (otherwise 0)
     power         (n_block,)        mu of Eq. 12
+    near          (n_block, 2)      squares of the shift (m^2) and of the turn up to which elongations come from
+                                    displacements (`mechanics.laws.spring.hardly_moved`)
     member        (9, M_padded)     P, Q in body frames; free length l0; L^2 - l0^2 of the length L at home; stiffness,
                                     damping, preload at alpha = 1
     times         (n_seg + 1,)      start, kinks of the loads, end
@@ -83,6 +86,7 @@ class Model(NamedTuple):
     shortest: FloatArray
     block: IndexArray
     power: FloatArray
+    near: FloatArray
     member: FloatArray
     times: FloatArray
     force: FloatArray

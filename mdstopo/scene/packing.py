@@ -49,7 +49,7 @@ def pack(model: Model, threads: int | None = None) -> Packed:
         [np.array(sizes, dtype=np.int64)]
         + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows, chunk)]
     ).astype(np.int64)
-    before = [model.inv_mass, model.q0, model.v0, model.home.ravel(), model.reach, model.shortest, model.power]
+    before = [model.inv_mass, model.q0, model.v0, model.home.ravel(), model.reach, model.shortest, model.power, model.near.ravel()]
     gap = -sum(len(a) for a in before) % _LINE  # members begin on a line of the cache
     after = [model.member, model.times, model.force, model.load_arm, model.load_force]
     parts = [np.asarray(a, dtype=np.float64).ravel() for a in (*before, np.zeros(gap), *after)]
@@ -119,6 +119,8 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     f += n_pair
     power = floats[f : f + n_block]
     f += n_block
+    near = floats[f : f + 2 * n_block].reshape((n_block, 2))
+    f += 2 * n_block
     f += -f % _LINE
     member = floats[f : f + MEMBER * padded].reshape((MEMBER, padded))
     f += MEMBER * padded
@@ -130,6 +132,6 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     f += 2 * n_load
     load_force = floats[f : f + 4 * n_seg * n_load].reshape((n_seg, n_load, 2, 2))
     return Model(
-        inv_mass, q0, v0, home, pair, reach, shortest, block, power, member, times, force, load_body, load_follows,
+        inv_mass, q0, v0, home, pair, reach, shortest, block, power, near, member, times, force, load_body, load_follows,
         load_arm, load_force, chunk, ints[7],
     )  # fmt: skip

@@ -18,7 +18,7 @@ from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
 @kernel
 def _seen(member, width, i, r):  # type: ignore[no-untyped-def]
     """R q, 1/L, b and Delta of the members from i on."""
-    ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r)
+    ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r, np.bool_(True))
     bx = y * rx
     by = y * ry
     return ax, ay, y, bx, by, ax * by - ay * bx, stretch

@@ -49,6 +49,15 @@ def _elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped
 
 
 @part
+def hardly_moved(r, near):  # type: ignore[no-untyped-def]
+    """Whether a pose r (POSE,) is so near home that members would lose digits in a difference of lengths.
+
+    near (2,): a row of `scene.model.Model.near`. Beyond it, elongations from displacements are no better.
+    """
+    return r[10] * r[10] + r[11] * r[11] < near[0] and r[12] * r[12] + r[13] * r[13] < near[1]
+
+
+@part
 def elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-def]
     """Delta = L - l0 of members with r, r^2, 1/L and u, what r has changed by since home; excess: L0^2 - l0^2.
 
@@ -72,17 +81,18 @@ def elongation_of(rx, ry, length, ux, uy, free, excess):  # type: ignore[no-unty
 
 
 @part
-def elastic_force(member, width, scale, start, stop, r):  # type: ignore[no-untyped-def]
+def elastic_force(member, width, scale, start, stop, r, close):  # type: ignore[no-untyped-def]
     """Return Q (3 numbers) and E of the undamped springs from start to stop at the relative pose r (POSE,).
 
-    member (6 width or more,): the rows behind each other, width of each; scale (stop or more,): k.
+    member (6 width or more,): the rows behind each other, width of each; scale (stop or more,): k; close: whether
+    elongations come from displacements (`hardly_moved`).
     """
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
     energy = zero()
     for i in range(start, stop, lanes()):
-        ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r)
+        ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r, close)
         w = load(scale, i) * stretch
         energy += w * stretch
         w *= y
@@ -93,7 +103,7 @@ def elastic_force(member, width, scale, start, stop, r):  # type: ignore[no-unty
 
 
 @part
-def seen_members(member, width, i, r):  # type: ignore[no-untyped-def]
+def seen_members(member, width, i, r, close):  # type: ignore[no-untyped-def]
     """R q, r, |r|^2, 1/L and Delta of the members from i on."""
     u = load(member, 2 * width + i)
     v = load(member, 3 * width + i)
@@ -103,14 +113,18 @@ def seen_members(member, width, i, r):  # type: ignore[no-untyped-def]
     ry = ay - (load(member, width + i) - r[1])
     r2 = rx * rx + ry * ry
     y = inverse_root(r2, ZERO_LENGTH_SQUARED)
-    ux = r[10] + (r[12] * u - r[13] * v)
-    uy = r[11] + (r[13] * u + r[12] * v)
-    stretch = elongation(rx, ry, r2, y, ux, uy, load(member, 4 * width + i), load(member, 5 * width + i))
+    free = load(member, 4 * width + i)
+    if close:
+        ux = r[10] + (r[12] * u - r[13] * v)
+        uy = r[11] + (r[13] * u + r[12] * v)
+        stretch = elongation(rx, ry, r2, y, ux, uy, free, load(member, 5 * width + i))
+    else:
+        stretch = r2 * y - free
     return ax, ay, rx, ry, r2, y, stretch
 
 
 @part
-def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-untyped-def]
+def elastic_tangent(member, width, scale, start, stop, r, close):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K; arguments as of `elastic_force`.
 
     The lengths of the next members are found while these are summed: one chain of operations from coordinates to sums
@@ -130,9 +144,9 @@ def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-un
     kyt = zero()
     ktt = zero()
     last = stop - lanes()
-    ax, ay, rx, ry, _, y, stretch = seen_members(member, width, start, r)
+    ax, ay, rx, ry, _, y, stretch = seen_members(member, width, start, r, close)
     for i in range(start, stop, lanes()):
-        following = seen_members(member, width, min(i + lanes(), last), r)
+        following = seen_members(member, width, min(i + lanes(), last), r, close)
         stiffness = load(scale, i)
         w = stiffness * stretch
         energy += w * stretch

@@ -9,7 +9,8 @@ a = R q of a column and e = d - p of a row, r = a + e; so in a column, where a s
 
 Rows are padded by members of no stiffness at the row's last point, so that vectors take whole columns.
 Arguments: member arrays (n,) of whole rows, beginning at the first of them; the places of a row; the columns from
-`first` to `last`; the pose r (POSE,); room (rows, 2) for what belongs to rows.
+`first` to `last`; the pose r (POSE,); close, whether it is near home
+(`spring.hardly_moved`); room (rows, 2) for what belongs to rows.
 """
 
 import math
@@ -40,13 +41,14 @@ def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
 
 
 @part
-def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, room):  # type: ignore[no-untyped-def]
+def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):  # type: ignore[no-untyped-def]
     """Return Q (3 numbers) and E.
 
     As in `spring.elastic_tangent`, the lengths of the next row (after the last, of the next columns' first) are found
     while this one is summed.
     """
     begin_rows(px, py, width, r[0], r[1], room)
+    nothing_moved = zero(), zero(), zero()
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
@@ -55,19 +57,19 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, room):  # t
     seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
-        moved = moved_columns(qx, qy, i, r)
+        moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own_x = zero()
         own_y = zero()
         at = i
         for j in range(1, room.shape[0]):
             following = _seen(ax, ay, room, j)
-            w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), load(excess, at))
+            w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             own_x += w * seen[0]
             own_y += w * seen[1]
             at += width
             seen = following
         following = _seen(bx, by, room, np.int64(0))
-        w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), load(excess, at))
+        w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         own_x += w * seen[0]
         own_y += w * seen[1]
         seen = following
@@ -97,20 +99,21 @@ def moved_columns(qx, qy, i, r):  # type: ignore[no-untyped-def]
 
 
 @part
-def _stretch(seen, moved, l0, excess):  # type: ignore[no-untyped-def]
-    """Delta of a member (`spring.elongation`)."""
+def _stretch(seen, moved, l0, excess, at, close):  # type: ignore[no-untyped-def]
+    """Delta of the members at a place (`spring.elongation`); close: whether the bodies have hardly moved."""
     rx, ry, r2, y = seen
-    twice_x, twice_y, u2 = moved
     x = r2 * y - l0
-    squares = (excess - u2) + twice_x * rx + twice_y * ry
-    off = 0.5 * y * (x * (r2 * y + l0) - squares)
-    return x - where_larger(r2 - u2, 0.0, off)
+    if close:
+        twice_x, twice_y, u2 = moved
+        squares = (load(excess, at) - u2) + twice_x * rx + twice_y * ry
+        x -= where_larger(r2 - u2, 0.0, 0.5 * y * (x * (r2 * y + l0) - squares))
+    return x
 
 
 @part
-def _weight(energy, seen, moved, k, l0, excess):  # type: ignore[no-untyped-def]
+def _weight(energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-untyped-def]
     """w of a member, and twice the energy with it."""
-    stretch = _stretch(seen, moved, l0, excess)
+    stretch = _stretch(seen, moved, l0, excess, at, close)
     w = k * stretch
     return w * seen[3], energy + w * stretch
 
@@ -171,12 +174,13 @@ def force_and_tangent(sums):  # type: ignore[no-untyped-def]
 
 
 @part
-def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, room):  # type: ignore[no-untyped-def]
+def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
 
     Ahead of its sums as in `grid_force`.
     """
     begin_rows(px, py, width, r[0], r[1], room)
+    nothing_moved = zero(), zero(), zero()
     nothing = zero()
     sums = no_columns(nothing)
     energy = nothing
@@ -184,16 +188,16 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, room):  #
     seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
         bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
-        moved = moved_columns(qx, qy, i, r)
+        moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own = no_members(nothing)
         at = i
         for j in range(1, room.shape[0]):
             following = _seen(ax, ay, room, j)
-            own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), load(excess, at))
+            own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             at += width
             seen = following
         following = _seen(bx, by, room, np.int64(0))
-        own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), load(excess, at))
+        own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         seen = following
         sums = add_column(sums, ax, ay, own)
         ax = bx
@@ -203,10 +207,10 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, room):  #
 
 
 @part
-def _add(own, energy, seen, moved, k, l0, excess):  # type: ignore[no-untyped-def]
+def _add(own, energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-untyped-def]
     """The sums of a column, and the energy, with a member more."""
     rx, ry, r2, y = seen
-    w, energy = _weight(energy, seen, moved, k, l0, excess)
+    w, energy = _weight(energy, seen, moved, k, l0, excess, at, close)
     # a member without direction has no n: its k must not enter the trace
     return add_member(own, rx, ry, y, w, where_larger(r2, ZERO_LENGTH_SQUARED, k - w)), energy
 
@@ -227,16 +231,16 @@ def _moved_at(turned, m):  # type: ignore[no-untyped-def]
 
 
 @part
-def _work(seen, moved, along, l0, excess):  # type: ignore[no-untyped-def]
+def _work(seen, moved, along, l0, excess, at, close):  # type: ignore[no-untyped-def]
     """f/k b . u = Delta/L r . (u + e x u_theta), of which the last are `along` (2,); of no length, r is nothing."""
-    return _stretch(seen, moved, l0, excess) * seen[3] * (seen[0] * along[2] + seen[1] * along[3])
+    return _stretch(seen, moved, l0, excess, at, close) * seen[3] * (seen[0] * along[2] + seen[1] * along[3])
 
 
 @part
-def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
+def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) and sum_e weight_e V_i of each spring to out: f, b at the first poses, V at the others.
 
-    pose (poses, POSE), u (m, 3), weight (poses - m,). Room: room (rows, poses, 4); turned (poses, 5, lanes) for a, 2 u
+    pose (poses, POSE), close (poses,) of `spring.hardly_moved`, u (m, 3), weight (poses - m,). Room: room (rows, poses, 4); turned (poses, 5, lanes) for a, 2 u
     and u^2 (`moved_columns`).
     """
     rows = room.shape[0]
@@ -256,28 +260,28 @@ def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, u, weig
     for i in range(first, last, lanes()):
         for m in range(poses):
             ax, ay = turned_columns(qx, qy, i, pose[m, 2], pose[m, 3])
-            twice_x, twice_y, u2 = moved_columns(qx, qy, i, pose[m])
             store(turned[m, 0], 0, ax)
             store(turned[m, 1], 0, ay)
-            store(turned[m, 2], 0, twice_x)
-            store(turned[m, 3], 0, twice_y)
-            store(turned[m, 4], 0, u2)
+            if close[m]:
+                twice_x, twice_y, u2 = moved_columns(qx, qy, i, pose[m])
+                store(turned[m, 2], 0, twice_x)
+                store(turned[m, 3], 0, twice_y)
+                store(turned[m, 4], 0, u2)
         at = i
         seen = _seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
-            more = load(excess, at)
             work = zero()
             for m in range(1, many):
                 following = _seen_at(turned, room, j, m)
-                work += _work(seen, _moved_at(turned, m - 1), room[j, m - 1], free, more)
+                work += _work(seen, _moved_at(turned, m - 1), room[j, m - 1], free, excess, at, close[m - 1])
                 seen = following
             if many > 0:
                 following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
-                work += _work(seen, _moved_at(turned, many - 1), room[j, many - 1], free, more)
+                work += _work(seen, _moved_at(turned, many - 1), room[j, many - 1], free, excess, at, close[many - 1])
                 seen = following
             for m in range(many, poses):
-                stretch = _stretch(_seen_at(turned, room, j, m), _moved_at(turned, m), free, more)
+                stretch = _stretch(_seen_at(turned, room, j, m), _moved_at(turned, m), free, excess, at, close[m])
                 work += 0.5 * weight[m - many] * stretch * stretch
             store(out, at, load(out, at) + load(k, at) * work)
             at += width
