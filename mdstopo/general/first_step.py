@@ -10,7 +10,15 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance
-from mdstopo.integrators.steps import FORCES, TURN, deflection, largest_turn, motion_weights
+from mdstopo.integrators.steps import (
+    FORCES,
+    TURN,
+    deflection,
+    gross_loads,
+    largest_turn,
+    motion_weights,
+    rounding_of_pairs,
+)
 from mdstopo.mechanics.geometry import POSE, relative_pose
 
 #: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,
@@ -19,6 +27,32 @@ FIRST = 1e-8, 4e-6
 #: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
 #: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it
 PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
+
+
+@kernel
+def rounding_at_start(model, rel, v, stiffness, strain, noise):  # type: ignore[no-untyped-def]
+    """noise (n_pair,) of `rounding_of_pairs`; of pairs with a body that is driven, what is of the size of the pair.
+
+    Joints hand forces on, and springs that hold against them may be elsewhere.
+    """
+    n = v.shape[0]
+    inverse = np.empty(n)
+    load = np.empty(n)
+    gross_loads(model, load)
+    for d in range(n):
+        inverse[d] = 1.0 / model.mass[d] if model.free[d] != 0 else 0.0
+    rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise)
+    most = 0.0
+    for p in range(noise.shape[0]):
+        most = max(most, noise[p])
+    for p in range(noise.shape[0]):
+        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + model.reach[p]
+        driven = False
+        for side in range(2):
+            body = model.pair[p, side]
+            for axis in range(3):
+                driven = driven or (body + 1 < n // 3 and model.free[3 * body + axis] == 0)
+        noise[p] = 1e-15 * arm if driven else min(max(noise[p], most), 1e-15 * arm + 1e-300)
 
 
 @kernel

@@ -17,6 +17,7 @@ from mdstopo.compiler.jit import entry
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
+from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.forces import drive_state
 from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
@@ -103,11 +104,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     extent = np.zeros((2, n_pair))
     motion = extent[0]
     noise = extent[1]
+    stiffness = np.empty(n_pair)
     for p in range(n_pair):
-        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + model.reach[p]) + 1e-300
-        stiffness = desk.sums[p, 7] + desk.sums[p, 11]
-        if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)
+        stiffness[p] = desk.sums[p, 7] + desk.sums[p, 11]
+        if desk.sums[p, 3] > 0.0 and stiffness[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness[p])
+    rounding_at_start(model, rel0, v, stiffness, motion, noise)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
     if not step > 0.0:

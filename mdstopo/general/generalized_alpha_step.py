@@ -156,7 +156,7 @@ def advance(  # type: ignore[no-untyped-def]
         solve_unknowns(model, desk, delta, row)
         rounding = 1e-8
         for p in range(model.pair.shape[0]):
-            turned_pose(model.pair, p, desk.turned, q, v, desk.rel)
+            turned_pose(model, p, desk.turned, q, v, desk.rel)
             reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
             scale[p] = max(reached, 1e3 * extent[1, p])
             rounding = max(rounding, 100.0 * extent[1, p] / scale[p])

@@ -12,7 +12,7 @@ from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.crush import begins_at_plateau
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
-from mdstopo.general.first_step import first_step, motion_scale
+from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general, set_modes
@@ -122,8 +122,8 @@ def scene_size(model):  # type: ignore[no-untyped-def]
     size = 0.0
     for p in range(model.reach.shape[0]):
         size = max(size, model.reach[p])
-    for d in range(0, model.q0.shape[0], 3):
-        size = max(size, abs(model.q0[d]), abs(model.q0[d + 1]))
+    for b in range(model.home.shape[0]):
+        size = max(size, abs(model.home[b, 0]), abs(model.home[b, 1]))
     return size if size > 0.0 else 1.0
 
 
@@ -278,11 +278,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     scale = np.empty(n_pair)
     shaken = 0.0
     for p in range(n_pair):
-        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
-        stiffness = desk.sums[p, 7] + desk.sums[p, 11]
-        shaken += abs(stiffness) * noise[p]
-        if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)  # a pair that starts strained
+        scale[p] = desk.sums[p, 7] + desk.sums[p, 11]
+        if desk.sums[p, 3] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / scale[p])  # a pair that starts strained
+    rounding_at_start(model, rel0, v0, scale, motion, noise)
+    for p in range(n_pair):
+        shaken += abs(scale[p]) * noise[p]
     # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0
     events = np.int64(0)
     if switching:

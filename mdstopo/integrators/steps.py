@@ -224,8 +224,8 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):  
     """noise (n_pair,): what rounding leaves uncertain of how far each pair has moved, m.
 
     Displacements are summed since the start, so it is a share of what forces move bodies by, not of where these are:
-    of the strain at the start, and of what the loads and velocities do until members hold against them. inverse (n,): of
-    the masses; load (n,) of `gross_loads`; stiffness (n_pair,): of a pair's members, N/m; strain (n_pair,): at the
+    of the strain at the start, and of what the loads and velocities do until members hold against them. inverse (n,):
+    of the masses; load (n,) of `gross_loads`; stiffness (n_pair,): of a pair's members, N/m; strain (n_pair,): at the
     start, m.
     """
     span = model.times[model.times.shape[0] - 1] - model.times[0]

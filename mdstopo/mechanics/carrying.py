@@ -29,10 +29,9 @@ def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
     springs, own, left = _that_carry(springs_of(model), strength, fill)
     return (
         Model(
-            model.inv_mass, model.q0, model.v0, model.home, model.pair, model.reach, model.shortest, springs.block, model.power,
-            model.near,
-            springs.member, model.times, model.force, model.load_body, model.load_follows, model.load_arm,
-            model.load_force, springs.chunk, model.threads,
+            model.inv_mass, model.q0, model.v0, model.home, model.pair, model.reach, model.shortest, springs.block,
+            model.power, model.near, springs.member, model.times, model.force, model.load_body, model.load_follows,
+            model.load_arm, model.load_force, springs.chunk, model.threads,
         ),
         own,
         left,

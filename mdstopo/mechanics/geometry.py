@@ -5,9 +5,9 @@
 T = dxi/dq (3 x 6, columns x_A y_A psi_A x_B y_B psi_B). With one member's row b = dL/dxi, its row of the
 compatibility matrix (Eq. 32) is B = -b T, and dDelta/dq = -B (Eq. 36). Nothing here depends on members.
 
-The coordinates q of a body are what it has moved since a place of its own, its home: (x, y, psi) = home + q. A pose tells
-by how much it differs from the one at home, too, without forming the difference of two poses: that keeps all digits of
-members that hardly stretch.
+The coordinates q of a body are what it has moved since a place of its own, its home: (x, y, psi) = home + q. A pose
+tells by how much it differs from the one at home, too, without forming the difference of two poses: that keeps all
+digits of members that hardly stretch.
 """
 
 from mdstopo.compiler.jit import part
@@ -23,6 +23,12 @@ POSE = 14
 def turned_body(home, body, angle):  # type: ignore[no-untyped-def]
     """cos and sin of a body's psi when it has turned by an angle since home, and by how much they have changed."""
     m, s = small_turn(angle)
+    return turned_from(home, body, m, s)
+
+
+@part
+def turned_from(home, body, m, s):  # type: ignore[no-untyped-def]
+    """`turned_body` from cos - 1 and sin of the angle."""
     c0 = home[body, 3]
     s0 = home[body, 4]
     dc = c0 * m - s0 * s

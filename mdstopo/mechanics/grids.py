@@ -49,12 +49,13 @@ def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, su
             for j in range(m):
                 r = rel[j, p]
                 o = sums[j, column]
+                close = hardly_moved(r, near)
                 if tangent:
-                    found = grid_tangent(px, py, qx, qy, l0, excess, ks, width, first, last, r, hardly_moved(r, near), own)
+                    found = grid_tangent(px, py, qx, qy, l0, excess, ks, width, first, last, r, close, own)
                     add_forces(found[:4], counted, o)
                     add_tangent(found[4:], o)
                 else:
-                    found_force = grid_force(px, py, qx, qy, l0, excess, ks, width, first, last, r, hardly_moved(r, near), own)
+                    found_force = grid_force(px, py, qx, qy, l0, excess, ks, width, first, last, r, close, own)
                     add_forces(found_force, counted, o)
 
 
@@ -75,6 +76,6 @@ def design_grid(start, stop, width, near, member, pose, u, weight, out):  # type
         for first in range(0, width, wide):
             grid_design(
                 member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], width, first, min(first + wide, width), pose, close, u, weight, own,
-                turned, out[lo:hi],
+                member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], width, first, min(first + wide, width),
+                pose, close, u, weight, own, turned, out[lo:hi],
             )  # fmt: skip

@@ -149,9 +149,7 @@ def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, 
         out = part[i]
         out[:] = 0.0
         k = chunk[i, 0]
-        _sum(
-            k, chunk[i, 1], chunk[i, 2], block, near[k], member, strength, rel, m, tangent, out, np.int64(0)
-        )
+        _sum(k, chunk[i, 1], chunk[i, 2], block, near[k], member, strength, rel, m, tangent, out, np.int64(0))
         i = taken(counter)
 
 
@@ -210,9 +208,7 @@ def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, c
                 o[20] += c4
                 o[21] += c5
             else:
-                x, y, t, e, ex, ey, et = viscous_force(
-                    px, py, qx, qy, l0, excess, ks, cs, ps, r
-                )
+                x, y, t, e, ex, ey, et = viscous_force(px, py, qx, qy, l0, excess, ks, cs, ps, r)
             o[0] += x
             o[1] += y
             o[2] += t

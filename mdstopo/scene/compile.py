@@ -104,13 +104,14 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
     member = np.zeros((MEMBER, start))
     for group, block in zip(case.members, blocks, strict=True):
         _fill(group, block, member)
+    near = [_nearness(group, member, block) for group, block in zip(case.members, blocks, strict=True)]
     return Members(
         pairs=np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
         block=np.array(blocks, dtype=np.int64).reshape(-1, BLOCK),
         power=np.array(powers, dtype=np.float64),
         member=member,
         shortest=np.array([float(group.length.min()) for group in case.members]),
-        near=np.array([_nearness(group, member, block) for group, block in zip(case.members, blocks, strict=True)]).reshape(-1, 2),
+        near=np.array(near).reshape(-1, 2),
     )
 
 

@@ -1,11 +1,12 @@
 """A scene as arrays: what one load case needs to be computed, and nothing else.
 
-n_b bodies have n = 3 n_b coordinates, what (x, y, psi) of each has changed by since the start: q. `ground` is the last body, with infinite mass, where a
-member is tied to it; it is absent otherwise. Members live in blocks of one law and one pair of bodies, structure of
-arrays; blocks are padded to a multiple of the vector width with members of no stiffness, and so is each row of a
-block that joins every point of one grid with every point of another (`scene.grids`). Loads are linear in time
-within a segment, and the integrators land on the ends of segments, so a kernel never asks on which side of a kink
-it stands. All arrays are read-only; everything is a run-time value, so a changed case compiles nothing anew.
+n_b bodies have n = 3 n_b coordinates q: what x, y and psi of each have changed by since the start. `ground` is the
+last body, with infinite mass, where a member is tied to it; it is absent otherwise. Members live in blocks of one law
+and one pair of bodies, structure of arrays; blocks are padded to a multiple of the vector width with members of no
+stiffness, and so is each row of a block that joins every point of one grid with every point of another (`scene.grids`).
+Loads are linear in time within a segment, and the integrators land on the ends of segments, so a kernel never asks on
+which side of a kink it stands. All arrays are read-only; everything is a run-time value, so a changed case compiles
+nothing anew.
 """
 
 from typing import NamedTuple

@@ -120,9 +120,7 @@ def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, addin
                         px, py, qx, qy, l0, excess, ks, rel[i // 3 : i // 3 + 1, p], unit[axis : axis + 1], o
                     )
                 else:
-                    viscous_design(
-                        px, py, qx, qy, l0, excess, ks, cs, ps, rel[i // 3, p], unit[axis], o
-                    )
+                    viscous_design(px, py, qx, qy, l0, excess, ks, cs, ps, rel[i // 3, p], unit[axis], o)
             for i in range(first, last):
                 o = fresh[i - first, :wide]
                 for g in range(wide):

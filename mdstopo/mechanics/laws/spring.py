@@ -13,7 +13,8 @@ All kernels return sums over the tile, which is all that anything at body level 
 
 with k, c and preload already multiplied by alpha^mu. A member of zero length has no direction and adds no force.
 
-Delta is no difference of lengths (`elongation`). Member arrays (6, n) are P, Q, l0 and L0^2 - l0^2, L0 the length at home.
+Delta is no difference of lengths (`elongation`). Member arrays (6, n) are P, Q, l0 and its excess: L0^2 - l0^2 of the
+length L0 at home.
 
 Kernels come in two kinds, elastic (no damping, no preload: E_xi = -Q, K symmetric, C absent) and viscous.
 Arguments: member arrays (n,), then the pose r (POSE,).
@@ -62,8 +63,8 @@ def elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-
     """Delta = L - l0 of members with r, r^2, 1/L and u, what r has changed by since home; excess: L0^2 - l0^2.
 
     L^2 - l0^2 = excess + u . (2 r - u) has all digits of u, and one step of Newton's method for
-    Delta (Delta + 2 l0) = L^2 - l0^2 leaves of what L - l0 has lost the square. Where u is longer than r, L itself is the
-    more accurate.
+    Delta (Delta + 2 l0) = L^2 - l0^2 leaves of what L - l0 has lost the square. Where u is longer than r, L itself is
+    the more accurate.
     """
     x = r2 * y - free
     squares = excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))

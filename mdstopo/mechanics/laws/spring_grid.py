@@ -240,8 +240,8 @@ def _work(seen, moved, along, l0, excess, at, close):  # type: ignore[no-untyped
 def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) and sum_e weight_e V_i of each spring to out: f, b at the first poses, V at the others.
 
-    pose (poses, POSE), close (poses,) of `spring.hardly_moved`, u (m, 3), weight (poses - m,). Room: room (rows, poses, 4); turned (poses, 5, lanes) for a, 2 u
-    and u^2 (`moved_columns`).
+    pose (poses, POSE), close (poses,) of `spring.hardly_moved`, u (m, 3), weight (poses - m,). Room: room (rows,
+    poses, 4); turned (poses, 5, lanes) for a, 2 u and u^2 (`moved_columns`).
     """
     rows = room.shape[0]
     many = u.shape[0]
