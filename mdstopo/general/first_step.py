@@ -17,6 +17,7 @@ from mdstopo.integrators.steps import (
     gross_loads,
     largest_turn,
     motion_weights,
+    noise_of,
     rounding_of_pairs,
 )
 from mdstopo.mechanics.geometry import POSE, relative_pose
@@ -56,8 +57,9 @@ def rounding_at_start(model, rel, v, stiffness, strain, noise):  # type: ignore[
 
 
 @kernel
-def motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale):  # type: ignore[no-untyped-def]
-    """scale (n_pair,): what the errors of a pair's motion are measured against, m; rel (n_pair, POSE): where it is.
+def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):  # type: ignore[no-untyped-def]
+    """scale (n_pair,): what the errors of a pair's motion are measured against, m; q (n,), rel (n_pair, POSE): where it
+    is.
 
     motion (n_pair,): how far it has moved so far; noise: what rounding leaves; tolerance: of a step.
     """
@@ -66,7 +68,8 @@ def motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale):  # ty
         scale[p] = max(motion[p], deflection(rel, rel0, reach, p))
         widest = max(widest, scale[p])
     for p in range(pair.shape[0]):
-        scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+        lost = noise_of(pair, noise, rel, reach, q, p)
+        scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
 
 
 @kernel
@@ -99,7 +102,7 @@ def first_step(  # type: ignore[no-untyped-def]
             h *= 0.1
             continue
         relative_pose(model.pair, model.home, q, v, rel)
-        motion_scale(model.pair, rel, rel0, model.reach, motion, noise, tolerance, scale)
+        motion_scale(model.pair, q, rel, rel0, model.reach, motion, noise, tolerance, scale)
         motion_weights(model.pair, rel, model.reach, scale, weight)
         theta = 0.0
         for d in range(n):

@@ -374,7 +374,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 continue
             sigma_end = least_singular_value(model, desk)
             relative_pose(pair, model.home, ends[0], ends[1], rel)
-            motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
+            motion_scale(pair, ends[0], rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
             # beside a singular pose velocities are what joints leave of them, and the step has to reach that pose
             lasting = longest if sigma >= CLOSE * largest else 0.0

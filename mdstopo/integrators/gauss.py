@@ -50,6 +50,7 @@ from mdstopo.integrators.steps import (
     largest_turn,
     lasting,
     motion_weights,
+    noise_of,
     rounding_of_pairs,
     solved_to,
 )
@@ -274,7 +275,8 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                         scale[p] = reached
                         widest = max(widest, reached)
                     for p in range(n_pair):
-                        scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+                        lost = noise_of(pair, noise, rel[0], reach, q[s - 1], p)
+                        scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
                     motion_weights(pair, rel[0], reach, scale, weight)
                 e = balance(
                     pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning,

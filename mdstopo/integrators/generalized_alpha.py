@@ -39,6 +39,7 @@ from mdstopo.integrators.steps import (
     keep_stage,
     keep_state,
     motion_weights,
+    noise_of,
     rounding_of_pairs,
 )
 from mdstopo.mechanics.assembly import forces
@@ -220,7 +221,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                     solve(band, half, pivots, delta)
                     for p in range(n_pair):
                         reached = max(motion[p], deflection(rel[0], rel0, model.reach, p))
-                        scale[p] = max(reached, 1e3 * noise[p])
+                        scale[p] = max(reached, 1e3 * noise_of(pair, noise, rel[0], model.reach, q_now[0], p))
                     motion_weights(pair, rel0, model.reach, scale, weight)
                     e = 0.0
                     for d in range(n):
@@ -235,7 +236,8 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                     # the last clause: rounding is all that is left
                     rounding = 1e-8
                     for p in range(n_pair):
-                        rounding = max(rounding, 100.0 * noise[p] / scale[p])
+                        lost = noise_of(pair, noise, rel[0], model.reach, q_now[0], p)
+                        rounding = max(rounding, 100.0 * lost / scale[p])
                     accepted = e <= newton_tolerance or (e >= 0.5 * previous and e < rounding)
                     previous = e
                     if not accepted and (newton >= MOST or (newton >= RESTART and not e < np.inf)):

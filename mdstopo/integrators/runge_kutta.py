@@ -32,6 +32,7 @@ from mdstopo.integrators.steps import (
     largest_turn,
     lasting,
     motion_weights,
+    noise_of,
     rounding_of_pairs,
 )
 from mdstopo.mechanics.assembly import forces
@@ -241,7 +242,8 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 scale[p] = reached
                 widest = max(widest, reached)
             for p in range(n_pair):
-                scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+                lost = noise_of(pair, noise, rel[0], reach, ends[0], p)
+                scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
             motion_weights(pair, rel[0], reach, scale, weight)
             error = _error(table[2], s, h, longest, a, weight)
             finite = True

@@ -246,6 +246,21 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):  
 
 
 @part
+def noise_of(pair, noise, rel, reach, q, p):  # type: ignore[no-untyped-def]
+    """What rounding leaves uncertain of how far pair p has moved, m, in a state q (n,) with poses rel (n_pair, POSE).
+
+    noise: of `rounding_of_pairs`; and what both bodies have moved together is rounded, too.
+    """
+    a = 3 * pair[p, 0]
+    b = 3 * pair[p, 1]
+    moved = max(abs(q[a]), abs(q[a + 1])) + max(abs(q[b]), abs(q[b + 1]))
+    turned = min(abs(q[a + 2]), 1.0) + min(abs(q[b + 2]), 1.0)
+    if turned > 0.0:
+        moved += turned * (np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p])
+    return noise[p] + 1e-15 * moved
+
+
+@part
 def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
     """How far the bodies of a pair turn against each other between two states (n,), rad, at most."""
     largest = 0.0
