@@ -27,11 +27,16 @@ def _tangent(member, pose, close=True):
 
 @numba.njit
 def _design(member, poses, changes, out):
-    spring.elastic_design(member[0], member[1], member[2], member[3], member[4], member[5], member[6], poses, changes, out)
+    spring.elastic_design(
+        member[0], member[1], member[2], member[3], member[4], member[5], member[6], poses, changes, out
+    )
 
 
 def members(seed, count=COUNT):
-    """Coordinates, free lengths, their excess at home (pose of no shift and turn), stiffness; the last third is padding: no stiffness, both ends at the origin."""
+    """Coordinates, free lengths, their excess at home (a pose of no shift and no turn), stiffness.
+
+    The last third is padding: no stiffness, both ends at the origin.
+    """
     rng = np.random.default_rng(seed)
     member = rng.normal(size=(7, count))
     member[4:] = np.abs(member[4:])
