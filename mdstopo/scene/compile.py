@@ -27,6 +27,7 @@ from mdstopo.scene.model import (
     STIFFNESS,
     STOP,
     VECTOR,
+    WIDTH,
     FloatArray,
     IndexArray,
     Model,
@@ -67,7 +68,7 @@ class Scene:
 
 
 #: share of the longest member by which bodies may have moved for elongations to come from displacements
-NEAR = 0.02
+NEAR = 0.01
 
 
 @dataclass(frozen=True)
@@ -116,8 +117,13 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
 
 
 def _nearness(group: MemberGroup, member: FloatArray, block: list[int]) -> list[float]:
-    """A row of `Model.near`: up to a share of the longest member, in which digits are to be won."""
+    """A row of `Model.near`: up to a share of the longest member, in which digits are to be won.
+
+    In grids, whose kernels do not ask which is shorter, no end has moved by more than half of the shortest member.
+    """
     far = NEAR * float(group.length.max())
+    if block[WIDTH]:
+        far = min(far, 0.25 * float(group.length.min()))
     reach = float(np.hypot(*member[[QX, QY], block[START] : block[STOP]]).max())
     return [far**2, min(far / max(reach, 1e-300), 1.0) ** 2]
 

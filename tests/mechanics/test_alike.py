@@ -40,7 +40,10 @@ def _far(member, before, after):
 
 
 def scene(law, seed=0):
-    """Members (6, COUNT), at home where the relative pose is none, the last six of the block padding; their scales; parameters; a pose with its rate."""
+    """Members (6, COUNT), at home where the relative pose is none; their scales; parameters; a pose with its rate.
+
+    The last six of the block are padding.
+    """
     rng = np.random.default_rng(seed)
     member, scale = rng.normal(size=(6, COUNT)), rng.uniform(0.1, 1.0, COUNT)
     member[4] = np.abs(member[4])

@@ -85,8 +85,8 @@ def apart_at_home(home: FloatArray, first: int, second: int, at_first: Pair, at_
 
 def _size(home: FloatArray, first: int, second: int, joint: Joint) -> float:
     """What rounding of the ends of a joint is measured against, m."""
-    places = [abs(value) for body in (first, second) for value in home[body, :HOME_ANGLE].tolist()]
-    return sum(places) + sum(abs(value) for value in (*joint.at_first, *joint.at_second))
+    places = float(np.abs(home[[first, second], :HOME_ANGLE]).sum())
+    return places + sum(abs(value) for value in (*joint.at_first, *joint.at_second))
 
 
 def describe(joint: Joint) -> str:

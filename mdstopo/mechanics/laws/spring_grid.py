@@ -100,13 +100,13 @@ def moved_columns(qx, qy, i, r):  # type: ignore[no-untyped-def]
 
 @part
 def _stretch(seen, moved, l0, excess, at, close):  # type: ignore[no-untyped-def]
-    """Delta of the members at a place (`spring.elongation`); close: whether the bodies have hardly moved."""
+    """Delta of the members at a place (`spring.elongation`); close: whether bodies have hardly moved, so that u < r."""
     rx, ry, r2, y = seen
     x = r2 * y - l0
     if close:
         twice_x, twice_y, u2 = moved
         squares = (load(excess, at) - u2) + twice_x * rx + twice_y * ry
-        x -= where_larger(r2 - u2, 0.0, 0.5 * y * (x * (r2 * y + l0) - squares))
+        x -= 0.5 * y * (x * (r2 * y + l0) - squares)
     return x
 
 
