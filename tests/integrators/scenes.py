@@ -131,10 +131,10 @@ def figure_3(acceleration=(9.8, 0.0), turn=20.0, end=0.2) -> Scene:
     q0 = np.array([0.0, 0, 0, 0, -1, 0])
     model = Model(
         inv_mass=inv_mass, q0=np.zeros(6), v0=np.zeros(6), home=home_at(q0), pair=np.array([[0, 1]]),
-        reach=np.array([2.1]), shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020, 0, 0]]), power=np.ones(1),
-        near=np.full((1, 2), 0.01), member=member,
-        times=np.array([0.0, end]), force=force, load_body=np.zeros(0, np.int64),
-        load_follows=np.zeros(0, np.int64), load_arm=np.zeros((0, 2)), load_force=np.zeros((1, 0, 2, 2)),
+        reach=np.array([2.1]), shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020, 0, 0]]),
+        power=np.ones(1), near=np.full((1, 2), 0.01), member=member, times=np.array([0.0, end]), force=force,
+        load_body=np.zeros(0, np.int64), load_follows=np.zeros(0, np.int64), load_arm=np.zeros((0, 2)),
+        load_force=np.zeros((1, 0, 2, 2)),
     )  # fmt: skip
     return Scene(model, False, 1020)
 
