@@ -13,6 +13,7 @@ from mdstopo.general.balance import balance
 from mdstopo.integrators.steps import (
     FORCES,
     TURN,
+    add_gross_force,
     deflection,
     gross_loads,
     largest_turn,
@@ -21,6 +22,7 @@ from mdstopo.integrators.steps import (
     rounding_of_pairs,
 )
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.laws.table import ACTUATOR, PULSE, SPRING, TABLE
 
 #: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,
 #: linkages and landings, from 2e-7 to 2e-5 for the second
@@ -31,7 +33,26 @@ PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
 
 
 @kernel
-def rounding_at_start(model, rel, v, stiffness, strain, noise):  # type: ignore[no-untyped-def]
+def unstretched_force(model, k):  # type: ignore[no-untyped-def]
+    """The largest force of a member of block k at unit strength that does not come from its elongation."""
+    code = model.block[k, 3]
+    if code == PULSE:
+        return abs(model.law[k, 0])
+    if code == SPRING:
+        return abs(model.law[k, 2])
+    if code == ACTUATOR:
+        return abs(model.law[k, 0] * model.law[k, 2])
+    most = 0.0
+    if code == TABLE:
+        for segment in range(model.level.shape[0]):
+            start = model.level[segment, k, 0]
+            end = start + (model.times[segment + 1] - model.times[segment]) * model.level[segment, k, 1]
+            most = max(most, abs(start), abs(end))
+    return most
+
+
+@kernel
+def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):  # type: ignore[no-untyped-def]
     """noise (n_pair,) of `rounding_of_pairs`; of pairs with a body that is driven, what is of the size of the pair.
 
     Joints hand forces on, and springs that hold against them may be elsewhere.
@@ -40,6 +61,13 @@ def rounding_at_start(model, rel, v, stiffness, strain, noise):  # type: ignore[
     inverse = np.empty(n)
     load = np.empty(n)
     gross_loads(model, load)
+    for k in range(model.block.shape[0]):
+        force = unstretched_force(model, k)
+        if force > 0.0:
+            total = 0.0
+            for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+                total += strength[0, i]
+            add_gross_force(model.pair, rel, model.reach, model.block[k, 0], force * total, load)
     for d in range(n):
         inverse[d] = 1.0 / model.mass[d] if model.free[d] != 0 else 0.0
     rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise)

@@ -109,7 +109,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         stiffness[p] = desk.sums[p, 7] + desk.sums[p, 11]
         if desk.sums[p, 3] > 0.0 and stiffness[p] > 0.0:
             motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness[p])
-    rounding_at_start(model, rel0, v, stiffness, motion, noise)
+    rounding_at_start(model, strength, rel0, v, stiffness, motion, noise)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
     if not step > 0.0:

@@ -281,7 +281,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         scale[p] = desk.sums[p, 7] + desk.sums[p, 11]
         if desk.sums[p, 3] > 0.0 and scale[p] > 0.0:
             motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / scale[p])  # a pair that starts strained
-    rounding_at_start(model, rel0, v0, scale, motion, noise)
+    rounding_at_start(model, strength, rel0, v0, scale, motion, noise)
     for p in range(n_pair):
         shaken += abs(scale[p]) * noise[p]
     # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0

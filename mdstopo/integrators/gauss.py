@@ -41,6 +41,7 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     TURN,
+    add_preloads,
     carve,
     copy_tangents,
     deflection,
@@ -189,6 +190,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
             motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # a pair that starts strained
     gross_loads(model, load[:n])
+    add_preloads(model, strength, rel0, load)
     rounding_of_pairs(model, inv_mass, rel0, v0, load, scale, motion, noise)
     rate = fastest_rate(pair, inv_mass, k, c, damped, ABOUT)
     last_time = times[times.shape[0] - 1]

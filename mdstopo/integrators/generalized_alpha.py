@@ -34,6 +34,7 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
+    add_preloads,
     deflection,
     gross_loads,
     keep_stage,
@@ -204,6 +205,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                         if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
                             motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # it starts strained
                     gross_loads(model, delta)
+                    add_preloads(model, strength, rel[0], delta)
                     rounding_of_pairs(model, inv_mass, rel[0], v, delta, scale, motion, noise)
                     for p in range(n_pair):
                         for j in range(POSE):

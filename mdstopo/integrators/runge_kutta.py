@@ -24,6 +24,7 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     TURN,
+    add_preloads,
     carve,
     deflection,
     gross_loads,
@@ -208,6 +209,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
         if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
             motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])
     gross_loads(model, weight)
+    add_preloads(model, strength, rel0, weight)
     rounding_of_pairs(model, model.inv_mass, rel0, v0, weight, scale, motion, noise)
     t = times[0]
     last_time = times[times.shape[0] - 1]

@@ -220,6 +220,29 @@ def gross_loads(model, out):  # type: ignore[no-untyped-def]
 
 
 @part
+def add_gross_force(pair, rel, reach, p, force, out):  # type: ignore[no-untyped-def]
+    """out (n,) += a force of any direction between the bodies of pair p, and its moments."""
+    arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
+    for side in range(2):
+        b = 3 * pair[p, side]
+        out[b] += force
+        out[b + 1] += force
+        out[b + 2] += arm * force
+
+
+@part
+def add_preloads(model, strength, rel, out):  # type: ignore[no-untyped-def]
+    """out (n,) += the preloads of all springs, strength (3, M_padded), as gross forces."""
+    for k in range(model.block.shape[0]):
+        total = 0.0
+        if model.block[k, 3] == 1:
+            for i in range(model.block[k, 1], model.block[k, 2]):
+                total += abs(strength[2, i])
+        if total > 0.0:
+            add_gross_force(model.pair, rel, model.reach, model.block[k, 0], total, out)
+
+
+@part
 def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):  # type: ignore[no-untyped-def]
     """noise (n_pair,): what rounding leaves uncertain of how far each pair has moved, m.
 
