@@ -93,6 +93,7 @@ def _followed(
 ) -> FloatArray | None:
     """The equilibrium (n,) of the design `end`, followed from that of `begin`, q; None where it jumps or ends."""
     from mdstopo.general.settle import settle
+
     size, share, step = size_of(case), 0.0, FIRST
     while share < 1.0:
         step = min(step, 1.0 - share)

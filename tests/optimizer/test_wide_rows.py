@@ -109,9 +109,7 @@ def test_learnt_curvature_counts_as_it_does_with_few_variables(h, pairs):
     lines = conic.Lines(problem.offset[:5], problem.pool[:5, free], problem.group[:5])
     norms = conic.Norms(np.zeros((0, 2)), nothing, nothing, np.zeros(0), np.zeros(0, dtype=np.int64))
     row = LinearRows(problem.pool[5:6, free], np.zeros(1), np.ones(1, dtype=np.bool_))
-    expected = conic.solve(
-        conic.Program(low[free], high[free], lines, norms, problem.penalty, row, B.restricted(free))
-    )
+    expected = conic.solve(conic.Program(low[free], high[free], lines, norms, problem.penalty, row, B.restricted(free)))
     d = np.zeros(n)
     d[free] = expected.d
     assert np.abs(found.trial - problem.region.x - d).max() < 1e-4
@@ -232,6 +230,7 @@ def test_very_many_variables_under_two_limits_end_at_the_optimum():
 
 def _least(problem, rounds=1_500):
     """The largest Lagrangian's bound, by the ellipsoid method: no gradients of ours, no solver of ours."""
+
     def at(y):
         q = problem.c + y[0] * problem.a / problem.most[0] + y[1] * problem.b / problem.most[1] + y[2] / (0.4 * N)
         x = np.where(q < 0.0, 1.0, 0.0)

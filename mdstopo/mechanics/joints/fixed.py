@@ -1,6 +1,6 @@
 """The fixed joint: two points coincide, as in the revolute one, and the angle psi_B - psi_A stays theta_0.
 
-Parameters: s_A (2), s_B (2), -, -, theta_0.
+Parameters: those of the revolute joint. theta_0 is the angle at home.
 """
 
 from mdstopo.compiler.jit import kernel
@@ -16,7 +16,7 @@ from mdstopo.mechanics.joints.revolute import (
 def fixed_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     """Phi (3) and its slopes; the angle's are constant, so all else is the revolute joint's."""
     revolute_rows(par, w, phi, jac)
-    phi[2] = w[5] - w[2] - par[6]
+    phi[2] = w[5] - w[2]
     for i in range(6):
         jac[2, i] = 0.0
     jac[2, 2] = -1.0

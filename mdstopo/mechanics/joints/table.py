@@ -1,6 +1,6 @@
 """The joints: what each contributes to the constrained equations, by its code, and its parameters from the case.
 
-w (PLACES,): coordinates of the first and the second body, with the turns of `revolute.turn`; wd, wdd (6,): their time
+w (PLACES,): where the first and the second body are (`revolute.place_joint`); wd, wdd (6,): their time
 derivatives. The equations of motion are
 M a + Phi_q^T lam = F, so the force of a joint on its first body is -Phi_q^T lam.
 """
@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from mdstopo.case.model import DistanceJoint, Joint, PrismaticJoint
+from mdstopo.case.model import DistanceJoint, Joint, Pair, PrismaticJoint
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.joints.distance import (
     distance_acceleration_slopes,
@@ -40,26 +40,53 @@ from mdstopo.mechanics.joints.revolute import (
     revolute_stiffness,
     revolute_velocity_slope,
 )
+from mdstopo.scene.model import HOME_ANGLE, HOME_COS, HOME_X, HOME_Y, FloatArray
 
 REVOLUTE, PRISMATIC, FIXED, DISTANCE = range(4)
 CODES = {"revolute": REVOLUTE, "prismatic": PRISMATIC, "fixed": FIXED, "distance": DISTANCE}
 ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
 WIDTH = 12
+#: misfit of a joint at home, relative to its coordinates, that only rounding has left
+FITTED = 4e-15
 #: what a joint transmits (`joint_transmitted`)
 FORCE, MOMENT, ACROSS = range(3)
 #: slopes of Phi, by row, that are the same wherever the bodies are: columns of either body
 STEADY = {REVOLUTE: ((0, 1), (0, 1)), PRISMATIC: ((), ()), FIXED: ((0, 1), (0, 1), (0, 1, 2)), DISTANCE: ((),)}
 
 
-def parameters(joint: Joint, angle_first: float, angle_second: float) -> list[float]:
-    """The parameter row (WIDTH,) of a joint between bodies that start at these angles (rad)."""
-    row = [*joint.at_first, *joint.at_second, 0.0, 0.0, angle_second - angle_first]
-    row += [0.0] * (WIDTH - len(row))
+def parameters(joint: Joint, home: FloatArray, first: int, second: int) -> list[float]:
+    """The parameter row (WIDTH,) of a joint between two bodies at home (n_body, HOME)."""
+    row = [*joint.at_first, *joint.at_second] + [0.0] * (WIDTH - 4)
+    x, y = apart_at_home(home, first, second, joint.at_first, joint.at_second)
     if isinstance(joint, PrismaticJoint):
         row[4], row[5] = -joint.axis[1], joint.axis[0]
+        c, s = home[first, HOME_COS:].tolist()
+        row[8] = (c * row[4] - s * row[5]) * x + (s * row[4] + c * row[5]) * y
     elif isinstance(joint, DistanceJoint):
         row[7] = joint.length
+        length = math.hypot(x, y)
+        off = (length - joint.length) * (length + joint.length)
+        row[8] = off if abs(length - joint.length) > FITTED * _size(home, first, second, joint) else 0.0
+    else:
+        row[8], row[9] = x, y
     return row
+
+
+def apart_at_home(home: FloatArray, first: int, second: int, at_first: Pair, at_second: Pair) -> list[float]:
+    """The vector between a point of each of two bodies at home, m; what only rounding has left of it is zero."""
+    ends, size = [], 0.0
+    for body, (x, y) in ((first, at_first), (second, at_second)):
+        c, s = home[body, HOME_COS:].tolist()
+        ends.append((home[body, HOME_X] + c * x - s * y, home[body, HOME_Y] + s * x + c * y))
+        size += abs(x) + abs(y) + abs(home[body, HOME_X]) + abs(home[body, HOME_Y])
+    apart = [float(two - one) for one, two in zip(*ends, strict=True)]
+    return [value if abs(value) > FITTED * size else 0.0 for value in apart]
+
+
+def _size(home: FloatArray, first: int, second: int, joint: Joint) -> float:
+    """What rounding of the ends of a joint is measured against, m."""
+    places = float(np.abs(home[[first, second], :HOME_ANGLE]).sum())
+    return places + sum(abs(value) for value in (*joint.at_first, *joint.at_second))
 
 
 def describe(joint: Joint) -> str:
