@@ -214,7 +214,9 @@ class Evaluator:
             if meeting >= 0:
                 status, message = Status.ZERO_LENGTH, self._member(load_case, meeting)
         work = work_named(driver.work.tolist())
-        return Trajectory.of(load_case, self.scenes[load_case].n, steps, status, message, work, self._origin)
+        bodies = next(each.bodies for each in self.case.load_cases if each.name == load_case)
+        home = np.array([value for body in bodies for value in (*body.position, body.angle)])
+        return Trajectory.of(load_case, steps, status, message, work, home)
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`.

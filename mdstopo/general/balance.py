@@ -29,8 +29,8 @@ from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
-from mdstopo.mechanics.geometry import POSE
-from mdstopo.mechanics.joints.revolute import PLACES, revolute_pull
+from mdstopo.mechanics.geometry import POSE, turned_from
+from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_pull
 from mdstopo.mechanics.joints.table import (
     joint_acceleration_slopes,
     joint_gamma,
@@ -111,12 +111,10 @@ def gather(model, j, x, out):  # type: ignore[no-untyped-def]
 @part
 def gather_turned(model, j, q, turned, w):  # type: ignore[no-untyped-def]
     """w (PLACES,) of joint j from q (n,) and the turns of `forces.turn_bodies`."""
-    gather(model, j, q, w)
     one = model.joint[j, 1]
     two = model.joint[j, 2]
-    for i in range(2):
-        w[6 + i] = turned[one, i]
-        w[8 + i] = turned[two, i]
+    turns_one = turned_from(model.home, one, turned[one, 0], turned[one, 1])
+    place_turned(model.home, one, two, q, turns_one, turned_from(model.home, two, turned[two, 0], turned[two, 1]), w)
 
 
 @part

@@ -19,7 +19,8 @@ from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
-from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
+from mdstopo.scene.compile import home_of
+from mdstopo.scene.model import HOME_COS, VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.scene.signals import breakpoints, segment_values
@@ -68,25 +69,25 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     names = (*(body.name for body in case.bodies), GROUND)
     index = {name: i for i, name in enumerate(names)}
     n = 3 * len(names)
-    mass, q0, v0 = np.ones(n), np.zeros(n), np.zeros(n)
+    mass, v0 = np.ones(n), np.zeros(n)
+    home = home_of(load_case, len(names))
     for i, body in enumerate(load_case.bodies):
         mass[3 * i : 3 * i + 3] = body.mass, body.mass, body.inertia
-        q0[3 * i : 3 * i + 3] = *body.position, body.angle
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
     fine = has_coarse_steps(case.solver)
     more = lasting_times(case, fine) + motion_times(load_case)
     times = breakpoints(load_case, more)
-    driven, drive = drives(load_case, times, q0, v0)
+    driven, drive = drives(load_case, times, home[:, :3].ravel(), v0)
     _refuse_impacts(case, load_case, driven, drive, times)
     free = np.ones(n, dtype=np.int64)
     free[-3:] = 0
     free[driven] = 0
 
     pairs: dict[tuple[int, int], int] = {}
-    members = _members(case, index, pairs, times)
-    bushing_pair, bushing = _bushings(case, index, pairs, q0)
-    joint, joint_par = _joints(case, index, pairs, q0)
+    members = _members(case, home if _stands_otherwise(case, load_case) else None, index, pairs, times)
+    bushing_pair, bushing = _bushings(case, index, pairs, home)
+    joint, joint_par = _joints(case, index, pairs, home)
     contact_pair, contact, contact_words = contact_rows(case, index, pairs)
     held = {body for pair in pairs for body in pair}
     for i in range(len(names) - 1):
@@ -98,12 +99,13 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         reach[p] = max(reach[p], float(np.hypot(row[PX], row[PY])))
     force, turning, load_force = _loads(load_case, index, times, n)
     responses, reductions = looked_at(case, load_case.name)
-    response, response_par = _responses(case, responses, index, q0)
-    layout = arrange(case, joint, joint_par, free, mass, q0, pair)
+    response, response_par = _responses(case, responses, index)
+    layout = arrange(case, joint, joint_par, free, mass, home, pair)
     _refuse_redundant(case, load_case, layout.redundant)
     damped = _damped(case, responses, reductions)
     model = GeneralModel(
-        free=free, mass=mass, q0=q0, v0=v0, pair=pair, reach=reach, **members, times=times, force=force,
+        free=free, mass=mass, q0=np.zeros(n), v0=v0, home=home, pair=pair, reach=reach, **members, times=times,
+        force=force,
         load_body=np.array([index[load.body] for load in turning], dtype=np.int64),
         load_follows=np.array([load.frame == "body" for load in turning], dtype=np.int64),
         load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
@@ -159,10 +161,33 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...
         raise CaseError(mistakes, str(case.path or case.name))
 
 
-def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], times: FloatArray) -> dict[str, Any]:
+def _stands_otherwise(case: Case, load_case: LoadCase) -> bool:
+    """Whether a motion makes the bodies of a load case start elsewhere than members were measured."""
+    places = ([(*body.position, body.angle) for body in bodies] for bodies in (case.bodies, load_case.bodies))
+    return next(places) != next(places)
+
+
+def _lengths_at(home: FloatArray, one: int, two: int, p_local: FloatArray, q_local: FloatArray) -> FloatArray:
+    """Lengths (M,) of members between points (M, 2) of two bodies at home."""
+    ends = []
+    for body, points in ((one, p_local), (two, q_local)):
+        x, y, _, c, s = home[body]
+        ends.append(np.array([x, y]) + points @ np.array([[c, s], [-s, c]]))
+    between = ends[1] - ends[0]
+    return np.asarray(np.hypot(between[:, 0], between[:, 1]))
+
+
+def _members(
+    case: Case,
+    home: FloatArray | None,
+    index: dict[str, int],
+    pairs: dict[tuple[int, int], int],
+    times: FloatArray,
+) -> dict[str, Any]:
     """Blocks of one law each: a group with a list of laws has as many, which share its design variables.
 
-    A law of which each member has a parameter of its own has a block for each member.
+    A law of which each member has a parameter of its own has a block for each member. home: where bodies stand if not
+    where the lengths of members were measured.
     """
     blocks, powers, rows, active, level, columns = [], [], [], [], [], []
     curves: list[float] = []
@@ -171,6 +196,9 @@ def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int
     for number, group in enumerate(case.members):
         first_body, second_body, p_local, q_local = ends_of(group)
         pair = pairs.setdefault((index[first_body], index[second_body]), len(pairs))
+        length = group.length
+        if home is not None:
+            length = _lengths_at(home, index[first_body], index[second_body], p_local, q_local)
         for place, record in enumerate(group.laws):
             rest = getattr(record, "free_length", None)
             kernels, code = laws.kernels_of(type(record)), laws.code_of(type(record))
@@ -182,9 +210,10 @@ def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int
             for part in parts:
                 count = len(part)
                 padded = -(-count // VECTOR) * VECTOR
-                member = np.zeros((5, padded))
+                member = np.zeros((6, padded))
                 member[0:2, :count], member[2:4, :count] = p_local[part].T, q_local[part].T
                 member[4, :count] = group.length[part] if rest is None else rest
+                member[5, :count] = (length[part] - member[4, :count]) * (length[part] + member[4, :count])
                 variable = first + int(part[0]) if group.design else -1
                 blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0])])
                 rows.append(laws.parameters(record, curves))
@@ -200,25 +229,27 @@ def _members(case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int
         "active": np.array(active, dtype=np.int64).reshape(-1, segments).T.copy(),
         "level": np.array(level, dtype=np.float64).reshape(-1, segments, 2).transpose(1, 0, 2).copy(),
         "power": np.array(powers, dtype=np.float64),
-        "member": np.concatenate(columns, axis=1) if columns else np.zeros((5, 0)),
+        "member": np.concatenate(columns, axis=1) if columns else np.zeros((6, 0)),
         "curves": np.array(curves, dtype=np.float64),
     }
 
 
 def _bushings(
-    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], q0: FloatArray
+    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], home: FloatArray
 ) -> tuple[IndexArray, FloatArray]:
     where, rows = [], []
     for bushing in case.bushings:
         a, b = (index[name] for name in bushing.bodies)
         where.append(pairs.setdefault((a, b), len(pairs)))
-        angle = q0[3 * b + 2] - q0[3 * a + 2]
-        rows.append([*bushing.at_first, *bushing.at_second, angle, *bushing.stiffness, *bushing.damping])
-    return np.array(where, dtype=np.int64), np.array(rows, dtype=np.float64).reshape(-1, 11)
+        apart = joints.apart_at_home(home, a, b, bushing.at_first, bushing.at_second)
+        c, s = home[a, HOME_COS:]
+        x, y = c * apart[0] + s * apart[1], c * apart[1] - s * apart[0]
+        rows.append([*bushing.at_first, *bushing.at_second, x, y, *bushing.stiffness, *bushing.damping])
+    return np.array(where, dtype=np.int64), np.array(rows, dtype=np.float64).reshape(-1, 12)
 
 
 def _joints(
-    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], q0: FloatArray
+    case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], home: FloatArray
 ) -> tuple[IndexArray, FloatArray]:
     codes, rows = [], []
     for joint in case.joints:
@@ -226,7 +257,7 @@ def _joints(
         pair = pairs.setdefault((a, b), len(pairs))
         kind = type(joint)
         codes.append([joints.code_of(kind), a, b, pair, joints.kernels_of(kind).rows])
-        rows.append(joints.parameters(joint, float(q0[3 * a + 2]), float(q0[3 * b + 2])))
+        rows.append(joints.parameters(joint, home, a, b))
     return (
         np.array(codes, dtype=np.int64).reshape(-1, 5),
         np.array(rows, dtype=np.float64).reshape(-1, joints.WIDTH),
@@ -279,16 +310,13 @@ def _loads(
     return force, turning, load_force
 
 
-def _responses(
-    case: Case, responses: tuple[Response, ...], index: dict[str, int], q0: FloatArray
-) -> tuple[IndexArray, FloatArray]:
+def _responses(case: Case, responses: tuple[Response, ...], index: dict[str, int]) -> tuple[IndexArray, FloatArray]:
     codes, rows = [], []
     groups = [group.name for group in case.members]
     named = [joint.name for joint in case.joints]
     for response in responses:
         record = kind_of(response)
         code = responses_of.code_of(record)
-        kernels = responses_of.LISTED[code]
         body = index[response.body or GROUND]
         reference = index[response.relative_to or GROUND]
         component = COMPONENTS[response.component or "norm"]
@@ -300,9 +328,7 @@ def _responses(
             if joints.kernels_of(type(case.joints[subject])).force_rows < 2:  # along a line there is no norm
                 component = COMPONENTS["x"]
         codes.append([code, body, reference, component, record.order, subject])
-        row = list(response.numbers)
-        if kernels.row is not None:
-            row = list(kernels.row(response, q0[3 * body : 3 * body + 3], q0[3 * reference : 3 * reference + 3]))
+        row = [*(response.at_local or ()), *response.numbers]
         rows.append(row + [0.0] * (4 - len(row)))
     return np.array(codes, dtype=np.int64).reshape(-1, 6), np.array(rows, dtype=np.float64).reshape(-1, 4)
 

@@ -8,8 +8,6 @@ the edge's first end and u its direction or normal. With rows B_u = dh_u/dq and 
 where H_u = d2h_u/dq2 has the angles' terms only. The mode of contact j stands in `strength` behind those of members.
 """
 
-import math
-
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
@@ -20,6 +18,7 @@ from mdstopo.mechanics.contact import (
     contact_margin_slopes,
     contact_next,
 )
+from mdstopo.mechanics.geometry import turned_body
 
 
 @kernel
@@ -29,16 +28,15 @@ def contact_rows(model, j, q, v, rows, rates):  # type: ignore[no-untyped-def]
     c = model.contact[j]
     a = 3 * model.pair[p, 0]
     b = 3 * model.pair[p, 1]
-    ca = math.cos(q[a + 2])
-    sa = math.sin(q[a + 2])
-    cb = math.cos(q[b + 2])
-    sb = math.sin(q[b + 2])
+    home = model.home
+    ca, sa, _, _ = turned_body(home, a // 3, q[a + 2])
+    cb, sb, _, _ = turned_body(home, b // 3, q[b + 2])
     qx = cb * c[4] - sb * c[5]
     qy = sb * c[4] + cb * c[5]
     wa = v[a + 2]
     wb = v[b + 2]
-    zx = q[b] - q[a] + qx
-    zy = q[b + 1] - q[a + 1] + qy
+    zx = home[b // 3, 0] - home[a // 3, 0] + (q[b] - q[a]) + qx
+    zy = home[b // 3, 1] - home[a // 3, 1] + (q[b + 1] - q[a + 1]) + qy
     vx = v[b] - v[a] - wb * qy
     vy = v[b + 1] - v[a + 1] + wb * qx
     for i in range(2):
@@ -100,12 +98,13 @@ def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):  # type: igno
         uy = n * rows[1, 4] + t * rows[0, 4]
         a = 3 * model.pair[p, 0]
         b = 3 * model.pair[p, 1]
-        cb = math.cos(q[b + 2])
-        sb = math.sin(q[b + 2])
+        cb, sb, _, _ = turned_body(model.home, b // 3, q[b + 2])
         qx = cb * c[4] - sb * c[5]
         qy = sb * c[4] + cb * c[5]
         lever = ux * qx + uy * qy
-        k[2, 2] += ux * (q[b] - q[a] + qx) + uy * (q[b + 1] - q[a + 1] + qy)
+        zx = model.home[b // 3, 0] - model.home[a // 3, 0] + (q[b] - q[a]) + qx
+        zy = model.home[b // 3, 1] - model.home[a // 3, 1] + (q[b + 1] - q[a + 1]) + qy
+        k[2, 2] += ux * zx + uy * zy
         k[2, 5] -= lever
         k[5, 2] -= lever
         k[5, 5] += lever

@@ -491,7 +491,7 @@ class GeneralSteps:
 
             jac = np.zeros((len(model.joint), 3, 6))
             for k in range(len(q)):
-                slopes_of(model.joint, model.joint_par, q[k].copy(), np.zeros((len(model.joint), 3)), jac)
+                slopes_of(model.joint, model.joint_par, model.home, q[k].copy(), np.zeros((len(model.joint), 3)), jac)
                 dense = np.zeros((len(places), len(model.mass)))
                 for i, (j, r) in enumerate(places):
                     for c in range(6):
@@ -514,5 +514,5 @@ class GeneralSteps:
         full = np.zeros((len(q), len(model.mass)))
         full[:, : q.shape[1]] = q
         out = np.zeros((len(q), len(model.joint), 3))
-        reactions(model.joint, model.joint_par, row, full, np.ascontiguousarray(lam), out)
+        reactions(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
         return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}

@@ -33,16 +33,19 @@ def motion_times(load_case: LoadCase) -> list[float]:
     return times
 
 
-def drives(load_case: LoadCase, times: FloatArray, q0: FloatArray, v0: FloatArray) -> tuple[IndexArray, FloatArray]:
-    """Driven coordinates (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,)."""
+def drives(load_case: LoadCase, times: FloatArray, home: FloatArray, v0: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """Driven coordinates (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,).
+
+    What is driven is the change since home (n,).
+    """
     parts = list(prescribed(load_case))
     cubics = np.zeros((len(times) - 1, len(parts), 4))
     for i, (d, _, part) in enumerate(parts):
         if part.kind == "position":
-            cubics[:, i] = _spline_cubics(part.signal, times)
+            cubics[:, i] = _spline_cubics(part.signal, times, float(home[d]))
             continue
         values = segment_values(part.signal, times)
-        position, velocity = float(q0[d]), float(v0[d])
+        position, velocity = 0.0, float(v0[d])
         for k in range(len(times) - 1):
             value, slope = values[k]
             if part.kind == "acceleration":
@@ -56,10 +59,10 @@ def drives(load_case: LoadCase, times: FloatArray, q0: FloatArray, v0: FloatArra
     return np.array([d for d, _, _ in parts], dtype=np.int64), cubics
 
 
-def _spline_cubics(signal: object, times: FloatArray) -> FloatArray:
-    """The not-a-knot spline of a table of positions in every segment, whose ends hold all its knots."""
+def _spline_cubics(signal: object, times: FloatArray, home: float) -> FloatArray:
+    """The not-a-knot spline of a table of positions, less that at home, in every segment; their ends hold all knots."""
     assert isinstance(signal, Table)
-    t, x = signal.times, signal.values[:, 0]
+    t, x = signal.times, signal.values[:, 0] - home
     m = slopes(t, x)
     out = np.empty((len(times) - 1, 4))
     for k in range(len(times) - 1):

@@ -16,14 +16,15 @@ import math
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import inline, kernel
 from mdstopo.general.contact import contact_switch
-from mdstopo.general.members import direction, stretch_of
+from mdstopo.general.members import direction, stretch_of, stretched
 from mdstopo.general.model import INERTER
 from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import deflection
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
-from mdstopo.mechanics.geometry import relative_pose
+from mdstopo.mechanics.geometry import relative_pose, turned_body
+from mdstopo.mechanics.laws.spring import elongation_of
 from mdstopo.mechanics.laws.table import (
     law_grazes,
     law_has_pieces,
@@ -63,7 +64,7 @@ def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-d
         for i in range(lo, lo + model.block[k, 5]):
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i] - strength[2, i]
+            x = stretched(model.member, i, r, length) - strength[2, i]
             s = law_margin(code, model.law[k], x, rate, int(strength[1, i]), model.curves)
             if s < best:
                 best = s
@@ -100,7 +101,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             r = rel0[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i] - strength[2, i]
+            x = stretched(model.member, i, r, length) - strength[2, i]
             s0 = law_margin(code, model.law[k], x, rate, mode, model.curves)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
@@ -109,7 +110,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
             r = rel1[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i] - strength[2, i]
+            x = stretched(model.member, i, r, length) - strength[2, i]
             s1 = law_margin(code, model.law[k], x, rate, mode, model.curves)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
@@ -203,13 +204,13 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
     for part in range(1, parts + 1):
         c = part / parts
         if part == parts:
-            relative_pose(model.pair, q1, v1, rel)
+            relative_pose(model.pair, model.home, q1, v1, rel)
         else:
             a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
             for d in range(n):
                 q[d] = a0 * q0[d] + a1 * q1[d] + h * (b0 * v0[d] + b1 * v1[d])
                 v[d] = (da0 * q0[d] + da1 * q1[d]) / h + db0 * v0[d] + db1 * v1[d]
-            relative_pose(model.pair, q, v, rel)
+            relative_pose(model.pair, model.home, q, v, rel)
             margin, _ = smallest_margin(model, segment, strength, rel)
             if margin < -noise:
                 return c, near
@@ -225,23 +226,41 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
     return 2.0, near
 
 
-@kernel
-def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-def]
-    """Delta, dDelta/dt, B (6,) and dB/dt (6,) of member i over the coordinates of its pair p."""
-    a = 3 * model.pair[p, 0]
-    b = 3 * model.pair[p, 1]
+@inline
+def member_between(model, i, one, two, q, turn_one, turn_two):  # type: ignore[no-untyped-def]
+    """The arms p and q of member i of two bodies in global axes, its vector, its length and Delta.
+
+    turn_one, turn_two: of `turned_body`.
+    """
     m = model.member
-    ca = math.cos(q[a + 2])
-    sa = math.sin(q[a + 2])
-    cb = math.cos(q[b + 2])
-    sb = math.sin(q[b + 2])
+    ca, sa, ca_since, sa_since = turn_one
+    cb, sb, cb_since, sb_since = turn_two
+    a = 3 * one
+    b = 3 * two
     px = ca * m[0, i] - sa * m[1, i]
     py = sa * m[0, i] + ca * m[1, i]
     qx = cb * m[2, i] - sb * m[3, i]
     qy = sb * m[2, i] + cb * m[3, i]
-    ux = q[b] + qx - q[a] - px
-    uy = q[b + 1] + qy - q[a + 1] - py
-    length = math.sqrt(ux * ux + uy * uy)
+    wx = q[b] - q[a]
+    wy = q[b + 1] - q[a + 1]
+    x = model.home[two, 0] - model.home[one, 0] + wx + qx - px
+    y = model.home[two, 1] - model.home[one, 1] + wy + qy - py
+    ux = wx + (cb_since * m[2, i] - sb_since * m[3, i]) - (ca_since * m[0, i] - sa_since * m[1, i])
+    uy = wy + (sb_since * m[2, i] + cb_since * m[3, i]) - (sa_since * m[0, i] + ca_since * m[1, i])
+    length = math.sqrt(x * x + y * y)
+    return px, py, qx, qy, x, y, length, elongation_of(x, y, length, ux, uy, m[4, i], m[5, i])
+
+
+@kernel
+def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-def]
+    """Delta, dDelta/dt, B (6,) and dB/dt (6,) of member i over the coordinates of its pair p."""
+    one = model.pair[p, 0]
+    two = model.pair[p, 1]
+    a = 3 * one
+    b = 3 * two
+    turn_one = turned_body(model.home, one, q[a + 2])
+    turn_two = turned_body(model.home, two, q[b + 2])
+    px, py, qx, qy, ux, uy, length, stretch = member_between(model, i, one, two, q, turn_one, turn_two)
     y = 1.0 / length if length > 1e-15 else 0.0
     ex = ux * y
     ey = uy * y
@@ -264,7 +283,7 @@ def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-de
     row_rate[3] = fx
     row_rate[4] = fy
     row_rate[5] = fy * qx - fx * qy - wb * (ex * qx + ey * qy)
-    return length - m[4, i], rate
+    return stretch, rate
 
 
 @kernel

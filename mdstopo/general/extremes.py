@@ -24,6 +24,8 @@ FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LAST = len(FRACTIONS) - 1
 #: values or rates that differ by less than this, relative to the largest, differ by rounding
 ROUNDING = 1e-13
+#: rate, relative to the largest, that is none beside a step whose rate is one: a plateau's, which only rounding tilts
+FLAT = 1e-9
 #: peaks nearer than this in time (relative to what was simulated) and value are one
 RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 
@@ -183,9 +185,15 @@ def _boundaries(samples: Samples, g: FloatArray, d: FloatArray, limit: float, si
     ends[-1] = True
     starts = np.zeros(m + 1, dtype=bool)
     starts[0] = True
-    from_left = (g_left >= limit) & (d_left > 0.0) & (ends | (d_right <= 0.0) | (jump & (g_right < g_left)))
+    flat = FLAT * float(np.abs(d).max())
+    level_right, level_left = (d_left > flat) & (d_right <= flat), (d_right < -flat) & (d_left >= -flat)
+    from_left = (
+        (g_left >= limit) & (d_left > 0.0) & (ends | (d_right <= 0.0) | level_right | (jump & (g_right < g_left)))
+    )
     from_left[0] = False
-    from_right = (g_right >= limit) & (d_right < 0.0) & (starts | (d_left >= 0.0) | (jump & (g_left < g_right)))
+    from_right = (
+        (g_right >= limit) & (d_right < 0.0) & (starts | (d_left >= 0.0) | level_left | (jump & (g_left < g_right)))
+    )
     from_right[-1] = False
     # where both sides have one peak in common, it is one
     from_right &= ~(from_left & ~(jump & (g_right > g_left)))

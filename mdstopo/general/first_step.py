@@ -10,8 +10,19 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.balance import balance
-from mdstopo.integrators.steps import FORCES, TURN, deflection, largest_turn, motion_weights
+from mdstopo.integrators.steps import (
+    FORCES,
+    TURN,
+    add_gross_force,
+    deflection,
+    gross_loads,
+    largest_turn,
+    motion_weights,
+    noise_of,
+    rounding_of_pairs,
+)
 from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.laws.table import law_is_given, law_unstretched
 
 #: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,
 #: linkages and landings, from 2e-7 to 2e-5 for the second
@@ -22,8 +33,55 @@ PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
 
 
 @kernel
-def motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale):  # type: ignore[no-untyped-def]
-    """scale (n_pair,): what the errors of a pair's motion are measured against, m; rel (n_pair, POSE): where it is.
+def unstretched_force(model, k):  # type: ignore[no-untyped-def]
+    """The largest force of a member of block k at unit strength that does not come from its elongation."""
+    code = model.block[k, 3]
+    most = law_unstretched(code, model.law[k])
+    if law_is_given(code):
+        for segment in range(model.level.shape[0]):
+            start = model.level[segment, k, 0]
+            end = start + (model.times[segment + 1] - model.times[segment]) * model.level[segment, k, 1]
+            most = max(most, abs(start), abs(end))
+    return most
+
+
+@kernel
+def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):  # type: ignore[no-untyped-def]
+    """noise (n_pair,) of `rounding_of_pairs`; of pairs with a body that is driven, what is of the size of the pair.
+
+    Joints hand forces on, and springs that hold against them may be elsewhere.
+    """
+    n = v.shape[0]
+    inverse = np.empty(n)
+    load = np.empty(n)
+    gross_loads(model, load)
+    for k in range(model.block.shape[0]):
+        force = unstretched_force(model, k)
+        if force > 0.0:
+            total = 0.0
+            for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+                total += strength[0, i]
+            add_gross_force(model.pair, rel, model.reach, model.block[k, 0], force * total, load)
+    for d in range(n):
+        inverse[d] = 1.0 / model.mass[d] if model.free[d] != 0 else 0.0
+    rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise)
+    most = 0.0
+    for p in range(noise.shape[0]):
+        most = max(most, noise[p])
+    for p in range(noise.shape[0]):
+        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + model.reach[p]
+        driven = False
+        for side in range(2):
+            body = model.pair[p, side]
+            for axis in range(3):
+                driven = driven or (body + 1 < n // 3 and model.free[3 * body + axis] == 0)
+        noise[p] = 1e-15 * arm if driven else min(max(noise[p], most), 1e-15 * arm + 1e-300)
+
+
+@kernel
+def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):  # type: ignore[no-untyped-def]
+    """scale (n_pair,): what the errors of a pair's motion are measured against, m; q (n,), rel (n_pair, POSE): where it
+    is.
 
     motion (n_pair,): how far it has moved so far; noise: what rounding leaves; tolerance: of a step.
     """
@@ -32,7 +90,8 @@ def motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale):  # ty
         scale[p] = max(motion[p], deflection(rel, rel0, reach, p))
         widest = max(widest, scale[p])
     for p in range(pair.shape[0]):
-        scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+        lost = noise_of(pair, noise, rel, reach, q, p)
+        scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
 
 
 @kernel
@@ -64,8 +123,8 @@ def first_step(  # type: ignore[no-untyped-def]
         if singular >= 0 or not finite:
             h *= 0.1
             continue
-        relative_pose(model.pair, q, v, rel)
-        motion_scale(model.pair, rel, rel0, model.reach, motion, noise, tolerance, scale)
+        relative_pose(model.pair, model.home, q, v, rel)
+        motion_scale(model.pair, q, rel, rel0, model.reach, motion, noise, tolerance, scale)
         motion_weights(model.pair, rel, model.reach, scale, weight)
         theta = 0.0
         for d in range(n):

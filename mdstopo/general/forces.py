@@ -14,29 +14,25 @@ from mdstopo.general.contact import add_contacts
 from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.general.switches import APART, DAMPED
-from mdstopo.mechanics.angles import cos_sin
+from mdstopo.mechanics.angles import small_turn
 from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangent
-from mdstopo.mechanics.geometry import add_pair_force, fill_pose
+from mdstopo.mechanics.geometry import add_pair_force, fill_pose, turned_body
 from mdstopo.mechanics.passes import FIRST_TANGENT, SUMS
 
 
 @part
 def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
-    """turned (n_body, 2) = cos and sin of every body's angle: pairs and joints share them."""
+    """turned (n_body, 2) = cos - 1 and sin of the angle that every body has turned by: pairs and joints share them."""
     for b in range(turned.shape[0]):
-        turned[b, 0], turned[b, 1] = cos_sin(q[3 * b + 2])
+        turned[b, 0], turned[b, 1] = small_turn(q[3 * b + 2])
 
 
 @part
-def turned_pose(pair, p, turned, q, v, rel):  # type: ignore[no-untyped-def]
+def turned_pose(model, p, turned, q, v, rel):  # type: ignore[no-untyped-def]
     """`mechanics.geometry.relative_pose` of pair p, of bodies that are turned by `turn_bodies`."""
-    one = pair[p, 0]
-    two = pair[p, 1]
-    ca = turned[one, 0]
-    sa = turned[one, 1]
-    cb = turned[two, 0]
-    sb = turned[two, 1]
-    fill_pose(pair, p, q, v, ca, sa, ca * cb + sa * sb, ca * sb - sa * cb, rel)
+    one = model.pair[p, 0]
+    two = model.pair[p, 1]
+    fill_pose(model.pair, p, model.home, q, v, turned[one, 0], turned[one, 1], turned[two, 0], turned[two, 1], rel)
 
 
 @kernel
@@ -69,33 +65,33 @@ def add_bushings(model, rel, q, tangent, sums):  # type: ignore[no-untyped-def]
         o = sums[p]
         ax = r[2] * b[2] - r[3] * b[3]
         ay = r[3] * b[2] + r[2] * b[3]
-        ux = r[0] + ax - b[0]
-        uy = r[1] + ay - b[1]
+        ux = b[4] + r[10] + (r[12] * b[2] - r[13] * b[3])
+        uy = b[5] + r[11] + (r[13] * b[2] + r[12] * b[3])
         wx = r[4] - ay * r[6]
         wy = r[5] + ax * r[6]
-        fx = b[5] * ux + b[8] * wx
-        fy = b[6] * uy + b[9] * wy
-        turn = q[3 * model.pair[p, 1] + 2] - q[3 * model.pair[p, 0] + 2] - b[4]
+        fx = b[6] * ux + b[9] * wx
+        fy = b[7] * uy + b[10] * wy
+        turn = q[3 * model.pair[p, 1] + 2] - q[3 * model.pair[p, 0] + 2]
         o[0] -= fx
         o[1] -= fy
-        o[2] -= ax * fy - ay * fx + b[7] * turn + b[10] * r[6]
+        o[2] -= ax * fy - ay * fx + b[8] * turn + b[11] * r[6]
         if not tangent:
             continue
         # g = d(u)/dxi = [I, (-ay, ax)]; K = g^T k g + g^T c d(w)/dxi + (d2u/dtheta2 . f), C = g^T c g
-        kxt = -b[5] * ay - b[8] * ax * r[6]
-        kyt = b[6] * ax - b[9] * ay * r[6]
-        o[7] += b[5]
+        kxt = -b[6] * ay - b[9] * ax * r[6]
+        kyt = b[7] * ax - b[10] * ay * r[6]
+        o[7] += b[6]
         o[9] += kxt
-        o[11] += b[6]
+        o[11] += b[7]
         o[12] += kyt
-        o[13] -= ay * b[5]
-        o[14] += ax * b[6]
-        o[15] += ax * kyt - ay * kxt - (ax * fx + ay * fy) + b[7]
-        o[16] += b[8]
-        o[18] += b[9]
-        o[19] -= b[8] * ay
-        o[20] += b[9] * ax
-        o[21] += b[8] * ay * ay + b[9] * ax * ax + b[10]
+        o[13] -= ay * b[6]
+        o[14] += ax * b[7]
+        o[15] += ax * kyt - ay * kxt - (ax * fx + ay * fy) + b[8]
+        o[16] += b[9]
+        o[18] += b[10]
+        o[19] -= b[9] * ay
+        o[20] += b[10] * ax
+        o[21] += b[9] * ay * ay + b[10] * ax * ax + b[11]
 
 
 @kernel
@@ -122,16 +118,16 @@ def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):  # type: ignore[
     In global axes: u = x_B + R_B q - x_A - R_A p, L' = e . u', L'' = e . u'' + (|u'|^2 - L'^2)/L.
     """
     m = model.member
-    ca = math.cos(q[a_body + 2])
-    sa = math.sin(q[a_body + 2])
-    cb = math.cos(q[b_body + 2])
-    sb = math.sin(q[b_body + 2])
+    ca, sa, _, _ = turned_body(model.home, a_body // 3, q[a_body + 2])
+    cb, sb, _, _ = turned_body(model.home, b_body // 3, q[b_body + 2])
+    home_x = model.home[b_body // 3, 0] - model.home[a_body // 3, 0]
+    home_y = model.home[b_body // 3, 1] - model.home[a_body // 3, 1]
     px = ca * m[0, i] - sa * m[1, i]
     py = sa * m[0, i] + ca * m[1, i]
     qx = cb * m[2, i] - sb * m[3, i]
     qy = sb * m[2, i] + cb * m[3, i]
-    ux = q[b_body] + qx - q[a_body] - px
-    uy = q[b_body + 1] + qy - q[a_body + 1] - py
+    ux = home_x + (q[b_body] - q[a_body]) + qx - px
+    uy = home_y + (q[b_body + 1] - q[a_body + 1]) + qy - py
     length = math.sqrt(ux * ux + uy * uy)
     if length < 1e-15:
         row[:] = 0.0
@@ -209,10 +205,10 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):  # ty
         ia = 3 * model.pair[pair, 0]
         ib = 3 * model.pair[pair, 1]
         m = model.member
-        ca = math.cos(q[ia + 2])
-        sa = math.sin(q[ia + 2])
-        cb = math.cos(q[ib + 2])
-        sb = math.sin(q[ib + 2])
+        ca, sa, _, _ = turned_body(model.home, ia // 3, q[ia + 2])
+        cb, sb, _, _ = turned_body(model.home, ib // 3, q[ib + 2])
+        home_x = model.home[ib // 3, 0] - model.home[ia // 3, 0]
+        home_y = model.home[ib // 3, 1] - model.home[ia // 3, 1]
         wa = v[ia + 2]
         wb = v[ib + 2]
         ra = a[ia + 2]
@@ -222,8 +218,8 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):  # ty
             py = sa * m[0, i] + ca * m[1, i]
             qx = cb * m[2, i] - sb * m[3, i]
             qy = sb * m[2, i] + cb * m[3, i]
-            ux = q[ib] + qx - q[ia] - px
-            uy = q[ib + 1] + qy - q[ia + 1] - py
+            ux = home_x + (q[ib] - q[ia]) + qx - px
+            uy = home_y + (q[ib + 1] - q[ia + 1]) + qy - py
             length = math.sqrt(ux * ux + uy * uy)
             if length < 1e-15:
                 continue
@@ -306,7 +302,7 @@ def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: i
     turn_bodies(q, desk.turned)
     for p in range(pair.shape[0]):
         if carries[p] != 0:
-            turned_pose(pair, p, desk.turned, q, v, rel)
+            turned_pose(model, p, desk.turned, q, v, rel)
             for i in range(SUMS if tangent else FIRST_TANGENT):
                 sums[p, i] = 0.0
     general_sums(model, segment, t, strength, rel, tangent, sums)
@@ -322,7 +318,7 @@ def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: i
         c = desk.c
         for p in range(pair.shape[0]):
             if carries[p] != 0:
-                pair_tangent(pair, p, rel, q, sums, damped, k, c)
+                pair_tangent(p, rel, sums, damped, k, c)
             elif desk.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0

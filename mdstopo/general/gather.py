@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import block_design, rate_of_row
+from mdstopo.general.members import block_design, rate_of_row, stretched
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
@@ -63,7 +63,7 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type
     for j in range(count):
         for p in range(n_pair):
             if carries[p] != 0:
-                turned_pose(model.pair, p, turned[j], stage[j, 0], stage[j, 1], rel[j])
+                turned_pose(model, p, turned[j], stage[j, 0], stage[j, 1], rel[j])
                 _virtual(model.pair, rel[j], p, z[j], u[j, p])
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
@@ -73,7 +73,7 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type
         lo = model.block[k, 1]
         if code == SPRING and weight == 0.0 and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
             width = model.member.shape[1]
-            rows = model.member.reshape(5 * width)
+            rows = model.member.reshape(6 * width)
             stop = lo + whole_vectors(model.block[k, 5])
             elastic_designs(rows, width, lo, stop, model.law[k, 0], rel, u, p, out)
             continue
@@ -130,7 +130,7 @@ def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):  # type
     """out (M_padded,) += scale times the force of each law of a member at unit strength."""
     row = np.empty(6)
     rel = np.empty((model.pair.shape[0], POSE))
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
             continue
@@ -155,6 +155,6 @@ def _unit_force(model, k, i, segment, t, r, strength):  # type: ignore[no-untype
     length = np.sqrt(x * x + y * y)
     rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
     value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    stretch = length - model.member[4, i] - strength[2, i]
+    stretch = stretched(model.member, i, r, length) - strength[2, i]
     f, _, _, _, _ = law(model.block[k, 3], model.law[k], stretch, rate, int(strength[1, i]), t, value, model.curves)
     return f

@@ -16,6 +16,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
+from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.forces import drive_state
 from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
@@ -99,15 +100,16 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
-    relative_pose(model.pair, q, v, rel0)
+    relative_pose(model.pair, model.home, q, v, rel0)
     extent = np.zeros((2, n_pair))
     motion = extent[0]
     noise = extent[1]
+    stiffness = np.empty(n_pair)
     for p in range(n_pair):
-        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + model.reach[p]) + 1e-300
-        stiffness = desk.sums[p, 7] + desk.sums[p, 11]
-        if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)
+        stiffness[p] = desk.sums[p, 7] + desk.sums[p, 11]
+        if desk.sums[p, 3] > 0.0 and stiffness[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness[p])
+    rounding_at_start(model, strength, rel0, v, stiffness, motion, noise)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
     if not step > 0.0:
@@ -174,7 +176,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if code != OK:
                 where[0] = singular
                 return code, count, events, t
-            relative_pose(model.pair, ends[0], ends[1], rel)
+            relative_pose(model.pair, model.home, ends[0], ends[1], rel)
             happens = False
             who = nowhere
             if switching:
@@ -187,8 +189,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 copy_state(ends, beyond[0])
                 copy_state(state, left)
                 while top >= 0:  # as `runge_kutta.simulate` does
-                    relative_pose(model.pair, left[0], left[1], before)
-                    relative_pose(model.pair, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model.pair, model.home, left[0], left[1], before)
+                    relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     dip, near = first_sign(
                         model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
                         cut[top] - low, rounding,
@@ -212,7 +214,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     if code != OK:
                         where[0] = singular
                         return code, count, events, t
-                    relative_pose(model.pair, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     value, near_who = smallest_margin(model, segment, strength, rel)
                     if value < -rounding:
                         high = middle
@@ -221,7 +223,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         break
                     if value < graze and matters(model, strength, rel, near_who):
                         where[2] = near_who
-                relative_pose(model.pair, left[0], left[1], before)
+                relative_pose(model.pair, model.home, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
                     at_low, _ = smallest_margin(model, segment, strength, before)
@@ -240,7 +242,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         if code != OK:
                             where[0] = singular
                             return code, count, events, t
-                        relative_pose(model.pair, trial[0], trial[1], rel)
+                        relative_pose(model.pair, model.home, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, strength, rel)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
@@ -251,7 +253,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         model, tables[0], strength, segment, t, h, starting, state, guess, newton_tolerance, size,
                         stages, desk, track, ends, push, extent, rel0, work,
                     )  # fmt: skip
-                relative_pose(model.pair, ends[0], ends[1], rel)
+                relative_pose(model.pair, model.home, ends[0], ends[1], rel)
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
@@ -260,7 +262,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, model.reach, p))
             if where[1] < 0:
-                relative_pose(model.pair, q, v, before)
+                relative_pose(model.pair, model.home, q, v, before)
                 where[1] = meeting(model, segment, t, strength, before, rel)
             done += 1.0
             known += 1

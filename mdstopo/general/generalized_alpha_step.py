@@ -19,6 +19,7 @@ from mdstopo.integrators.steps import (
     TANGENTS,
     deflection,
     motion_weights,
+    noise_of,
 )
 
 
@@ -156,10 +157,11 @@ def advance(  # type: ignore[no-untyped-def]
         solve_unknowns(model, desk, delta, row)
         rounding = 1e-8
         for p in range(model.pair.shape[0]):
-            turned_pose(model.pair, p, desk.turned, q, v, desk.rel)
+            turned_pose(model, p, desk.turned, q, v, desk.rel)
             reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
-            scale[p] = max(reached, 1e3 * extent[1, p])
-            rounding = max(rounding, 100.0 * extent[1, p] / scale[p])
+            lost = noise_of(model.pair, extent[1], desk.rel, model.reach, q, p)
+            scale[p] = max(reached, 1e3 * lost)
+            rounding = max(rounding, 100.0 * lost / scale[p])
         motion_weights(model.pair, rel0, model.reach, scale, weight)
         e = 0.0
         for d in range(n):

@@ -43,7 +43,7 @@ def arrange(
     joint_par: FloatArray,
     free: IndexArray,
     mass: FloatArray,
-    q0: FloatArray,
+    home: FloatArray,
     pair: IndexArray,
 ) -> Layout:
     """Which rows are solved, and every order."""
@@ -51,7 +51,7 @@ def arrange(
     redundant: list[str] = []
     columns: list[list[int]] = []
     if len(joint):
-        jac = _slopes(joint, joint_par, q0)
+        jac = _slopes(joint, joint_par, home)
         kept: list[FloatArray] = []
         for j, (_, a, b, _, rows) in enumerate(joint.tolist()):
             coordinates = [*range(3 * a, 3 * a + 3), *range(3 * b, 3 * b + 3)]
@@ -94,11 +94,11 @@ def arrange(
     )  # fmt: skip
 
 
-def _slopes(joint: IndexArray, joint_par: FloatArray, q0: FloatArray) -> FloatArray:
+def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray) -> FloatArray:
     from mdstopo.general.start_entry import slopes_of
 
     jac = np.zeros((len(joint), 3, 6))
-    slopes_of(joint, joint_par, q0, np.zeros((len(joint), 3)), jac)
+    slopes_of(joint, joint_par, home, np.zeros(3 * len(home)), np.zeros((len(joint), 3)), jac)
     return jac
 
 

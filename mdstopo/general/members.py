@@ -12,12 +12,14 @@ Blocks of springs, which neither switch nor remember, take the vectors of `mecha
 
 import math
 
+import numpy as np
+
 from mdstopo.compiler.jit import inline, kernel, part
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.general.model import INERTER
 from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
 from mdstopo.mechanics.laws.alike import alike_damping, alike_design, alike_sums, alike_tangent, far
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent, elongation_of
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
@@ -53,10 +55,22 @@ def direction(member, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
 
 
 @inline
+def stretched(member, i, r, length):  # type: ignore[no-untyped-def]
+    """Delta of member i, which has a length at the relative pose r (POSE,)."""
+    x = member[2, i]
+    y = member[3, i]
+    rx = r[0] + (r[2] * x - r[3] * y) - member[0, i]
+    ry = r[1] + (r[3] * x + r[2] * y) - member[1, i]
+    ux = r[10] + (r[12] * x - r[13] * y)
+    uy = r[11] + (r[13] * x + r[12] * y)
+    return elongation_of(rx, ry, length, ux, uy, member[4, i], member[5, i])
+
+
+@inline
 def stretch_of(member, i, r):  # type: ignore[no-untyped-def]
     """Delta and dDelta/dt of member i at the relative pose r (POSE,)."""
     length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
-    return length - member[4, i], bx * r[4] + by * r[5] + bt * r[6]
+    return stretched(member, i, r, length), bx * r[4] + by * r[5] + bt * r[6]
 
 
 @part
@@ -91,7 +105,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
             continue
         rate = bx * vx + by * vy + bt * vt
         scale = strength[0, i]
-        x = length - member[4, i] - strength[2, i]
+        x = stretched(member, i, r, length) - strength[2, i]
         f, fd, fr, energy, pull = law(code, p, x, rate, int(strength[1, i]), t, value, curves)
         f *= scale
         o[0] -= f * bx
@@ -152,11 +166,11 @@ def add_springs(model, k, strength, r, tangent, o):  # type: ignore[no-untyped-d
             if p[1] != 0.0:
                 alike_damping(rows, width, scale, start, stop, p, r, o)
     elif tangent:
-        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r)
+        x, y, t, e, kxx, kxy, kyy, kxt, kyt, ktt = elastic_tangent(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
         add_tangent((c * kxx, c * kxy, c * kyy, c * kxt, c * kyt, c * ktt), o)
     else:
-        x, y, t, e = elastic_force(rows, width, scale, start, stop, r)
+        x, y, t, e = elastic_force(rows, width, scale, start, stop, r, np.bool_(True))
         add_forces((c * x, c * y, c * t, c * e), counted, o)
 
 
@@ -190,7 +204,7 @@ def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
             second = second_rate(model.member, i, r, acc)
-            x = length - model.member[4, i]
+            x = stretched(model.member, i, r, length)
             whole = law_has_pieces(code) and (not knots or model.block[k, 5] > KNOTTED)
             strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
@@ -240,7 +254,7 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
     if code == SPRING:
         width = member.shape[1]
         stop = lo + whole_vectors(model.block[k, 5])
-        alike_design(member.reshape(5 * width), width, lo, stop, p, r, u, weight, out)
+        alike_design(member.reshape(6 * width), width, lo, stop, p, r, u, weight, out)
         return
     curves = model.curves
     tau = t - model.times[segment]
@@ -250,7 +264,7 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
         if length == 0.0:
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
-        x = length - member[4, i] - strength[2, i]
+        x = stretched(member, i, r, length) - strength[2, i]
         f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, curves)
         out[i] += f * (bx * u[0] + by * u[1] + bt * u[2]) + weight * energy
 

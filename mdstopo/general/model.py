@@ -1,6 +1,7 @@
 """A general scene as arrays, and the same arrays packed for the way into compiled code.
 
-Bodies are those of the case as declared, ground after them; n = 3 bodies coordinates q = (x, y, psi) each. A
+Bodies are those of the case as declared, ground after them; n = 3 bodies coordinates q, what (x, y, psi) of each
+has changed by since home. A
 coordinate is free, or driven: known as a cubic of time within each segment; ground is driven and stands still. Rows of
 joints are solved together with the accelerations (`balance`); rows that others imply are left out there.
 """
@@ -11,7 +12,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.structures import bundle
-from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.model import HOME, FloatArray, IndexArray
 
 #: columns of `GeneralModel.block`; code -1 is an inerter. A block has all members of a group, or where each has a
 #: parameter of its own one of them, which is number OFFSET of the group
@@ -30,7 +31,8 @@ class GeneralModel(NamedTuple):
     ============  ================  =====================================================================
     free          (n,) 0 or 1       whether a coordinate is an unknown
     mass          (n,)              m, m, J of each body (1 for ground)
-    q0, v0        (n,)              state at the start
+    q0, v0        (n,)              state at the start: what the bodies have moved since home, and velocities
+    home          (n / 3, 5)        where they stand by the case (`scene.model.Model`)
     pair          (n_pair, 2)       the two bodies of each pair that members, joints or bushings connect
     reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
     block         (n_block, 8)      pair, start, stop (padded), code of the law, first design variable, count, group,
@@ -39,12 +41,13 @@ class GeneralModel(NamedTuple):
     active        (n_seg, n_block)  whether the law acts during a segment
     level         (n_seg, n_block, 2)   a tabulated force at the segment's start, and its slope
     power         (n_block,)        mu of Eq. 12
-    member        (5, M_padded)     P, Q in body frames; free length
+    member        (6, M_padded)     P, Q in body frames; free length l0; L^2 - l0^2 of the length L at home
     curves        (any,)            what `curve` laws read
     times         (n_seg + 1,)      start, everything that has a kink in time, end
     force         (n_seg, n, 2)     generalised load at the segment's start, slope in time; with gravity
     load_*                          loads that depend on the body's rotation, as in `scene.model.Model`
-    bushing_pair  (n_bushing,)      and `bushing` (n_bushing, 11): P, Q, angle at rest, stiffness, damping
+    bushing_pair  (n_bushing,)      and `bushing` (n_bushing, 12): P, Q, its stretch at home,
+                                    stiffness, damping
     driven        (n_driven,)       coordinates that are driven
     drive         (n_seg, n_driven, 4)   their positions in a segment, powers of the time since its start
     joint         (n_joint, 5)      code, first and second body, pair, rows; `joint_par` (n_joint, 12)
@@ -60,7 +63,7 @@ class GeneralModel(NamedTuple):
     product       (n_product, 3)    what that matrix is made of: an entry, and two slopes by the same coordinate whose
                                     product, over its mass, belongs there
     steady        (size[3],)        what else it is made of: products of slopes that never change
-    response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point, its place at the start
+    response      (n_resp, 6)       see the columns above; `response_par` (n_resp, 4): point
     contact_pair  (n_contact,)      the pair of edge and point; `contact` (n_contact, 11): see `mechanics.contact`
     varied        (n_varied, 4)     parameters that vary: block, place (`mechanics.laws.table`), which value, and
                                     whether it is a time that stands exactly at the start (the end); rising by value
@@ -71,6 +74,7 @@ class GeneralModel(NamedTuple):
     mass: FloatArray
     q0: FloatArray
     v0: FloatArray
+    home: FloatArray
     pair: IndexArray
     reach: FloatArray
     block: IndexArray
@@ -186,6 +190,8 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     q0 = floats[n : 2 * n]
     v0 = floats[2 * n : 3 * n]
     f = 3 * n
+    home = floats[f : f + n // 3 * HOME].reshape((n // 3, HOME))
+    f += n // 3 * HOME
     reach = floats[f : f + n_pair]
     f += n_pair
     law = floats[f : f + 8 * n_block].reshape((n_block, 8))
@@ -194,8 +200,8 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     f += 2 * n_seg * n_block
     power = floats[f : f + n_block]
     f += n_block
-    member = floats[f : f + 5 * padded].reshape((5, padded))
-    f += 5 * padded
+    member = floats[f : f + 6 * padded].reshape((6, padded))
+    f += 6 * padded
     curves = floats[f : f + n_curve]
     f += n_curve
     times = floats[f : f + n_seg + 1]
@@ -206,8 +212,8 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     f += 2 * n_load
     load_force = floats[f : f + 4 * n_seg * n_load].reshape((n_seg, n_load, 2, 2))
     f += 4 * n_seg * n_load
-    bushing = floats[f : f + 11 * n_bush].reshape((n_bush, 11))
-    f += 11 * n_bush
+    bushing = floats[f : f + 12 * n_bush].reshape((n_bush, 12))
+    f += 12 * n_bush
     drive = floats[f : f + 4 * n_seg * n_driven].reshape((n_seg, n_driven, 4))
     f += 4 * n_seg * n_driven
     joint_par = floats[f : f + 12 * n_joint].reshape((n_joint, 12))
@@ -218,7 +224,7 @@ def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
     f += 4 * n_resp
     contact = floats[f : f + 11 * n_contact].reshape((n_contact, 11))
     return ModelView(
-        free, mass, q0, v0, pair, reach, block, law, active, level, power, member, curves, times, force, load_body,
-        load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row, place, size,
-        line, envelope, product, steady, response, response_par, contact_pair, contact, varied,
+        free, mass, q0, v0, home, pair, reach, block, law, active, level, power, member, curves, times, force,
+        load_body, load_follows, load_arm, load_force, bushing_pair, bushing, driven, drive, joint, joint_par, row,
+        place, size, line, envelope, product, steady, response, response_par, contact_pair, contact, varied,
     )  # fmt: skip

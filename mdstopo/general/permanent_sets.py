@@ -19,7 +19,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.events import member_rows
-from mdstopo.general.members import direction
+from mdstopo.general.members import direction, stretched
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.table import (
@@ -68,7 +68,7 @@ def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no
     """out (slots,) += what the sets do to the forces at a state with virtual displacement z (n,), and to weight V."""
     rel = np.empty((model.pair.shape[0], POSE))
     u = np.empty(3)
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     slot = 0
     for k in range(model.block.shape[0]):
         if not law_remembers(model.block[k, 3]):
@@ -82,7 +82,9 @@ def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no
             if model.active[segment, k] != 0:
                 length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
                 if length > 0.0:
-                    force, stored = set_slopes(model, k, i, strength, length - model.member[4, i] - strength[2, i], 0.0)
+                    force, stored = set_slopes(
+                        model, k, i, strength, stretched(model.member, i, r, length) - strength[2, i], 0.0
+                    )
                     out[slot] += energy * stored - force * (bx * u[0] + by * u[1] + bt * u[2])
             slot += 1
 

@@ -67,11 +67,14 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
         none[:] = 0.0
     last = np.inf
     worst = np.inf
+    moved = 0.0  # since home: misfits are known to a share of it
+    for b in range(0, n, 3):
+        moved = max(moved, abs(q[b]), abs(q[b + 1]), min(abs(q[b + 2]), 1.0) * scale)
     for _ in range(MOST):
         turn_bodies(q, desk.turned)
         joint_state(model, q, v, desk)
         worst = misfit(model, desk.phi, which)
-        if worst <= 1e-15 * scale or not worst < last:
+        if worst <= 1e-15 * min(moved, scale) or not worst < last:
             break
         last = worst
         singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))

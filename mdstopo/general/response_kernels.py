@@ -2,7 +2,8 @@
 
 A kernel takes what it needs of the following, in any order, by these names:
 
-    model, j          the scene's arrays (`general.model`), and which of its responses it is
+    model, j          the scene's arrays (`general.model`), and which of its responses it is; `model.response_par[j]`
+                      has the point in body coordinates, then `Response.numbers`, four at most
     strength, segment (`general.members`), the stretch of time between two breakpoints
     who               of a response of members the member that is looked at
     t, q, v, a, lam   a state whose balance has just been made: time, coordinates, velocities, accelerations (n,),
@@ -11,13 +12,11 @@ A kernel takes what it needs of the following, in any order, by these names:
     bars, row_bar     (3, n) slopes by q, v, a and (n_row,) by lam: zero before, added to
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from mdstopo.case.aims import Response
 from mdstopo.compiler.kernel import Kernel
-from mdstopo.scene.model import FloatArray
 
 Function = Kernel | Callable[..., Any]
 
@@ -39,8 +38,6 @@ class ResponseKernels:
     """A response g(q, v, a, lam).
 
     value: g_j, with its slopes added to bars and row_bar.
-    row (response, body, reference): up to four numbers for `model.response_par`, from the poses (3,) at the start of
-    the body and of the one that it is seen from; None: `Response.numbers`.
     vector: of a component or a norm. absolute: whether it is an absolute value, or a largest one, which has kinks.
     needs_balance: whether it needs a, lam or the desk; where not, its order (`ResponseKind`) says of how many
     derivatives of the motion it is. by_state: whether its rate is g_q v + g_v a where the motion has the derivatives
@@ -48,7 +45,6 @@ class ResponseKernels:
     """
 
     value: Function
-    row: Callable[[Response, FloatArray, FloatArray], Sequence[float]] | None = None
     vector: VectorKernels | None = None
     absolute: bool = False
     needs_balance: bool = True

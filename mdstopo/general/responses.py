@@ -5,30 +5,26 @@ multipliers are at hand. Of each kind there is a record, `ResponseKernels`; the 
 """
 
 import importlib
-import math
-from collections.abc import Sequence
 
 import numpy as np
 
-from mdstopo.case.aims import Response
 from mdstopo.case.responses import RESPONSES, ResponseKind
 from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.balance import balance, gather, gather_multipliers
+from mdstopo.general.balance import balance, gather_multipliers
 from mdstopo.general.duties import beside, derivatives
-from mdstopo.general.events import member_rows
+from mdstopo.general.events import member_between, member_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.model import INERTER, GeneralModel
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
-from mdstopo.mechanics.geometry import add_pair_force
-from mdstopo.mechanics.joints.revolute import PLACES, turn
+from mdstopo.mechanics.geometry import add_pair_force, turned_body
+from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
 from mdstopo.mechanics.joints.table import FORCE, MOMENT, joint_transmitted
 from mdstopo.mechanics.laws.table import law
 from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
 from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
-from mdstopo.scene.model import FloatArray
 
 #: the kernels of responses by their code, column KIND of `GeneralModel.response`; `enter` fills it, at the end
 LISTED: Listed[ResponseKernels] = Listed()
@@ -107,19 +103,18 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  
 def group_forces(model, strength, segment, t, group, q, v, a, out):  # type: ignore[no-untyped-def]
     """out (M,) = f* of all members of a group: that of `member_force`, to the bit, without slopes."""
     row = np.empty(6)
-    member = model.member
     out[:] = 0.0
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != group or model.active[segment, k] == 0:
             continue
-        one = 3 * model.pair[model.block[k, 0], 0]
-        two = 3 * model.pair[model.block[k, 0], 1]
-        ca = math.cos(q[one + 2])
-        sa = math.sin(q[one + 2])
-        cb = math.cos(q[two + 2])
-        sb = math.sin(q[two + 2])
-        wa = v[one + 2]
-        wb = v[two + 2]
+        one = model.pair[model.block[k, 0], 0]
+        two = model.pair[model.block[k, 0], 1]
+        a_body = 3 * one
+        b_body = 3 * two
+        turn_one = turned_body(model.home, one, q[a_body + 2])
+        turn_two = turned_body(model.home, two, q[b_body + 2])
+        wa = v[a_body + 2]
+        wb = v[b_body + 2]
         value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
         first = model.block[k, 7] - model.block[k, 1]
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
@@ -127,18 +122,12 @@ def group_forces(model, strength, segment, t, group, q, v, a, out):  # type: ign
             if model.block[k, 3] == INERTER:
                 out[first + i] += scale * inerter_force(model, k, i, q, v, a, row)
                 continue
-            px = ca * member[0, i] - sa * member[1, i]
-            py = sa * member[0, i] + ca * member[1, i]
-            qx = cb * member[2, i] - sb * member[3, i]
-            qy = sb * member[2, i] + cb * member[3, i]
-            ux = q[two] + qx - q[one] - px
-            uy = q[two + 1] + qy - q[one + 1] - py
-            length = math.sqrt(ux * ux + uy * uy)
+            px, py, qx, qy, ux, uy, length, stretch = member_between(model, i, one, two, q, turn_one, turn_two)
             y = 1.0 / length if length > 1e-15 else 0.0
-            dx = v[two] - wb * qy - v[one] + wa * py
-            dy = v[two + 1] + wb * qx - v[one + 1] - wa * px
+            dx = v[b_body] - wb * qy - v[a_body] + wa * py
+            dy = v[b_body + 1] + wb * qx - v[a_body + 1] - wa * px
             rate = ux * y * dx + uy * y * dy
-            x = length - member[4, i] - strength[2, i]
+            x = stretch - strength[2, i]
             f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
             out[first + i] += scale * f
 
@@ -250,16 +239,24 @@ def _motion(model, j, component, q, v, a, bars):  # type: ignore[no-untyped-def]
     slope = np.empty((6, 3))
     b = 3 * model.response[j, 1]
     r = 3 * model.response[j, 2]
-    par = model.response_par[j]
     order = model.response[j, 4]
     if _is_vector(model.response[j, 0]):
         value = point_response(
-            order, component, par[0:2], par[2:4], q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3],
-            v[r : r + 3], a[r : r + 3], slope,
+            order, component, model.response_par[j], model.home[b // 3], model.home[r // 3], q[b : b + 3], v[b : b + 3],
+            a[b : b + 3], q[r : r + 3], v[r : r + 3], a[r : r + 3], slope,
         )  # fmt: skip
     else:
         value = angle_response(
-            order, q[b : b + 3], v[b : b + 3], a[b : b + 3], q[r : r + 3], v[r : r + 3], a[r : r + 3], slope
+            order,
+            model.home[b // 3],
+            model.home[r // 3],
+            q[b : b + 3],
+            v[b : b + 3],
+            a[b : b + 3],
+            q[r : r + 3],
+            v[r : r + 3],
+            a[r : r + 3],
+            slope,
         )
     for i in range(3):
         for c in range(3):
@@ -276,8 +273,7 @@ def _transmitted(model, j, which, q, lam, bars, row_bar):  # type: ignore[no-unt
     mine = np.empty(3)
     by_lam = np.empty(3)
     by_q = np.empty(6)
-    gather(model, joint, q, w)
-    turn(w)
+    place_joint(model.home, model.joint[joint, 1], model.joint[joint, 2], q, w)
     gather_multipliers(model, joint, lam, mine)
     value = joint_transmitted(model.joint[joint, 0], model.joint_par[joint], w, mine, which, by_lam, by_q)
     for r in range(3):
@@ -478,18 +474,9 @@ def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, la
 # Records
 
 
-def point_row(response: Response, body: FloatArray, reference: FloatArray) -> Sequence[float]:
-    """The point in body coordinates, and where the observer sees it at the start."""
-    point = np.array(response.at_local or (0.0, 0.0))
-    turn = np.array([[np.cos(body[2]), -np.sin(body[2])], [np.sin(body[2]), np.cos(body[2])]])
-    back = np.array([[np.cos(reference[2]), np.sin(reference[2])], [-np.sin(reference[2]), np.cos(reference[2])]])
-    return [*point, *(back @ (body[:2] + turn @ point - reference[:2]))]
-
-
 OF_ENERGY = ResponseKernels(value=energy_value, by_state=True)
 OF_POINT = ResponseKernels(
     value=motion_value,
-    row=point_row,
     vector=VectorKernels(across=motion_across, components=motion_components),
     needs_balance=False,
     by_state=True,

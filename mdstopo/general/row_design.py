@@ -10,7 +10,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.compiler.vector import lanes
 from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import direction, rate_of_row
+from mdstopo.general.members import direction, rate_of_row, stretched
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.switches import carriers
@@ -39,7 +39,7 @@ def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work
             turn_bodies(stage[0], turned)
         for p in range(n_pair):
             if carries[p] != 0:
-                turned_pose(model.pair, p, turned, stage[0], stage[1], rel[j])
+                turned_pose(model, p, turned, stage[0], stage[1], rel[j])
                 for m in range(count):
                     pair_displacement(model.pair, rel[j], p, z[m, j], u[m, j, p])
                     for i in range(3):
@@ -58,7 +58,7 @@ def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work
             width = model.member.shape[1]
             stop = lo + whole_vectors(model.block[k, 5])
             own = model.law[k]
-            member = model.member.reshape(5 * width)
+            member = model.member.reshape(6 * width)
             if own[1] == 0.0 and own[2] == 0.0:
                 elastic_designs_of_rows(member, width, lo, stop, own[0], rel, u, p, room, out)
             else:
@@ -88,7 +88,7 @@ def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):  # type: igno
         f = 0.0
         if length > 0.0:
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = length - model.member[4, i] - strength[2, i]
+            x = stretched(model.member, i, r, length) - strength[2, i]
             f, _, _, _, _ = law(model.block[k, 3], p, x, rate, int(strength[1, i]), t, value, model.curves)
         seen[0, e] = f
         seen[1, e] = bx

@@ -11,7 +11,7 @@ from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.balance import balance, make_desk
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
-from mdstopo.general.first_step import first_step, motion_scale
+from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
 from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
 from mdstopo.general.members import meeting, scale_general, set_modes
@@ -122,8 +122,8 @@ def scene_size(model):  # type: ignore[no-untyped-def]
     size = 0.0
     for p in range(model.reach.shape[0]):
         size = max(size, model.reach[p])
-    for d in range(0, model.q0.shape[0], 3):
-        size = max(size, abs(model.q0[d]), abs(model.q0[d + 1]))
+    for b in range(model.home.shape[0]):
+        size = max(size, abs(model.home[b, 0]), abs(model.home[b, 1]))
     return size if size > 0.0 else 1.0
 
 
@@ -136,7 +136,7 @@ def start_modes(model, strength, desk, q, v, a, lam, knots):  # type: ignore[no-
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, POSE))
     second = np.zeros((n_pair, 3))
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     for attempt in range(2):
         set_modes(model, strength, rel, second, knots)
         if attempt == 0:
@@ -158,7 +158,7 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
     n = q.shape[0]
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, POSE))
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     done = 0
     while True:
         margin, who = smallest_margin(model, segment, strength, rel)
@@ -272,17 +272,18 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     largest = sigma
     way = np.inf  # until the joints repeat each other
     must = True
-    relative_pose(pair, q0, v0, rel0)
+    relative_pose(pair, model.home, q0, v0, rel0)
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
     shaken = 0.0
     for p in range(n_pair):
-        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
-        stiffness = desk.sums[p, 7] + desk.sums[p, 11]
-        shaken += abs(stiffness) * noise[p]
-        if desk.sums[p, 3] > 0.0 and stiffness > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness)  # a pair that starts strained
+        scale[p] = desk.sums[p, 7] + desk.sums[p, 11]
+        if desk.sums[p, 3] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / scale[p])  # a pair that starts strained
+    rounding_at_start(model, strength, rel0, v0, scale, motion, noise)
+    for p in range(n_pair):
+        shaken += abs(scale[p]) * noise[p]
     # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0
     events = np.int64(0)
     if switching:
@@ -372,8 +373,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 work[REJECTED] += 1
                 continue
             sigma_end = least_singular_value(model, desk)
-            relative_pose(pair, ends[0], ends[1], rel)
-            motion_scale(pair, rel, rel0, reach, motion, noise, tolerance, scale)
+            relative_pose(pair, model.home, ends[0], ends[1], rel)
+            motion_scale(pair, ends[0], rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
             # beside a singular pose velocities are what joints leave of them, and the step has to reach that pose
             lasting = longest if sigma >= CLOSE * largest else 0.0
@@ -424,8 +425,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 copy_vector(q0, left[0])
                 copy_vector(v0, left[1])
                 while top >= 0:
-                    relative_pose(pair, left[0], left[1], before)
-                    relative_pose(pair, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(pair, model.home, left[0], left[1], before)
+                    relative_pose(pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     dip, near = first_sign(
                         model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
                         cut[top] - low, rounding,
@@ -445,7 +446,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
                         track, beyond[top], push, size, work,
                     )  # fmt: skip
-                    relative_pose(pair, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     value, near_who = smallest_margin(model, segment, strength, rel)
                     if value < -rounding:
                         high = middle
@@ -454,7 +455,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         break
                     if value < graze and matters(model, strength, rel, near_who):
                         where[2] = near_who
-                relative_pose(pair, left[0], left[1], before)
+                relative_pose(pair, model.home, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
                     at_low, _ = smallest_margin(model, segment, strength, before)
@@ -469,7 +470,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
                             track, trial, push, size, work,
                         )  # fmt: skip
-                        relative_pose(pair, trial[0], trial[1], rel)
+                        relative_pose(pair, model.home, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, strength, rel)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
@@ -481,7 +482,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         track, ends, push, size, work,
                     )  # fmt: skip
                     sigma_end = least_singular_value(model, desk)
-                relative_pose(pair, ends[0], ends[1], rel)
+                relative_pose(pair, model.home, ends[0], ends[1], rel)
             largest = max(largest, sigma_end)
             way = way_to_pose(h, sigma, sigma_end, largest)
             sigma = sigma_end
@@ -489,7 +490,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             for p in range(n_pair):
                 motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
             if where[1] < 0:
-                relative_pose(pair, q0, v0, before)
+                relative_pose(pair, model.home, q0, v0, before)
                 where[1] = meeting(model, segment, t, strength, before, rel)
             happened = events
             t = end if lands else t + h

@@ -40,7 +40,8 @@ FREE = 1e-9
 class Settled:
     """An equilibrium.
 
-    q (n,); inverse (n, n): dq = inverse dF. moved: how far the centre of a body has gone at most, m, and whose it is;
+    q (n,): what the bodies have moved since home.
+    inverse (n, n): dq = inverse dF. moved: how far the centre of a body has gone at most, m, and whose it is;
     turned: the same of angles, rad.
     """
 

@@ -21,7 +21,7 @@ def rest(model, alpha, strength, q, v):  # type: ignore[no-untyped-def]
     v[:] = 0.0
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, POSE))
-    relative_pose(model.pair, q, v, rel)
+    relative_pose(model.pair, model.home, q, v, rel)
     set_modes(model, strength, rel, np.zeros((n_pair, 3)), np.bool_(True))
 
 

@@ -9,19 +9,16 @@ from mdstopo.general.members import scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.projection import project
 from mdstopo.general.runge_kutta import scene_size, start_modes
-from mdstopo.mechanics.joints.revolute import PLACES, turn
+from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
 
 
 @entry
-def slopes_of(joint, joint_par, q, phi, jac):  # type: ignore[no-untyped-def]
-    """phi (n_joint, 3) and jac (n_joint, 3, 6) of joints (n_joint, 5) with joint_par (n_joint, 12) at q (n,)."""
+def slopes_of(joint, joint_par, home, q, phi, jac):  # type: ignore[no-untyped-def]
+    """phi (n_joint, 3), jac (n_joint, 3, 6) of joints (n_joint, 5) with joint_par (n_joint, 12) at q (n,) from home."""
     w = np.empty(PLACES)
     for j in range(joint.shape[0]):
-        for i in range(3):
-            w[i] = q[3 * joint[j, 1] + i]
-            w[3 + i] = q[3 * joint[j, 2] + i]
-        turn(w)
+        place_joint(home, joint[j, 1], joint[j, 2], q, w)
         joint_rows(joint[j, 0], joint_par[j], w, phi[j], jac[j])
 
 
@@ -46,17 +43,15 @@ def assemble(ints, floats, q, v, move, phi, rates):  # type: ignore[no-untyped-d
 
 
 @entry
-def reactions(joint, joint_par, row, q, lam, out):  # type: ignore[no-untyped-def]
+def reactions(joint, joint_par, home, row, q, lam, out):  # type: ignore[no-untyped-def]
     """out (T, n_joint, 3) = Fx, Fy, M of each joint on its first body at states q (T, n) with lam (T, n_row)."""
     w = np.empty(PLACES)
     mine = np.empty(3)
     for k in range(q.shape[0]):
         for j in range(joint.shape[0]):
             for i in range(3):
-                w[i] = q[k, 3 * joint[j, 1] + i]
-                w[3 + i] = q[k, 3 * joint[j, 2] + i]
                 mine[i] = lam[k, row[j, i]] if row[j, i] >= 0 else 0.0
-            turn(w)
+            place_joint(home, joint[j, 1], joint[j, 2], q[k], w)
             joint_reaction(joint[j, 0], joint[j, 4], joint_par[j], w, mine, out[k, j])
 
 

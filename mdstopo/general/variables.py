@@ -112,7 +112,10 @@ class Placing:
                 law[k] = laws.parameters(now, [])
             if "free_length" in changed:
                 first = int(model.block[k, START])
-                member[4, first : first + int(model.block[k, COUNT])] = changed["free_length"]
+                part, free = slice(first, first + int(model.block[k, COUNT])), changed["free_length"]
+                was = member[4, part].copy()
+                member[4, part] = free
+                member[5, part] += (was - free) * (was + free)
             if changed.keys() & with_role(type(now), "is_time"):
                 times |= {t for t in laws.landings(now, self._fine) if start < t < end}
                 begin = -np.inf if now.active_from is None else now.active_from

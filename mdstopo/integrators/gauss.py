@@ -41,14 +41,18 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     TURN,
+    add_preloads,
     carve,
     copy_tangents,
     deflection,
+    gross_loads,
     keep_stage,
     keep_state,
     largest_turn,
     lasting,
     motion_weights,
+    noise_of,
+    rounding_of_pairs,
     solved_to,
 )
 from mdstopo.mechanics.assembly import add_loads, forces
@@ -68,8 +72,8 @@ FIRST_LEVEL = 0
 #: radians of the fastest vibration that the first window may span, so that the sweeps contract
 LONGEST = 6.0
 #: the first pass is made in single precision from this Newton tolerance on, where the bodies move by that share of
-#: their size (over the share that `noise` is)
-ROUGH_TOLERANCE, ROUGH = 1e-7, 0.05 / 1e-15
+#: their distance and reach
+ROUGH_TOLERANCE, ROUGH = 1e-7, 0.05
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
 SLOW = 0.26
 MOST_CAUTIOUS = 100.0
@@ -182,10 +186,12 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         f_base[d] = f[0, d]
     add_loads(model, np.int64(0), t, q0, load_base)
     for p in range(n_pair):
-        stiffness = sums[0, p, 7] + sums[0, p, 11]
-        if sums[0, p, 3] > 0.0 and stiffness > 0.0:
-            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # a pair that starts strained
-        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
+        scale[p] = sums[0, p, 7] + sums[0, p, 11]
+        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # a pair that starts strained
+    gross_loads(model, load[:n])
+    add_preloads(model, strength, rel0, load)
+    rounding_of_pairs(model, inv_mass, rel0, v0, load, scale, motion, noise)
     rate = fastest_rate(pair, inv_mass, k, c, damped, ABOUT)
     last_time = times[times.shape[0] - 1]
     span = last_time - t
@@ -236,11 +242,11 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 hv0[d] = h * v0[d]
             # nothing has moved yet: what the start's forces alone would do is the scale of the prediction
             integrate_to_nodes(planes[2], s, s, h * h, q0, hv0, planes[0, 0], a, q)
-            relative_pose(pair, q[s - 1], v0, rel[s - 1])
+            relative_pose(pair, model.home, q[s - 1], v0, rel[s - 1])
             rough = may_begin_roughly
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
-                rough = rough and scale[p] > ROUGH * noise[p]
+                rough = rough and scale[p] > ROUGH * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p])
             motion_weights(pair, rel0, reach, scale, weight)
             accepted = False
             estimate = 0.0
@@ -271,7 +277,8 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                         scale[p] = reached
                         widest = max(widest, reached)
                     for p in range(n_pair):
-                        scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+                        lost = noise_of(pair, noise, rel[0], reach, q[s - 1], p)
+                        scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
                     motion_weights(pair, rel[0], reach, scale, weight)
                 e = balance(
                     pair, inverse, planes, s, q0, v0, hv0, none, h, f, own, damped, turning,

@@ -34,10 +34,14 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
+    add_preloads,
     deflection,
+    gross_loads,
     keep_stage,
     keep_state,
     motion_weights,
+    noise_of,
+    rounding_of_pairs,
 )
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
@@ -197,11 +201,13 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                 work[TANGENTS] += 1
                 if count == 0 and newton == -starting:
                     for p in range(n_pair):
-                        stiffness = sums[0, p, 7] + sums[0, p, 11]
-                        if sums[0, p, 3] > 0.0 and stiffness > 0.0:
-                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)  # it starts strained
-                        size = np.sqrt(rel[0, p, 0] ** 2 + rel[0, p, 1] ** 2) + model.reach[p]
-                        noise[p] = 1e-15 * size + 1e-300
+                        scale[p] = sums[0, p, 7] + sums[0, p, 11]
+                        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
+                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # it starts strained
+                    gross_loads(model, delta)
+                    add_preloads(model, strength, rel[0], delta)
+                    rounding_of_pairs(model, inv_mass, rel[0], v, delta, scale, motion, noise)
+                    for p in range(n_pair):
                         for j in range(POSE):
                             rel0[p, j] = rel[0, p, j]
                 accepted = newton < 0
@@ -217,7 +223,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                     solve(band, half, pivots, delta)
                     for p in range(n_pair):
                         reached = max(motion[p], deflection(rel[0], rel0, model.reach, p))
-                        scale[p] = max(reached, 1e3 * noise[p])
+                        scale[p] = max(reached, 1e3 * noise_of(pair, noise, rel[0], model.reach, q_now[0], p))
                     motion_weights(pair, rel0, model.reach, scale, weight)
                     e = 0.0
                     for d in range(n):
@@ -232,7 +238,8 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                     # the last clause: rounding is all that is left
                     rounding = 1e-8
                     for p in range(n_pair):
-                        rounding = max(rounding, 100.0 * noise[p] / scale[p])
+                        lost = noise_of(pair, noise, rel[0], model.reach, q_now[0], p)
+                        rounding = max(rounding, 100.0 * lost / scale[p])
                     accepted = e <= newton_tolerance or (e >= 0.5 * previous and e < rounding)
                     previous = e
                     if not accepted and (newton >= MOST or (newton >= RESTART and not e < np.inf)):

@@ -24,13 +24,17 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     TURN,
+    add_preloads,
     carve,
     deflection,
+    gross_loads,
     keep_stage,
     keep_state,
     largest_turn,
     lasting,
     motion_weights,
+    noise_of,
+    rounding_of_pairs,
 )
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.carrying import carrying
@@ -187,25 +191,26 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
         q0[d] = model.q0[d]
         v0[d] = model.v0[d]
     rel0 = np.empty((n_pair, POSE))
-    relative_pose(pair, q0, v0, rel0)
+    relative_pose(pair, model.home, q0, v0, rel0)
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
-    for p in range(n_pair):
-        noise[p] = 1e-15 * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]) + 1e-300
     # a pair that starts strained moves on the scale of its mean strain
-    relative_pose(pair, q0, v0, rel[0])
+    relative_pose(pair, model.home, q0, v0, rel[0])
     springs = springs_of(model)
     member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     work[FORCES] += 1
     for p in range(n_pair):
-        stiffness = 0.0
+        scale[p] = 0.0
         for b in range(model.block.shape[0]):
             if model.block[b, 0] == p and model.block[b, 4] >= 0:
                 for i in range(model.block[b, 1], model.block[b, 2]):
-                    stiffness += strength[0, i]
-        if sums[0, p, 3] > 0.0 and stiffness > 0.0:
-            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / stiffness)
+                    scale[p] += strength[0, i]
+        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])
+    gross_loads(model, weight)
+    add_preloads(model, strength, rel0, weight)
+    rounding_of_pairs(model, model.inv_mass, rel0, v0, weight, scale, motion, noise)
     t = times[0]
     last_time = times[times.shape[0] - 1]
     span = last_time - t
@@ -234,12 +239,13 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             widest = 0.0
             for p in range(n_pair):
                 reached = motion[p]
-                relative_pose(pair, ends[0], ends[1], rel[0])
+                relative_pose(pair, model.home, ends[0], ends[1], rel[0])
                 reached = max(reached, deflection(rel[0], rel0, reach, p))
                 scale[p] = reached
                 widest = max(widest, reached)
             for p in range(n_pair):
-                scale[p] = max(scale[p], 0.01 * widest, noise[p] / tolerance, 1e3 * noise[p])
+                lost = noise_of(pair, noise, rel[0], reach, ends[0], p)
+                scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
             motion_weights(pair, rel[0], reach, scale, weight)
             error = _error(table[2], s, h, longest, a, weight)
             finite = True

@@ -190,11 +190,97 @@ def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_ou
 @part
 def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
     """How far the pair p has moved from its pose at the start, at its attachment points, m (angle within a turn)."""
-    x = rel[p, 0] - rel0[p, 0]
-    y = rel[p, 1] - rel0[p, 1]
-    c = rel[p, 2] - rel0[p, 2]
-    s = rel[p, 3] - rel0[p, 3]
+    x = rel[p, 10] - rel0[p, 10]
+    y = rel[p, 11] - rel0[p, 11]
+    c = rel[p, 12] - rel0[p, 12]
+    s = rel[p, 13] - rel0[p, 13]
     return np.sqrt(x * x + y * y) + reach[p] * np.sqrt(c * c + s * s)
+
+
+@part
+def gross_loads(model, out):  # type: ignore[no-untyped-def]
+    """out (n,) = the largest size of the applied loads of each coordinate, without regard to their signs."""
+    out[:] = 0.0
+    for segment in range(model.times.shape[0] - 1):
+        length = model.times[segment + 1] - model.times[segment]
+        for d in range(out.shape[0]):
+            start = model.force[segment, d, 0]
+            out[d] = max(out[d], abs(start), abs(start + length * model.force[segment, d, 1]))
+    for k in range(model.load_body.shape[0]):
+        most = 0.0
+        for segment in range(model.times.shape[0] - 1):
+            length = model.times[segment + 1] - model.times[segment]
+            for axis in range(2):
+                start = model.load_force[segment, k, axis, 0]
+                most = max(most, abs(start), abs(start + length * model.load_force[segment, k, axis, 1]))
+        b = 3 * model.load_body[k]
+        out[b] += most
+        out[b + 1] += most
+        out[b + 2] += most * (abs(model.load_arm[k, 0]) + abs(model.load_arm[k, 1]))
+
+
+@part
+def add_gross_force(pair, rel, reach, p, force, out):  # type: ignore[no-untyped-def]
+    """out (n,) += a force of any direction between the bodies of pair p, and its moments."""
+    arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
+    for side in range(2):
+        b = 3 * pair[p, side]
+        out[b] += force
+        out[b + 1] += force
+        out[b + 2] += arm * force
+
+
+@part
+def add_preloads(model, strength, rel, out):  # type: ignore[no-untyped-def]
+    """out (n,) += the preloads of all springs, strength (3, M_padded), as gross forces."""
+    for k in range(model.block.shape[0]):
+        total = 0.0
+        if model.block[k, 3] == 1:
+            for i in range(model.block[k, 1], model.block[k, 2]):
+                total += abs(strength[2, i])
+        if total > 0.0:
+            add_gross_force(model.pair, rel, model.reach, model.block[k, 0], total, out)
+
+
+@part
+def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):  # type: ignore[no-untyped-def]
+    """noise (n_pair,): what rounding leaves uncertain of how far each pair has moved, m.
+
+    Displacements are summed since the start, so it is a share of what forces move bodies by, not of where these are:
+    of the strain at the start, and of what the loads and velocities do until members hold against them. inverse (n,):
+    of the masses; load (n,) of `gross_loads`; stiffness (n_pair,): of a pair's members, N/m; strain (n_pair,): at the
+    start, m.
+    """
+    span = model.times[model.times.shape[0] - 1] - model.times[0]
+    for p in range(model.pair.shape[0]):
+        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + model.reach[p]
+        mobility = 0.0
+        speed = 0.0
+        push = 0.0
+        for side in range(2):
+            b = 3 * model.pair[p, side]
+            mobility += inverse[b]
+            speed += abs(v[b]) + abs(v[b + 1]) + arm * abs(v[b + 2])
+            push += inverse[b] * (load[b] + load[b + 1]) + arm * inverse[b + 2] * load[b + 2]
+        rate = np.sqrt(stiffness[p] * mobility) if stiffness[p] > 0.0 else 0.0
+        time = span if rate * span <= 1.0 else 1.0 / rate
+        moved = strain[p] + time * (speed + time * push)
+        noise[p] = 1e-15 * min(moved, arm) + 1e-24 * arm + 1e-300
+
+
+@part
+def noise_of(pair, noise, rel, reach, q, p):  # type: ignore[no-untyped-def]
+    """What rounding leaves uncertain of how far pair p has moved, m, in a state q (n,) with poses rel (n_pair, POSE).
+
+    noise: of `rounding_of_pairs`; and what both bodies have moved together is rounded, too.
+    """
+    a = 3 * pair[p, 0]
+    b = 3 * pair[p, 1]
+    moved = max(abs(q[a]), abs(q[a + 1])) + max(abs(q[b]), abs(q[b + 1]))
+    turned = min(abs(q[a + 2]), 1.0) + min(abs(q[b + 2]), 1.0)
+    if turned > 0.0:
+        moved += turned * (np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p])
+    return noise[p] + 1e-15 * moved
 
 
 @part

@@ -33,8 +33,8 @@ class Trajectory:
     their derivatives, a by the equations of motion, right-continuous where a load jumps; lam (T, n_rows): Lagrange
     multipliers (no rows without joints and motions). status: anything but OK means that it ends early, at t[-1], or
     goes on without being right (ZERO_LENGTH, STEP_TOO_LARGE); message says why. work: counts by name. reactions: Fx,
-    Fy, M (T, 3) of each joint on its first body, at the joint, global axes. origin: what the coordinates of `steps` are
-    measured from; q is in those of the case.
+    Fy, M (T, 3) of each joint on its first body, at the joint, global axes. home (n,): where the bodies are by the case
+    when those of `steps` have not moved.
     """
 
     load_case: str
@@ -48,23 +48,22 @@ class Trajectory:
     work: dict[str, int]
     steps: "DenseSteps | GeneralSteps" = field(repr=False)
     reactions: Mapping[str, FloatArray] = field(default_factory=dict)
-    origin: tuple[float, float] = field(default=(0.0, 0.0), repr=False)
+    home: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
 
     @classmethod
     def of(
         cls,
         load_case: str,
-        n: int,
         steps: "DenseSteps | GeneralSteps",
         status: Status,
         message: str,
         work: dict[str, int],
-        origin: tuple[float, float] = (0.0, 0.0),
+        home: FloatArray,
     ) -> "Trajectory":
-        """The trajectory of the first n coordinates (what follows is ground) of steps measured from `origin`."""
-        t = steps.t.copy()
+        """The trajectory of the coordinates that have a home (n,), of steps that tell what these have moved since."""
+        t, n = steps.t.copy(), len(home)
         q, v = steps.state[:, 0, :n].copy(), steps.state[:, 1, :n].copy()
-        _shift(q, origin)
+        q += home
         a, lam = np.zeros_like(q), np.zeros((len(t), 0))
         reactions: Mapping[str, FloatArray] = {}
         if isinstance(steps, DenseSteps):
@@ -73,7 +72,7 @@ class Trajectory:
             out, lam = steps.balanced(t)
             a = out[2][:, :n].copy()
             reactions = steps.reactions(out[0], lam)
-        return cls(load_case, status, message, t, q, v, a, lam, work, steps, reactions, origin)
+        return cls(load_case, status, message, t, q, v, a, lam, work, steps, reactions, home)
 
     def at(self, times: ArrayLike) -> States:
         """States at times (T,), from the integrator's own dense output.
@@ -89,13 +88,5 @@ class Trajectory:
         else:
             out, lam = self.steps.balanced(asked)
         q, v, a = out[:, :, :n]
-        _shift(q, self.origin)
+        q += self.home
         return States(q, v, a, lam)
-
-
-def _shift(q: FloatArray, origin: tuple[float, float]) -> None:
-    """Positions q (T, n) from `origin` as those of the case, in place."""
-    if origin == (0.0, 0.0):
-        return  # not even the sign of a zero changes
-    q[:, 0::3] += origin[0]
-    q[:, 1::3] += origin[1]

@@ -168,6 +168,7 @@ class System:
         q0 = np.array([value for body in self.load_case.bodies for value in (*body.position, body.angle)])
         v0 = np.array([value for body in self.load_case.bodies for value in (*body.velocity, body.angular_velocity)])
         indices, cubics = drives(self.load_case, self.times, q0, v0)
+        cubics[:, :, 0] += q0[indices]
         for i, d in enumerate(indices.tolist()):
             if d % 3 < 2:
                 yield Row(self.at(self.names[d // 3])[d % 3], cubics[:, i])

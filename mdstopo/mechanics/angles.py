@@ -33,6 +33,17 @@ def _series(z):  # type: ignore[no-untyped-def]
 
 
 @part
+def small_turn(angle):  # type: ignore[no-untyped-def]
+    """cos - 1 and sin of an angle, rad, both without cancellation where it is small."""
+    if abs(angle) <= 0.7:
+        z = angle * angle
+        s, c = _series(z)
+        return z * z * c - 0.5 * z, angle + angle * z * s
+    c, s = cos_sin(angle)
+    return c - 1.0, s
+
+
+@part
 def cos_sin(angle):  # type: ignore[no-untyped-def]
     """cos and sin of an angle, rad."""
     if not abs(angle) <= FAR:

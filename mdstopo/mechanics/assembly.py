@@ -3,10 +3,8 @@
 One pass returns a few numbers a pair of bodies and pose (`SUMS`); everything here works on those.
 """
 
-import math
-
 from mdstopo.compiler.jit import inline, kernel, part
-from mdstopo.mechanics.geometry import add_pair_force, relative_pose
+from mdstopo.mechanics.geometry import add_pair_force, relative_pose, turned_body
 from mdstopo.mechanics.passes import member_sums, springs_of
 
 
@@ -21,8 +19,7 @@ def add_loads(model, segment, t, q, f):  # type: ignore[no-untyped-def]
         return
     for k in range(model.load_body.shape[0]):
         b = 3 * model.load_body[k]
-        c = math.cos(q[b + 2])
-        s = math.sin(q[b + 2])
+        c, s, _, _ = turned_body(model.home, model.load_body[k], q[b + 2])
         x = model.load_force[segment, k, 0, 0] + tau * model.load_force[segment, k, 0, 1]
         y = model.load_force[segment, k, 1, 0] + tau * model.load_force[segment, k, 1, 1]
         if model.load_follows[k]:
@@ -41,8 +38,7 @@ def load_tangent(model, segment, t, q, turn):  # type: ignore[no-untyped-def]
     tau = t - model.times[segment]
     for k in range(model.load_body.shape[0]):
         b = 3 * model.load_body[k]
-        c = math.cos(q[b + 2])
-        s = math.sin(q[b + 2])
+        c, s, _, _ = turned_body(model.home, model.load_body[k], q[b + 2])
         x = model.load_force[segment, k, 0, 0] + tau * model.load_force[segment, k, 0, 1]
         y = model.load_force[segment, k, 1, 0] + tau * model.load_force[segment, k, 1, 1]
         if model.load_follows[k]:  # force and arm turn together: the moment stays
@@ -55,24 +51,24 @@ def load_tangent(model, segment, t, q, turn):  # type: ignore[no-untyped-def]
 
 
 @part
-def pair_tangents(pair, rel, q, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
+def pair_tangents(pair, rel, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
     """Tangents in body coordinates of one pose: k_out (n_pair, 6, 6) = -dF/dq, c_out = -dF/dv (if damped).
 
     K = T^T (K_xi T + C_xi d(Tv)/dq) - d(T^T Q)/dq, C = T^T C_xi T, written in global axes: with D = x_B - x_A and
     w = -J D, R dxi_d = dD + w dpsi_A, and R d(xi'_d) = -omega_A J dD - J R xi'_d dpsi_A.
     """
-    for p in range(rel.shape[0]):
-        pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out)
+    for p in range(pair.shape[0]):
+        pair_tangent(p, rel, sums, damped, k_out, c_out)
 
 
 @kernel
-def pair_tangent(pair, p, rel, q, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
+def pair_tangent(p, rel, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
     """`pair_tangents` of pair p alone."""
     o = sums[p]
     ca = rel[p, 7]
     sa = rel[p, 8]
-    wx = q[3 * pair[p, 1] + 1] - q[3 * pair[p, 0] + 1]
-    wy = q[3 * pair[p, 0]] - q[3 * pair[p, 1]]
+    wx = sa * rel[p, 0] + ca * rel[p, 1]
+    wy = sa * rel[p, 1] - ca * rel[p, 0]
     # K_xi turned into global axes: rows and columns x, y, theta
     kxx, kxy, kyx, kyy = _turned(ca, sa, o[7], o[8], o[10], o[11])
     kxt = ca * o[9] - sa * o[12]
@@ -234,16 +230,16 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
     Constant: model, strength. In: segment, m, t (m,), q, v (m, n). Out: rel (m, n_pair, POSE), sums (m, n_pair, SUMS),
     f (m, n); with `tangent` also k_out (m, n_pair, 6, 6), c_out (the same, if damped), turn (m, n, if loads turn).
     """
-    place_bodies(model.pair, q, v, m, rel)
+    place_bodies(model.pair, model.home, q, v, m, rel)
     member_sums(springs_of(model), strength, rel, m, tangent, sums)
     sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn)
 
 
 @part
-def place_bodies(pair, q, v, m, rel):  # type: ignore[no-untyped-def]
+def place_bodies(pair, home, q, v, m, rel):  # type: ignore[no-untyped-def]
     """rel (m, n_pair, POSE) at m states."""
     for j in range(m):
-        relative_pose(pair, q[j], v[j], rel[j])
+        relative_pose(pair, home, q[j], v[j], rel[j])
 
 
 @part
@@ -258,6 +254,6 @@ def sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_
         for p in range(pair.shape[0]):
             add_pair_force(pair, rel[j], p, sums[j, p, 0], sums[j, p, 1], sums[j, p, 2], out)
         if tangent:
-            pair_tangents(pair, rel[j], q[j], sums[j], damped, k_out[j], c_out[j if damped else 0])
+            pair_tangents(pair, rel[j], sums[j], damped, k_out[j], c_out[j if damped else 0])
             if turning:
                 load_tangent(model, segment, t[j], q[j], turn[j])

@@ -11,12 +11,12 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.mechanics.passes import springs_of, threads_for
-from mdstopo.scene.model import BLOCK, VECTOR, Model, Springs
+from mdstopo.scene.model import BLOCK, DAMPING, MEMBER, STIFFNESS, VECTOR, Model, Springs
 
 #: costs of a member of a grid and of another: all that are left have to cost at most three quarters of what all do
 IN_GRID, PLAIN = 2, 3
 #: rows of strengths with room for the members that carry, as in `Model.member`
-ROOMY = 11
+ROOMY = 12
 
 
 @part
@@ -29,9 +29,9 @@ def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
     springs, own, left = _that_carry(springs_of(model), strength, fill)
     return (
         Model(
-            model.inv_mass, model.q0, model.v0, model.pair, model.reach, model.shortest, springs.block, model.power,
-            springs.member, model.times, model.force, model.load_body, model.load_follows, model.load_arm,
-            model.load_force, springs.chunk, model.threads,
+            model.inv_mass, model.q0, model.v0, model.home, model.pair, model.reach, model.shortest, springs.block,
+            model.power, model.near, springs.member, model.times, model.force, model.load_body, model.load_follows,
+            model.load_arm, model.load_force, springs.chunk, model.threads,
         ),
         own,
         left,
@@ -79,10 +79,10 @@ def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
         gather = (np.zeros(1, np.int64), springs.chunk, block, springs.member, strength, begin, count, room)
         shared(_gather_chunks, threads_for(springs, np.int64(1)), gather)
         for k in range(block.shape[0]):
-            for row in range(8):
+            for row in range(MEMBER):
                 for i in range(fewer[k, 1] + fewer[k, 5], fewer[k, 2]):
                     room[row, i] = 0.0
-    return Springs(fewer, room, chunk, springs.threads), room[5:8], left
+    return Springs(fewer, room, chunk, springs.threads, springs.near), room[STIFFNESS:MEMBER], left
 
 
 @kernel
@@ -119,7 +119,7 @@ def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
 
 @kernel
 def _gather(k, start, stop, block, member, strength, begin, count, room):  # type: ignore[no-untyped-def]
-    """Write those of the part start..stop of block k that carry something to room (8, M_padded) from begin on."""
+    """Write those of the part start..stop of block k that carry something to room (MEMBER, M_padded) from begin on."""
     viscous = block[k, 3] == 1
     place = np.empty(stop - start, np.int64)
     found = 0
@@ -129,8 +129,8 @@ def _gather(k, start, stop, block, member, strength, begin, count, room):  # typ
         if viscous:
             something |= (strength[1, i] != 0.0) | (strength[2, i] != 0.0)
         found += something
-    for row in range(8 if viscous else 6):
-        source = member[row] if row < 5 else strength[row - 5]
+    for row in range(MEMBER if viscous else DAMPING):
+        source = member[row] if row < STIFFNESS else strength[row - STIFFNESS]
         target = room[row]
         for i in range(count):
             target[begin + i] = source[place[i]]

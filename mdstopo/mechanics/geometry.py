@@ -4,49 +4,101 @@
 
 T = dxi/dq (3 x 6, columns x_A y_A psi_A x_B y_B psi_B). With one member's row b = dL/dxi, its row of the
 compatibility matrix (Eq. 32) is B = -b T, and dDelta/dq = -B (Eq. 36). Nothing here depends on members.
+
+The coordinates q of a body are what it has moved since a place of its own, its home: (x, y, psi) = home + q. A pose
+tells by how much it differs from the one at home, too, without forming the difference of two poses: that keeps all
+digits of members that hardly stretch.
 """
 
 from mdstopo.compiler.jit import part
-from mdstopo.mechanics.angles import cos_sin
+from mdstopo.mechanics.angles import small_turn
 
-#: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A
-DX, DY, COS, SIN, VX, VY, VT, COS_A, SIN_A, OMEGA_A = range(10)
-POSE = 10
+#: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A, then what has changed since
+#: home: d - d_0, cos theta - cos theta_0, sin theta - sin theta_0
+DX, DY, COS, SIN, VX, VY, VT, COS_A, SIN_A, OMEGA_A, UX, UY, UC, US = range(14)
+POSE = 14
 
 
 @part
-def relative_pose(pair, q, v, rel):  # type: ignore[no-untyped-def]
-    """Fill rel (n_pair, POSE) from one state q, v (n,)."""
+def turned_body(home, body, angle):  # type: ignore[no-untyped-def]
+    """cos and sin of a body's psi when it has turned by an angle since home, and by how much they have changed."""
+    m, s = small_turn(angle)
+    return turned_from(home, body, m, s)
+
+
+@part
+def turned_from(home, body, m, s):  # type: ignore[no-untyped-def]
+    """`turned_body` from cos - 1 and sin of the angle."""
+    c0 = home[body, 3]
+    s0 = home[body, 4]
+    dc = c0 * m - s0 * s
+    ds = s0 * m + c0 * s
+    return c0 + dc, s0 + ds, dc, ds
+
+
+@part
+def relative_pose(pair, home, q, v, rel):  # type: ignore[no-untyped-def]
+    """Fill rel (n_pair, POSE) from one state q, v (n,): displacements since home (n_body, 5), and velocities."""
     for p in range(pair.shape[0]):
-        turn = q[3 * pair[p, 0] + 2]
-        theta = q[3 * pair[p, 1] + 2] - turn
-        ca, sa = cos_sin(turn)
-        c, s = cos_sin(theta)
-        fill_pose(pair, p, q, v, ca, sa, c, s, rel)
+        ma, sa = small_turn(q[3 * pair[p, 0] + 2])
+        mb, sb = small_turn(q[3 * pair[p, 1] + 2])
+        fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel)
 
 
 @part
-def fill_pose(pair, p, q, v, ca, sa, c, s, rel):  # type: ignore[no-untyped-def]
-    """Fill rel[p] from one state and the cos and sin of psi_A and of theta."""
-    a = 3 * pair[p, 0]
-    b = 3 * pair[p, 1]
-    x = q[b] - q[a]
-    y = q[b + 1] - q[a + 1]
+def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):  # type: ignore[no-untyped-def]
+    """Fill rel[p] from one state and cos - 1 and sin of the angles that both bodies have turned by since home.
+
+    With D_0 the vector between the bodies at home and w the change of it,
+
+        d - d_0 = R_A^T w + (R_A - R_A0)^T D_0,      R - R_0 = R_0 (R(theta - theta_0) - I),
+
+    of which no term is larger than what has changed.
+    """
+    one = pair[p, 0]
+    two = pair[p, 1]
+    a = 3 * one
+    b = 3 * two
+    ca = home[one, 3]
+    sine_a = home[one, 4]
+    cb = home[two, 3]
+    sine_b = home[two, 4]
+    home_x = home[two, 0] - home[one, 0]
+    home_y = home[two, 1] - home[one, 1]
+    c0 = ca * cb + sine_a * sine_b
+    s0 = ca * sine_b - sine_a * cb
+    # of the relative turn: cos - 1 and sin
+    m = ma + mb + ma * mb + sa * sb
+    s = sb - sa + (sb * ma - sa * mb)
+    dc = ca * ma - sine_a * sa
+    ds = sine_a * ma + ca * sa
+    ca += dc
+    sine_a += ds
+    wx = q[b] - q[a]
+    wy = q[b + 1] - q[a + 1]
+    x = home_x + wx
+    y = home_y + wy
     u = v[b] - v[a]
     w = v[b + 1] - v[a + 1]
-    dx = ca * x + sa * y
-    dy = ca * y - sa * x
+    dx = ca * x + sine_a * y
+    dy = ca * y - sine_a * x
     omega = v[a + 2]
+    uc = c0 * m - s0 * s
+    us = s0 * m + c0 * s
     rel[p, 0] = dx
     rel[p, 1] = dy
-    rel[p, 2] = c
-    rel[p, 3] = s
-    rel[p, 4] = ca * u + sa * w + omega * dy
-    rel[p, 5] = ca * w - sa * u - omega * dx
+    rel[p, 2] = c0 + uc
+    rel[p, 3] = s0 + us
+    rel[p, 4] = ca * u + sine_a * w + omega * dy
+    rel[p, 5] = ca * w - sine_a * u - omega * dx
     rel[p, 6] = v[b + 2] - omega
     rel[p, 7] = ca
-    rel[p, 8] = sa
+    rel[p, 8] = sine_a
     rel[p, 9] = omega
+    rel[p, 10] = (ca * wx + sine_a * wy) + (dc * home_x + ds * home_y)
+    rel[p, 11] = (ca * wy - sine_a * wx) + (dc * home_y - ds * home_x)
+    rel[p, 12] = uc
+    rel[p, 13] = us
 
 
 @part

@@ -8,9 +8,10 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.vector import lanes
+from mdstopo.mechanics.laws.spring import hardly_moved
 from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import ROWS, TILE
+from mdstopo.scene.model import EXCESS, ROWS, STIFFNESS, TILE
 
 #: places of a tile: of each it reads two numbers, where `passes` reads six
 PLACES = 4 * TILE
@@ -24,7 +25,7 @@ def tile_of(rows, width):  # type: ignore[no-untyped-def]
 
 
 @part
-def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
     """Add the rows from start to stop of block k to sums (m, columns, SUMS) at the poses rel (m, n_pair, POSE)."""
     p = block[k, 0]
     width = block[k, 6]
@@ -40,6 +41,7 @@ def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, co
         qx = member[2, lo:hi]
         qy = member[3, lo:hi]
         l0 = member[4, lo:hi]
+        excess = member[EXCESS, lo:hi]
         ks = stiffness[lo:hi]
         own = room[: (hi - lo) // width]
         for first in range(0, width, wide):
@@ -47,22 +49,26 @@ def sum_grid(k, start, stop, block, member, stiffness, rel, m, tangent, sums, co
             for j in range(m):
                 r = rel[j, p]
                 o = sums[j, column]
+                close = hardly_moved(r, near)
                 if tangent:
-                    found = grid_tangent(px, py, qx, qy, l0, ks, width, first, last, r[0], r[1], r[2], r[3], own)
+                    found = grid_tangent(px, py, qx, qy, l0, excess, ks, width, first, last, r, close, own)
                     add_forces(found[:4], counted, o)
                     add_tangent(found[4:], o)
                 else:
-                    found_force = grid_force(px, py, qx, qy, l0, ks, width, first, last, r[0], r[1], r[2], r[3], own)
+                    found_force = grid_force(px, py, qx, qy, l0, excess, ks, width, first, last, r, close, own)
                     add_forces(found_force, counted, o)
 
 
 @part
-def design_grid(start, stop, width, member, pose, u, weight, out):  # type: ignore[no-untyped-def]
+def design_grid(start, stop, width, near, member, pose, u, weight, out):  # type: ignore[no-untyped-def]
     """Add what `grid_design` does at the poses pose (any, POSE) to out (M_padded,) for the rows from start to stop."""
     rows = (stop - start) // width
     tall, wide = tile_of(rows, width)
     room = np.empty((tall, pose.shape[0], 4))
-    turned = np.empty((pose.shape[0], 2, lanes()))
+    turned = np.empty((pose.shape[0], 5, lanes()))
+    close = np.empty(pose.shape[0], np.bool_)
+    for j in range(pose.shape[0]):
+        close[j] = hardly_moved(pose[j], near)
     for row in range(0, rows, tall):
         lo = start + row * width
         hi = start + min(row + tall, rows) * width
@@ -70,6 +76,6 @@ def design_grid(start, stop, width, member, pose, u, weight, out):  # type: igno
         for first in range(0, width, wide):
             grid_design(
                 member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[5, lo:hi], width, first, min(first + wide, width), pose, u, weight, own,
-                turned, out[lo:hi],
+                member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], width, first, min(first + wide, width),
+                pose, close, u, weight, own, turned, out[lo:hi],
             )  # fmt: skip

@@ -17,13 +17,14 @@ from mdstopo.mechanics.laws.spring import (
     elastic_design,
     elastic_force,
     elastic_tangent,
+    hardly_moved,
     stored_energy,
     viscous_design,
     viscous_force,
     viscous_tangent,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import TILE, Springs
+from mdstopo.scene.model import DAMPING, EXCESS, PRELOAD, STIFFNESS, TILE, Springs
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
 SUMS = 22
@@ -36,7 +37,7 @@ WORTH = 400_000
 @part
 def springs_of(model):  # type: ignore[no-untyped-def]
     """What `member_sums` needs of a model."""
-    return Springs(model.block, model.member, model.chunk, model.threads)
+    return Springs(model.block, model.member, model.chunk, model.threads, model.near)
 
 
 @kernel
@@ -69,9 +70,8 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
     """The part start..stop of block k."""
     if block[k, 4] < 0:
         for i in range(start, stop):
-            strength[0, i] = member[5, i]
-            strength[1, i] = member[6, i]
-            strength[2, i] = member[7, i]
+            for row in range(3):
+                strength[row, i] = member[STIFFNESS + row, i]
         return
     mu = power[k]
     rows, count, first, width = _rows(block, k, start, stop)
@@ -80,7 +80,7 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
             at = start + j * width
             begin = first + j * count
             a = alpha[begin : begin + count]
-            whole = member[5 + row, at : at + width]
+            whole = member[STIFFNESS + row, at : at + width]
             scaled = strength[row, at : at + width]
             if mu == 1.0 and begin + width <= alpha.shape[0]:
                 # whole vectors: a place of padding takes some other variable times no stiffness
@@ -126,11 +126,14 @@ def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-un
     sums[:m] = 0.0
     if springs.threads == 0:  # whole blocks: added where they belong at once
         for k in range(block.shape[0]):
-            _sum(k, block[k, 1], block[k, 2], block, springs.member, strength, rel, m, tangent, sums, block[k, 0])
+            _sum(
+                k, block[k, 1], block[k, 2], block, springs.near[k], springs.member, strength, rel, m, tangent, sums,
+                block[k, 0],
+            )  # fmt: skip
         return
     counter = np.zeros(1, np.int64)
     part = np.empty((chunk.shape[0], m, 1, SUMS))
-    job = (counter, chunk, block, springs.member, strength, rel, m, tangent, part)
+    job = (counter, chunk, block, springs.near, springs.member, strength, rel, m, tangent, part)
     shared(_sum_chunks, threads_for(springs, m), job)
     for i in range(chunk.shape[0]):
         p = block[chunk[i, 0], 0]
@@ -140,20 +143,21 @@ def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-un
 
 
 @kernel
-def _sum_chunks(counter, chunk, block, member, strength, rel, m, tangent, part):  # type: ignore[no-untyped-def]
+def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, part):  # type: ignore[no-untyped-def]
     i = taken(counter)
     while i < chunk.shape[0]:
         out = part[i]
         out[:] = 0.0
-        _sum(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, rel, m, tangent, out, np.int64(0))
+        k = chunk[i, 0]
+        _sum(k, chunk[i, 1], chunk[i, 2], block, near[k], member, strength, rel, m, tangent, out, np.int64(0))
         i = taken(counter)
 
 
 @kernel
-def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
     """Add the part start..stop of block k to sums (m, columns, SUMS)."""
     if block[k, 6] > 0:
-        sum_grid(k, start, stop, block, member, strength[0], rel, m, tangent, sums, column)
+        sum_grid(k, start, stop, block, near, member, strength[0], rel, m, tangent, sums, column)
         return
     p = block[k, 0]
     viscous = block[k, 3] == 1
@@ -168,23 +172,25 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
         qx = member[2, lo:hi]
         qy = member[3, lo:hi]
         l0 = member[4, lo:hi]
+        excess = member[EXCESS, lo:hi]
         ks = strength[0, lo:hi]
         for j in range(m):
             r = rel[j, p]
             o = sums[j, column]
             if not viscous:
                 if tangent:
-                    found = elastic_tangent(rows, width, scale, lo, hi, r)
+                    found = elastic_tangent(rows, width, scale, lo, hi, r, hardly_moved(r, near))
                     add_forces(found[:4], counted, o)
                     add_tangent(found[4:], o)
                 else:
-                    add_forces(elastic_force(rows, width, scale, lo, hi, r), counted, o)
+                    found_force = elastic_force(rows, width, scale, lo, hi, r, hardly_moved(r, near))
+                    add_forces(found_force, counted, o)
                 continue
             cs = strength[1, lo:hi]
             ps = strength[2, lo:hi]
             if tangent:
                 (x, y, t, e, ex, ey, et, k0, k1, k2, k3, k4, k5, k6, k7, k8, c0, c1, c2, c3, c4, c5) = viscous_tangent(
-                    px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
+                    px, py, qx, qy, l0, excess, ks, cs, ps, r
                 )
                 o[7] += k0
                 o[8] += k1
@@ -202,9 +208,7 @@ def _sum(k, start, stop, block, member, strength, rel, m, tangent, sums, column)
                 o[20] += c4
                 o[21] += c5
             else:
-                x, y, t, e, ex, ey, et = viscous_force(
-                    px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6]
-                )
+                x, y, t, e, ex, ey, et = viscous_force(px, py, qx, qy, l0, excess, ks, cs, ps, r)
             o[0] += x
             o[1] += y
             o[2] += t
@@ -242,7 +246,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
             if i < pose.shape[0]:
                 copy_rows(pose[i], rel[j])
             else:
-                relative_pose(pair, stage[i, 0], stage[i, 1], rel[j])
+                relative_pose(pair, model.home, stage[i, 0], stage[i, 1], rel[j])
             for p in range(n_pair):
                 pair_displacement(pair, rel[j], p, z[i], u[j, p])
                 for axis in range(3):
@@ -252,10 +256,10 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
     for i in range(weight.shape[0]):
         if weight[i] != 0.0:
             own[energies] = weight[i]
-            relative_pose(pair, point[i, 0], point[i, 1], rel[count + energies])
+            relative_pose(pair, model.home, point[i, 0], point[i, 1], rel[count + energies])
             energies += 1
     counter = np.zeros(1, np.int64)
-    job = (counter, model.chunk, model.block, model.member, rel, u, own, out)
+    job = (counter, model.chunk, model.block, model.near, model.member, rel, u, own, out)
     shared(_design_chunks, threads_for(model, count + energies), job)
 
 
@@ -269,15 +273,15 @@ def energy_gradient(model, point, weight, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _design_chunks(counter, chunk, block, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
     i = taken(counter)
     while i < chunk.shape[0]:
-        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, rel, u, weight, out)
+        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, near[chunk[i, 0]], member, rel, u, weight, out)
         i = taken(counter)
 
 
 @kernel
-def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+def _design(k, start, stop, block, near, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
     """The part start..stop of block k: works at the first poses of rel (any, n_pair, POSE), energies at the others.
 
     u (S, n_pair, 3): changes of the first poses.
@@ -287,7 +291,7 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
     p = block[k, 0]
     many = u.shape[0]
     if block[k, 6] > 0:
-        design_grid(start, stop, block[k, 6], member, rel[:, p], u[:, p], weight, out)
+        design_grid(start, stop, block[k, 6], near, member, rel[:, p], u[:, p], weight, out)
         return
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)
@@ -296,21 +300,19 @@ def _design(k, start, stop, block, member, rel, u, weight, out):  # type: ignore
         qx = member[2, lo:hi]
         qy = member[3, lo:hi]
         l0 = member[4, lo:hi]
-        ks = member[5, lo:hi]
+        excess = member[EXCESS, lo:hi]
+        ks = member[STIFFNESS, lo:hi]
         o = out[lo:hi]
         if block[k, 3] == 0:
-            elastic_design(px, py, qx, qy, l0, ks, rel[:many, p], u[:, p], o)
+            elastic_design(px, py, qx, qy, l0, excess, ks, rel[:many, p], u[:, p], o)
         else:
             for j in range(many):
-                r = rel[j, p]
-                w = u[j, p]
                 viscous_design(
-                    px, py, qx, qy, l0, ks, member[6, lo:hi], member[7, lo:hi],
-                    r[0], r[1], r[2], r[3], r[4], r[5], r[6], w[0], w[1], w[2], o,
+                    px, py, qx, qy, l0, excess, ks, member[DAMPING, lo:hi], member[PRELOAD, lo:hi], rel[j, p], u[j, p],
+                    o,
                 )  # fmt: skip
         for j in range(weight.shape[0]):
-            r = rel[many + j, p]
-            stored_energy(px, py, qx, qy, l0, ks, r[0], r[1], r[2], r[3], weight[j], o)
+            stored_energy(px, py, qx, qy, l0, excess, ks, rel[many + j, p], weight[j], o)
 
 
 @part

@@ -151,7 +151,7 @@ def _shorten_products(k, l0, own, product):  # type: ignore[no-untyped-def]
 @part
 def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
     """As `assembly.forces` with tangents, where `may_be_rough`; whether the forces are numbers."""
-    place_bodies(model.pair, q, v, m, rel)
+    place_bodies(model.pair, model.home, q, v, m, rel)
     rough_sums(springs_of(model), strength, rel, m, sums)
     sum_bodies(model, segment, m, t, q, np.bool_(True), np.bool_(False), rel, sums, f, k_out, c_out, turn)
     lost = 0.0

@@ -6,7 +6,7 @@ from mdstopo.case.model import Case
 from mdstopo.mechanics.start_entry import start_tangents
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import COUNT, DESIGN, FloatArray
+from mdstopo.scene.model import COUNT, DESIGN, MEMBER, STIFFNESS, FloatArray
 from mdstopo.scene.packing import pack
 
 
@@ -16,7 +16,7 @@ def natural_frequencies(case: Case, scene: Scene, design: FloatArray) -> FloatAr
     design: alpha (N,).
     """
     model, n, pairs = scene.model, len(scene.model.inv_mass), len(scene.model.pair)
-    strength = model.member[5:8].copy()
+    strength = model.member[STIFFNESS:MEMBER].copy()
     for block, group in zip(model.block.tolist(), case.members, strict=True):
         if block[DESIGN] >= 0:
             first = block[DESIGN]

@@ -11,9 +11,9 @@ from mdstopo.mechanics.passes import member_sums
 
 
 @part
-def energy_at(pair, springs, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
+def energy_at(pair, home, springs, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
     """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
-    relative_pose(pair, q, v, rel[0])
+    relative_pose(pair, home, q, v, rel[0])
     member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     return energy_of(rel[0], sums[0])
 

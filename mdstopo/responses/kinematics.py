@@ -12,6 +12,7 @@ The slopes follow by c_psi = J c, A_psi = -A J, and for c' = w_b J c, c'' = w_b'
 import math
 
 from mdstopo.compiler.jit import kernel
+from mdstopo.mechanics.angles import small_turn
 
 #: ACROSS: the component perpendicular to the vector as it is, whose own value is 0
 X, Y, NORM, ACROSS = range(4)
@@ -19,32 +20,31 @@ DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
 
 
 @kernel
-def point_start(s, qb, qr, out):  # type: ignore[no-untyped-def]
-    """out (2,) = the point's coordinates in r's frame."""
-    cb = math.cos(qb[2])
-    sb = math.sin(qb[2])
-    cr = math.cos(qr[2])
-    sr = math.sin(qr[2])
-    ux = qb[0] + cb * s[0] - sb * s[1] - qr[0]
-    uy = qb[1] + sb * s[0] + cb * s[1] - qr[1]
-    out[0] = cr * ux + sr * uy
-    out[1] = cr * uy - sr * ux
+def turned(home, angle):  # type: ignore[no-untyped-def]
+    """`geometry.turned_body` of a body with this row of `home`."""
+    m, s = small_turn(angle)
+    c = home[3] * m - home[4] * s
+    s = home[4] * m + home[3] * s
+    return home[3] + c, home[4] + s, c, s
 
 
 @kernel
-def point_response(order, component, s, start, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
+def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
     """The response; slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r. The norm's slope is zero where the norm is.
 
     With ACROSS the norm comes back with the slopes of the component perpendicular to the vector, a quarter turn ahead.
     """
-    cb = math.cos(qb[2])
-    sb = math.sin(qb[2])
-    ca = math.cos(qr[2])
-    sa = math.sin(qr[2])
+    cb, sb, cb_since, sb_since = turned(home_b, qb[2])
+    ca, sa, ca_since, sa_since = turned(home_r, qr[2])
     cx = cb * s[0] - sb * s[1]
     cy = sb * s[0] + cb * s[1]
-    ux = qb[0] + cx - qr[0]
-    uy = qb[1] + cy - qr[1]
+    # what u is at home, and what it has changed by
+    home_x = home_b[0] - home_r[0] + home_b[3] * s[0] - home_b[4] * s[1]
+    home_y = home_b[1] - home_r[1] + home_b[4] * s[0] + home_b[3] * s[1]
+    since_x = qb[0] - qr[0] + (cb_since * s[0] - sb_since * s[1])
+    since_y = qb[1] - qr[1] + (sb_since * s[0] + cb_since * s[1])
+    ux = home_x + since_x
+    uy = home_y + since_y
     wb = vb[2]
     w = vr[2]
     # global vector y, whose components along r's axes are looked at
@@ -64,8 +64,8 @@ def point_response(order, component, s, start, qb, vb, ab, qr, vr, ar, slope):  
     gx = ca * yx + sa * yy
     gy = ca * yy - sa * yx
     if order == DISPLACEMENT:
-        gx -= start[0]
-        gy -= start[1]
+        gx = ca * since_x + sa * since_y + (ca_since * home_x + sa_since * home_y)
+        gy = ca * since_y - sa * since_x + (ca_since * home_y - sa_since * home_x)
     # the weights of the two components
     if component == X:
         value = gx
@@ -138,7 +138,7 @@ def point_response(order, component, s, start, qb, vb, ab, qr, vr, ar, slope):  
 
 
 @kernel
-def angle_response(order, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
+def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
     """psi_b - psi_r, unwrapped, or its first or second derivative; slope as in `point_response`."""
     for i in range(6):
         for j in range(3):
@@ -146,7 +146,7 @@ def angle_response(order, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-unt
     slope[order, 2] = 1.0
     slope[3 + order, 2] = -1.0
     if order == DISPLACEMENT:
-        return qb[2] - qr[2]
+        return home_b[2] - home_r[2] + (qb[2] - qr[2])
     if order == VELOCITY:
         return vb[2] - vr[2]
     return ab[2] - ar[2]

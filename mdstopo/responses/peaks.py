@@ -137,7 +137,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     end_sums = np.empty((2, n_pair, SUMS))
     for end in range(begun, 2):
         state = steps.state[end * count]
-        relative_pose(model.pair, state[0], state[1], ends[end])
+        relative_pose(model.pair, model.home, state[0], state[1], ends[end])
     member_sums(springs, strength, ends[begun:], 2 - begun, np.bool_(False), end_sums[begun:])
     work[0] += 2 - begun
     for end in range(2):
@@ -193,7 +193,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
             c = (time - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
             work[0] += 1
-            value, rate = energy_at(model.pair, springs, strength, q, v, rel, sums)
+            value, rate = energy_at(model.pair, model.home, springs, strength, q, v, rel, sums)
             value *= sign
             rate *= sign
             if not crossing and not (d[i] > 0.0 and rate < 0.0) and not (d[i] < 0.0 and rate > 0.0):

@@ -11,7 +11,27 @@ import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, MemberGroup, SpringLaw
 from mdstopo.scene.grids import row_of
-from mdstopo.scene.model import BLOCK, VECTOR, FloatArray, IndexArray, Model
+from mdstopo.scene.model import (
+    BLOCK,
+    DAMPING,
+    EXCESS,
+    HOME,
+    HOME_ANGLE,
+    HOME_COS,
+    HOME_SIN,
+    L0,
+    MEMBER,
+    QX,
+    QY,
+    START,
+    STIFFNESS,
+    STOP,
+    VECTOR,
+    WIDTH,
+    FloatArray,
+    IndexArray,
+    Model,
+)
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.signals import breakpoints, segment_values
 
@@ -47,14 +67,19 @@ class Scene:
         return self.load_case.end
 
 
+#: share of the longest member by which bodies may have moved for elongations to come from displacements
+NEAR = 0.01
+
+
 @dataclass(frozen=True)
 class Members:
-    """What all load cases share, as in `Model`: pairs (n, 2), blocks, powers, member arrays; and the shortest initial
-    length of each block."""
+    """What all load cases share, as in `Model`: pairs (n, 2), blocks, powers, nearness, member arrays; and the shortest
+    initial length of each block."""
 
     pairs: IndexArray
     block: IndexArray
     power: FloatArray
+    near: FloatArray
     member: FloatArray
     shortest: FloatArray
 
@@ -77,33 +102,48 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
         powers.append(group.power)
         first += count if group.design else 0
         start = stop
-    member = np.zeros((8, start))
+    member = np.zeros((MEMBER, start))
     for group, block in zip(case.members, blocks, strict=True):
         _fill(group, block, member)
+    near = [_nearness(group, member, block) for group, block in zip(case.members, blocks, strict=True)]
     return Members(
         pairs=np.array(list(pairs), dtype=np.int64).reshape(-1, 2),
         block=np.array(blocks, dtype=np.int64).reshape(-1, BLOCK),
         power=np.array(powers, dtype=np.float64),
         member=member,
         shortest=np.array([float(group.length.min()) for group in case.members]),
+        near=np.array(near).reshape(-1, 2),
     )
 
 
+def _nearness(group: MemberGroup, member: FloatArray, block: list[int]) -> list[float]:
+    """A row of `Model.near`: up to a share of the longest member, in which digits are to be won.
+
+    In grids, whose kernels do not ask which is shorter, no end has moved by more than half of the shortest member.
+    """
+    far = NEAR * float(group.length.max())
+    if block[WIDTH]:
+        far = min(far, 0.25 * float(group.length.min()))
+    reach = float(np.hypot(*member[[QX, QY], block[START] : block[STOP]]).max())
+    return [far**2, min(far / max(reach, 1e-300), 1.0) ** 2]
+
+
 def _fill(group: MemberGroup, block: list[int], member: FloatArray) -> None:
-    """Write the members of a group into the padded arrays member (8, M_padded)."""
+    """Write the members of a group into the padded arrays member (MEMBER, M_padded)."""
     law = _spring(group)
     _, start, stop, _, _, count, width, length = block
     shape = (count // length, length) if width else (1, count)
-    rows = member[:, start : start + shape[0] * (width or count)].reshape(8, shape[0], -1)
+    rows = member[:, start : start + shape[0] * (width or count)].reshape(MEMBER, shape[0], -1)
     own = rows[:, :, : shape[1]]
     _, _, p_local, q_local = ends_of(group, as_stated=width > 0)
     own[0:2] = p_local.T.reshape(2, *shape)
     own[2:4] = q_local.T.reshape(2, *shape)
-    own[4] = (group.length if law.free_length is None else np.full(count, law.free_length)).reshape(shape)
-    own[5:8] = np.array([law.stiffness, law.damping, law.preload])[:, None, None]
+    own[L0] = (group.length if law.free_length is None else np.full(count, law.free_length)).reshape(shape)
+    own[EXCESS] = (group.length.reshape(shape) - own[L0]) * (group.length.reshape(shape) + own[L0])
+    own[STIFFNESS:MEMBER] = np.array([law.stiffness, law.damping, law.preload])[:, None, None]
     # what is between and behind them is the last one once more: no place has a length of its own
-    rows[:5, :, shape[1] :] = own[:5, :, -1:]
-    member[:5, start + rows[0].size : stop] = own[:5, -1, -1:]
+    rows[:STIFFNESS, :, shape[1] :] = own[:STIFFNESS, :, -1:]
+    member[:STIFFNESS, start + rows[0].size : stop] = own[:STIFFNESS, -1, -1:]
 
 
 def _spring(group: MemberGroup) -> SpringLaw:
@@ -121,16 +161,24 @@ def state_order(case: Case) -> tuple[str, ...]:
     return (*names, GROUND) if GROUND in held or set(names) - held else names
 
 
+def home_of(load_case: LoadCase, count: int) -> FloatArray:
+    """(count, HOME): where the bodies of a load case start, and ground behind them."""
+    home = np.zeros((count, HOME))
+    for row, body in zip(home, load_case.bodies, strict=False):
+        row[:3] = *body.position, body.angle
+    home[:, HOME_COS], home[:, HOME_SIN] = np.cos(home[:, HOME_ANGLE]), np.sin(home[:, HOME_ANGLE])
+    return home
+
+
 def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
     """The arrays of one load case; `shared` are those of `compile_members`."""
     names = state_order(case)
     index = {name: i for i, name in enumerate(names)}
     n_bodies = len(load_case.bodies)
     inv_mass = np.zeros(3 * len(names))
-    q0, v0 = np.zeros_like(inv_mass), np.zeros_like(inv_mass)
+    v0, home = np.zeros_like(inv_mass), home_of(load_case, len(names))
     for i, body in enumerate(load_case.bodies):
         inv_mass[3 * i : 3 * i + 3] = 1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia
-        q0[3 * i : 3 * i + 3] = *body.position, body.angle
         v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
 
     pairs, reach, shortest = _watched_pairs(names, shared)
@@ -156,16 +204,18 @@ def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
         load_force[:, k, 1] = segment_values(load.force[1], times)
 
     block, member = shared.block, shared.member
-    damped = bool(np.any(member[6] > 0.0))
+    damped = bool(np.any(member[DAMPING] > 0.0))
     model = Model(
         inv_mass=inv_mass,
-        q0=q0,
+        q0=np.zeros_like(v0),
         v0=v0,
+        home=home,
         pair=pairs,
         reach=reach,
         shortest=shortest,
         block=block,
         power=shared.power,
+        near=shared.near,
         member=member,
         times=times,
         force=force,

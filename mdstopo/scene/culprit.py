@@ -59,9 +59,10 @@ class Culprits:
             a, b = (3 * body for body in model.pair[block[PAIR]].tolist())
             ends = []
             for body, rows in ((a, (PX, PY)), (b, (QX, QY))):
-                c, s = np.cos(q[body + 2]), np.sin(q[body + 2])
+                at = model.home[body // 3, :3] + q[body : body + 3]
+                c, s = np.cos(at[2]), np.sin(at[2])
                 x, y = member[rows[0]], member[rows[1]]
-                ends.append(np.array([q[body] + c * x - s * y, q[body + 1] + s * x + c * y]))
+                ends.append(np.array([at[0] + c * x - s * y, at[1] + s * x + c * y]))
             ratio = np.hypot(*(ends[1] - ends[0])) / group.length
             carries = strength * (member[STIFFNESS] * member[L0] - member[PRELOAD]) != 0.0
             ratio = np.where(carries, ratio, np.inf)

@@ -1,11 +1,12 @@
 """A scene as arrays: what one load case needs to be computed, and nothing else.
 
-n_b bodies have n = 3 n_b coordinates q = (x, y, psi) each. `ground` is the last body, with infinite mass, where a
-member is tied to it; it is absent otherwise. Members live in blocks of one law and one pair of bodies, structure of
-arrays; blocks are padded to a multiple of the vector width with members of no stiffness, and so is each row of a
-block that joins every point of one grid with every point of another (`scene.grids`). Loads are linear in time
-within a segment, and the integrators land on the ends of segments, so a kernel never asks on which side of a kink
-it stands. All arrays are read-only; everything is a run-time value, so a changed case compiles nothing anew.
+n_b bodies have n = 3 n_b coordinates q: what x, y and psi of each have changed by since the start. `ground` is the
+last body, with infinite mass, where a member is tied to it; it is absent otherwise. Members live in blocks of one law
+and one pair of bodies, structure of arrays; blocks are padded to a multiple of the vector width with members of no
+stiffness, and so is each row of a block that joins every point of one grid with every point of another (`scene.grids`).
+Loads are linear in time within a segment, and the integrators land on the ends of segments, so a kernel never asks on
+which side of a kink it stands. All arrays are read-only; everything is a run-time value, so a changed case compiles
+nothing anew.
 """
 
 from typing import NamedTuple
@@ -17,7 +18,11 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 #: rows of `Model.member`
-PX, PY, QX, QY, L0, STIFFNESS, DAMPING, PRELOAD = range(8)
+PX, PY, QX, QY, L0, EXCESS, STIFFNESS, DAMPING, PRELOAD = range(9)
+MEMBER = 9
+#: columns of `Model.home`: x, y, psi, and cos and sin of psi
+HOME_X, HOME_Y, HOME_ANGLE, HOME_COS, HOME_SIN = range(5)
+HOME = 5
 #: columns of `Model.block`, and how many there are
 PAIR, START, STOP, KIND, DESIGN, COUNT, WIDTH, LENGTH = range(8)
 BLOCK = 8
@@ -41,6 +46,7 @@ class Springs(NamedTuple):
     member: FloatArray
     chunk: IndexArray
     threads: int
+    near: FloatArray
 
 
 class Model(NamedTuple):
@@ -48,14 +54,18 @@ class Model(NamedTuple):
 
     ============  ================  =====================================================================
     inv_mass      (n,)              1/m, 1/m, 1/J of each body; 0 for ground
-    q0, v0        (n,)              state at the start
+    q0, v0        (n,)              state at the start: what bodies have moved since home, which is nothing; velocities
+    home          (n / 3, 5)        x, y, psi of each body where its q is zero, cos and sin of that psi
     pair          (n_pair, 2)       the two bodies of each pair that members connect: P's, then Q's
     reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
     shortest      (n_pair,)         shortest initial length of a member, m (inf without members)
     block         (n_block, 8)      pair, start, stop (padded), kind of law, first design variable or -1, count;
                                     of a grid: places in a row, members in a row (otherwise 0)
     power         (n_block,)        mu of Eq. 12
-    member        (8, M_padded)     P, Q in body frames; free length; stiffness, damping, preload at alpha = 1
+    near          (n_block, 2)      squares of the shift (m^2) and of the turn up to which elongations come from
+                                    displacements (`mechanics.laws.spring.hardly_moved`)
+    member        (9, M_padded)     P, Q in body frames; free length l0; L^2 - l0^2 of the length L at home; stiffness,
+                                    damping, preload at alpha = 1
     times         (n_seg + 1,)      start, kinks of the loads, end
     force         (n_seg, n, 2)     generalised load at the segment's start, slope in time; with gravity
     load_body     (n_load,)         loads whose effect depends on the body's rotation: which body,
@@ -71,11 +81,13 @@ class Model(NamedTuple):
     inv_mass: FloatArray
     q0: FloatArray
     v0: FloatArray
+    home: FloatArray
     pair: IndexArray
     reach: FloatArray
     shortest: FloatArray
     block: IndexArray
     power: FloatArray
+    near: FloatArray
     member: FloatArray
     times: FloatArray
     force: FloatArray

@@ -12,7 +12,20 @@ import numpy as np
 
 from mdstopo.compiler.jit import part
 from mdstopo.compiler.threads import allowed
-from mdstopo.scene.model import BLOCK, CHUNK, MANY, ROWS, START, STOP, WIDTH, FloatArray, IndexArray, Model
+from mdstopo.scene.model import (
+    BLOCK,
+    CHUNK,
+    HOME,
+    MANY,
+    MEMBER,
+    ROWS,
+    START,
+    STOP,
+    WIDTH,
+    FloatArray,
+    IndexArray,
+    Model,
+)
 
 #: numbers in a line of the cache
 _LINE = 8
@@ -49,7 +62,16 @@ def pack(model: Model, threads: int | None = None) -> Packed:
         [np.array(sizes, dtype=np.int64)]
         + [a.ravel() for a in (model.pair, model.block, model.load_body, model.load_follows, chunk)]
     ).astype(np.int64)
-    before = [model.inv_mass, model.q0, model.v0, model.reach, model.shortest, model.power]
+    before = [
+        model.inv_mass,
+        model.q0,
+        model.v0,
+        model.home.ravel(),
+        model.reach,
+        model.shortest,
+        model.power,
+        model.near.ravel(),
+    ]
     gap = -sum(len(a) for a in before) % _LINE  # members begin on a line of the cache
     after = [model.member, model.times, model.force, model.load_arm, model.load_force]
     parts = [np.asarray(a, dtype=np.float64).ravel() for a in (*before, np.zeros(gap), *after)]
@@ -111,15 +133,19 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     q0 = floats[n : 2 * n]
     v0 = floats[2 * n : 3 * n]
     f = 3 * n
+    home = floats[f : f + n // 3 * HOME].reshape((n // 3, HOME))
+    f += n // 3 * HOME
     reach = floats[f : f + n_pair]
     f += n_pair
     shortest = floats[f : f + n_pair]
     f += n_pair
     power = floats[f : f + n_block]
     f += n_block
+    near = floats[f : f + 2 * n_block].reshape((n_block, 2))
+    f += 2 * n_block
     f += -f % _LINE
-    member = floats[f : f + 8 * padded].reshape((8, padded))
-    f += 8 * padded
+    member = floats[f : f + MEMBER * padded].reshape((MEMBER, padded))
+    f += MEMBER * padded
     times = floats[f : f + n_seg + 1]
     f += n_seg + 1
     force = floats[f : f + 2 * n_seg * n].reshape((n_seg, n, 2))
@@ -128,6 +154,6 @@ def unpack(ints, floats):  # type: ignore[no-untyped-def]
     f += 2 * n_load
     load_force = floats[f : f + 4 * n_seg * n_load].reshape((n_seg, n_load, 2, 2))
     return Model(
-        inv_mass, q0, v0, pair, reach, shortest, block, power, member, times, force, load_body, load_follows,
-        load_arm, load_force, chunk, ints[7],
+        inv_mass, q0, v0, home, pair, reach, shortest, block, power, near, member, times, force, load_body,
+        load_follows, load_arm, load_force, chunk, ints[7],
     )  # fmt: skip

@@ -1,10 +1,11 @@
 """The same scene, rounded otherwise: a sample of what double precision leaves uncertain.
 
 Two evaluations of one scene that differ in nothing but their tolerance round elongations alike, so their difference
-says nothing of what rounding does. Where a member of length L is stretched by Delta, its force is uncertain by
-eps L / Delta; states are rounded at every step, which adds up over many periods. Here the scene is computed from
-another point, so that its states round otherwise, and each length and each attachment point is moved to one of its
-neighbours in double precision. What that changes is what rounding changes, its growth in time included.
+says nothing of what rounding does. Where a member is stretched by Delta while its bodies have moved by u, its force is
+uncertain by eps u / Delta; states are rounded at every step, which adds up over many periods. Here the scene is
+computed from another point, and each length and each attachment point is moved to one of its neighbours in double
+precision: all products of displacements round otherwise. What that changes is what rounding changes, its growth in time
+included.
 """
 
 from dataclasses import replace

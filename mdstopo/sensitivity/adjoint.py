@@ -139,7 +139,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
             elif watched and k + 1 == count and c >= 1.0:
                 at = AT_END
             if at == ELSEWHERE:
-                value, _ = energy_at(pair, springs, strength, q, v, rel, sums)
+                value, _ = energy_at(pair, model.home, springs, strength, q, v, rel, sums)
                 work[0] += 1
                 if reduction == FINAL:
                     rows[0, 1] = value
@@ -147,7 +147,7 @@ def energy_rows(  # type: ignore[no-untyped-def]
                     for j in range(3):
                         pull[ELSEWHERE, p, j] = sums[0, p, 4 + j]
             else:
-                relative_pose(pair, q, v, rel[0])
+                relative_pose(pair, model.home, q, v, rel[0])
             energy_slope(pair, rel[0], pull[at], weight[0], mu_q)
         if not gradient:
             continue

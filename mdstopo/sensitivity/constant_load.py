@@ -41,10 +41,10 @@ def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):  # type
     pull = np.empty((n_pair, 3))
     scale_members(model, alpha, strength)
     for i in range(states.shape[0]):
-        relative_pose(pair, states[i, 0], states[i, 1], rel[0])
+        relative_pose(pair, model.home, states[i, 0], states[i, 1], rel[0])
         springs = springs_of(model)
         member_sums(springs, strength, rel, np.int64(1), np.bool_(True), sums)
-        pair_tangents(pair, rel[0], states[i, 0], sums[0], np.bool_(False), k, k)
+        pair_tangents(pair, rel[0], sums[0], np.bool_(False), k, k)
         for p in range(n_pair):
             for j in range(3):
                 pull[p, j] = sums[0, p, 4 + j]

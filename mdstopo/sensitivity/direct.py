@@ -25,7 +25,7 @@ NOWHERE = -2
 def slope_at(model, strength, q, v, rel, sums, out):  # type: ignore[no-untyped-def]
     """out (n,) = dg/dq at one state."""
     springs = springs_of(model)
-    energy_at(model.pair, springs, strength, q, v, rel, sums)
+    energy_at(model.pair, model.home, springs, strength, q, v, rel, sums)
     pull = np.empty((rel.shape[1], 3))
     for p in range(rel.shape[1]):
         for j in range(3):
@@ -64,7 +64,7 @@ def integral_weights(model, tables, steps, count, weight, bar):  # type: ignore[
     for w in range(count):
         stage_weights(tables, steps, w, weight[steps.index[w, 0] : steps.index[w + 1, 0]])
     for i in range(weight.shape[0]):
-        relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], rel)
+        relative_pose(model.pair, model.home, steps.stage[i, 0], steps.stage[i, 1], rel)
         energy_slope(model.pair, rel, steps.pull[i], weight[i], bar[i])
 
 
@@ -175,7 +175,7 @@ def direct(  # type: ignore[no-untyped-def]
             slope_at(model, strength, state[0], state[1], rel, sums, top[:n])
             total_line = line[0]
             total_line[:] = 0.0
-            apply_matrix(pair, model.block, model.member, steps.stage, 0, matrix, 0, 1, True, S, line)
+            apply_matrix(pair, model.home, model.block, model.member, steps.stage, 0, matrix, 0, 1, True, S, line)
             energy_gradient(model, steps.state[k : k + 1], one, total_line)
             unscale_gradient(model, alpha, total_line, history[k])
         if k == count:
@@ -198,7 +198,7 @@ def direct(  # type: ignore[no-untyped-def]
             o = steps.index[w, 0]
             end = steps.index[w + 1, 0]
             step_matrix(
-                pair, model.inv_mass, tables, steps, w, c, mu[job // n_row, job % n_row] if row else none,
+                pair, model.home, model.inv_mass, tables, steps, w, c, mu[job // n_row, job % n_row] if row else none,
                 bar[o:end] if integral and not row else no_bar, damped, turning, matrix,
             )  # fmt: skip
             work[5] += 1
@@ -209,7 +209,7 @@ def direct(  # type: ignore[no-untyped-def]
                 target = padded[job // n_row, job % n_row : job % n_row + 1] if row else total
                 first = width if out == 0 else 0
                 apply_matrix(
-                    pair, model.block, model.member, steps.stage[o:end], end - o, matrix, first,
+                    pair, model.home, model.block, model.member, steps.stage[o:end], end - o, matrix, first,
                     width + 1 if out == 0 else width, out == 0, S, target if out == 0 else S,
                 )  # fmt: skip
     finish_rows(model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients)

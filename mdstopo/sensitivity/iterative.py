@@ -18,6 +18,7 @@ from mdstopo.mechanics.assembly import add_turning, subtract_products
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
 from mdstopo.mechanics.passes import SUMS
+from mdstopo.scene.model import DAMPING, EXCESS, PRELOAD, STIFFNESS
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.direct import finish_rows, integral_weights, look_at_row
 from mdstopo.sensitivity.propagation import STRIP, add_three
@@ -103,7 +104,6 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):  # type: ign
     """out (n, STRIP) = -T^T b f of the members lo..hi of block k at unit strength; push (STRIP,) is room."""
     wide = hi - lo
     p = block[k, 0]
-    r = rel[p]
     unit = np.eye(3)
     lever = np.zeros(out.shape[0])
     out[:] = 0.0
@@ -116,13 +116,13 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):  # type: ign
         if block[k, 3] == 0:
             elastic_design(
                 member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[5, lo:hi], rel[p : p + 1], unit[axis : axis + 1], o,
+                member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], rel[p : p + 1], unit[axis : axis + 1], o,
             )  # fmt: skip
         else:
             viscous_design(
                 member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
-                member[5, lo:hi], member[6, lo:hi], member[7, lo:hi], r[0], r[1], r[2], r[3], r[4], r[5], r[6],
-                ux, uy, ut, o,
+                member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], member[DAMPING, lo:hi], member[PRELOAD, lo:hi],
+                rel[p], unit[axis], o,
             )  # fmt: skip
         lever[:] = 0.0
         add_pair_force(pair, rel, p, -ux, -uy, -ut, lever)
@@ -229,7 +229,7 @@ def iterative(  # type: ignore[no-untyped-def]
         if not radius < 1.0:
             return w
         for j in range(last + 1):
-            relative_pose(pair, steps.stage[o + j, 0], steps.stage[o + j, 1], rel[j])
+            relative_pose(pair, model.home, steps.stage[o + j, 0], steps.stage[o + j, 1], rel[j])
         for b in range(block.shape[0]):
             if block[b, 4] < 0:
                 continue

@@ -15,10 +15,10 @@ from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, defl
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
-from mdstopo.mechanics.laws.spring import meeting_in, passing_in, shortest_in
+from mdstopo.mechanics.laws.spring import elongation_of, meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
-from mdstopo.scene.model import DESIGN, L0, PAIR, PX, PY, QX, QY, START, STOP
+from mdstopo.scene.model import DESIGN, EXCESS, L0, PAIR, PX, PY, QX, QY, START, STOP
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -64,7 +64,7 @@ def look(  # type: ignore[no-untyped-def]
     steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
     pose = np.empty((steps.index[count, 0], model.pair.shape[0], POSE))
     for i in range(pose.shape[0]):
-        relative_pose(model.pair, steps.stage[i, 0], steps.stage[i, 1], pose[i])
+        relative_pose(model.pair, model.home, steps.stage[i, 0], steps.stage[i, 1], pose[i])
     find_meeting(model, strength, steps, count, pose, settings, meeting)
     find_unresolved(model, strength, steps, count, pose, len(tag) == len(GAUSS), max(VISIBLE, settings[0]), meeting)
     accuracy = solved_to(settings[0], settings[2])
@@ -104,12 +104,12 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):  # typ
     time = model.times[0]
     for p in range(n_pair):
         spare[p] = model.shortest[p]
-    relative_pose(pair, model.q0, model.v0, before)
+    relative_pose(pair, model.home, model.q0, model.v0, before)
     for i in range(steps.index[0, 0], stages + 1):
         was = time
         between = False
         if i == stages:
-            relative_pose(pair, steps.state[count, 0], steps.state[count, 1], rel)
+            relative_pose(pair, model.home, steps.state[count, 0], steps.state[count, 1], rel)
             time = steps.t[count]
         else:
             copy_rows(pose[i], rel)
@@ -155,7 +155,8 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):  # typ
 def find_unresolved(model, strength, steps, count, pose, collocated, visible, meeting):  # type: ignore[no-untyped-def]
     """meeting[2]: the member by which rounding leaves the largest stored energy no digits to speak of, or -1.
 
-    A length is known to u X where coordinates have the size X, u = 2.2e-16; an energy k Delta^2/2 then to k Delta u X.
+    An elongation is known to u X where bodies have moved by X since the start, u = 2.2e-16; an energy k Delta^2/2 then
+    to k Delta u X.
     By Cauchy and Schwarz the sum of these is at most u X sqrt(2 sum(k) E), which needs no pass over the members and
     nearly always is small enough.
 
@@ -174,7 +175,8 @@ def find_unresolved(model, strength, steps, count, pose, collocated, visible, me
         return
     size = 0.0
     for p in range(model.reach.shape[0]):
-        size = max(size, model.reach[p])
+        r = pose[best, p]
+        size = max(size, math.hypot(r[10], r[11]) + model.reach[p] * math.hypot(r[12], r[13]))
     for d in range(0, model.q0.shape[0], 3):
         size = max(size, abs(steps.stage[best, 0, d]), abs(steps.stage[best, 0, d + 1]))
     rounding = 2.2e-16 * size
@@ -195,7 +197,9 @@ def find_unresolved(model, strength, steps, count, pose, collocated, visible, me
         for i in range(model.block[b, START], model.block[b, STOP]):
             x = r[0] + r[2] * m[QX, i] - r[3] * m[QY, i] - m[PX, i]
             y = r[1] + r[3] * m[QX, i] + r[2] * m[QY, i] - m[PY, i]
-            elongation = abs(math.sqrt(x * x + y * y) - m[L0, i])
+            ux = r[10] + (r[12] * m[QX, i] - r[13] * m[QY, i])
+            uy = r[11] + (r[13] * m[QX, i] + r[12] * m[QY, i])
+            elongation = abs(elongation_of(x, y, math.sqrt(x * x + y * y), ux, uy, m[L0, i], m[EXCESS, i]))
             force = strength[0, i] * elongation
             lost += force * rounding
             elongated = elongated or (force > 0.0 and elongation > ELONGATED * rounding)
@@ -261,7 +265,7 @@ def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, str
                 v[d] = state[1, d]
         else:
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
-        relative_pose(model.pair, q, v, rel[0])
+        relative_pose(model.pair, model.home, q, v, rel[0])
         springs = springs_of(model)
         member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
         f[:] = 0.0

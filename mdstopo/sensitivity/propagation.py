@@ -15,13 +15,14 @@ from mdstopo.compiler.jit import kernel, member_kernel
 from mdstopo.integrators.contract import carried, tangent_step
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
+from mdstopo.scene.model import DAMPING, EXCESS, L0, PRELOAD, STIFFNESS
 
 #: members that are carried through together: their rows stay in the first-level cache
 STRIP = 128
 
 
 @kernel
-def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):  # type: ignore[no-untyped-def]
+def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):  # type: ignore[no-untyped-def]
     """Fill matrix (D + 1, D + 3 n_pair s) of step w, to its end (c < 0) or its fraction c.
 
     Columns: changes of the start; then for each stage and pair the three entries of b f of a member there. Rows:
@@ -53,7 +54,7 @@ def step_matrix(pair, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning,
             p = (j - width) // 3 % n_pair
             axis = (j - width) % 3
             if p == 0 and axis == 0:
-                relative_pose(pair, steps.stage[o + stage, 0], steps.stage[o + stage, 1], rel)
+                relative_pose(pair, home, steps.stage[o + stage, 0], steps.stage[o + stage, 1], rel)
             # a member's generalised force is -T^T b f
             unit = -1.0
             add_pair_force(
@@ -81,7 +82,7 @@ def add_three(a, b, c, x, y, z, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def apply_matrix(pair, block, member, stage, s, matrix, first, last, adding, S, target):  # type: ignore[no-untyped-def]
+def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, adding, S, target):  # type: ignore[no-untyped-def]
     """target (last - first, M_padded) = (adding: +=) rows first..last of matrix times the changes S and member forces.
 
     In: stage (s, 3, n) the states of the step's stages, S (D, M_padded). target may be S itself. Only design members.
@@ -90,7 +91,7 @@ def apply_matrix(pair, block, member, stage, s, matrix, first, last, adding, S, 
     width = S.shape[0]
     rel = np.empty((s, n_pair, POSE))
     for i in range(s):
-        relative_pose(pair, stage[i, 0], stage[i, 1], rel[i])
+        relative_pose(pair, home, stage[i, 0], stage[i, 1], rel[i])
     unit = np.eye(3)
     push = np.empty((3 * s, STRIP))
     fresh = np.empty((last - first, STRIP))
@@ -105,24 +106,21 @@ def apply_matrix(pair, block, member, stage, s, matrix, first, last, adding, S, 
             py = member[1, lo:hi]
             qx = member[2, lo:hi]
             qy = member[3, lo:hi]
-            l0 = member[4, lo:hi]
-            ks = member[5, lo:hi]
-            cs = member[6, lo:hi]
-            ps = member[7, lo:hi]
+            l0 = member[L0, lo:hi]
+            excess = member[EXCESS, lo:hi]
+            ks = member[STIFFNESS, lo:hi]
+            cs = member[DAMPING, lo:hi]
+            ps = member[PRELOAD, lo:hi]
             for i in range(3 * s):
-                r = rel[i // 3, p]
                 axis = i % 3
-                ux = 1.0 if axis == 0 else 0.0
-                uy = 1.0 if axis == 1 else 0.0
-                ut = 1.0 if axis == 2 else 0.0
                 o = push[i, :wide]
                 o[:] = 0.0
                 if block[k, 3] == 0:
-                    elastic_design(px, py, qx, qy, l0, ks, rel[i // 3 : i // 3 + 1, p], unit[axis : axis + 1], o)
-                else:
-                    viscous_design(
-                        px, py, qx, qy, l0, ks, cs, ps, r[0], r[1], r[2], r[3], r[4], r[5], r[6], ux, uy, ut, o
+                    elastic_design(
+                        px, py, qx, qy, l0, excess, ks, rel[i // 3 : i // 3 + 1, p], unit[axis : axis + 1], o
                     )
+                else:
+                    viscous_design(px, py, qx, qy, l0, excess, ks, cs, ps, rel[i // 3, p], unit[axis], o)
             for i in range(first, last):
                 o = fresh[i - first, :wide]
                 for g in range(wide):

@@ -10,7 +10,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.mechanics.start_entry import start_tangents
 from mdstopo.scene.compile import compile_members, compile_scene, state_order
 from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import COUNT, DESIGN
+from mdstopo.scene.model import COUNT, DESIGN, STIFFNESS
 from mdstopo.scene.packing import pack
 from tests.engine.plain import Plain
 from tests.engine.scenes import FEATURES, random_design, random_scene, read
@@ -80,9 +80,9 @@ def test_tangents_are_the_differentials_of_the_forces(seed):
     n, moving = len(model.inv_mass), 3 * len(case.bodies)
     rng = np.random.default_rng(seed)
     q, v = model.q0.copy(), model.v0.copy()
-    q[:moving] += rng.uniform(-0.2, 0.2, moving)
+    q[:moving] = rng.uniform(-0.2, 0.2, moving)
     v[:moving] += rng.uniform(-1.0, 1.0, moving)
-    strength = model.member[5:8].copy()
+    strength = model.member[STIFFNESS:].copy()
     for block, mu in zip(model.block.tolist(), model.power, strict=True):
         if block[DESIGN] >= 0:
             first = block[DESIGN]
@@ -106,7 +106,7 @@ def test_tangents_are_the_differentials_of_the_forces(seed):
     for d in range(moving):
         step = np.zeros(moving)
         step[d] = 1e-6
-        x, w = q[:moving], v[:moving]
+        x, w = model.home[:, :3].ravel()[:moving] + q[:moving], v[:moving]
         above = plain.member_force(x + step, w) + plain.load_force(t, x + step)
         below = plain.member_force(x - step, w) + plain.load_force(t, x - step)
         assert -K[:moving, d] == pytest.approx((above - below) / 2e-6, rel=0, abs=1e-7 * scale)

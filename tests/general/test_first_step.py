@@ -47,7 +47,7 @@ def _first(ints, floats, strength, tolerance, order, noise, work):
     q0, v0, a0, lam = model.q0.copy(), model.v0.copy(), np.zeros(n), np.zeros(model.size[0])
     balance(model, strength, np.int64(0), model.times[0], q0, v0, np.bool_(True), desk, a0, lam)
     rel = np.empty((n_pair, POSE))
-    relative_pose(model.pair, q0, v0, rel)
+    relative_pose(model.pair, model.home, q0, v0, rel)
     scratch = np.empty((3, n))
     return first_step(
         model, strength, model.times[1], q0, v0, a0, rel, np.zeros(n_pair), np.full(n_pair, noise), tolerance, order,

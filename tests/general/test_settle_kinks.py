@@ -118,7 +118,7 @@ def test_a_stack_on_legs_with_plateaus_and_gaps_rests_where_its_energy_is_least(
     case, energy = read_case(text), Energy(text)
     found = Evaluator(case).settled(np.ones(case.n_design), "default")
     assert found is not None
-    q = found.q[: len(energy.start)]
+    q = energy.start + found.q[: len(energy.start)]
     least, slope = energy(q)
     assert np.abs(slope).max() <= 1e-8 * energy.weight.max()
     assert least < energy(energy.start)[0]

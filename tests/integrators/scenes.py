@@ -10,7 +10,7 @@ from mdstopo.integrators.driver import CLOSENESS, NEWTON_TOLERANCE, ROWS
 from mdstopo.integrators.gauss_tables import gauss_tables
 from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for
-from mdstopo.scene.model import VECTOR, Model
+from mdstopo.scene.model import MEMBER, STIFFNESS, VECTOR, Model
 from mdstopo.scene.packing import pack
 from mdstopo.sensitivity.look import dense, look
 from mdstopo.sensitivity.reductions import MAX
@@ -67,10 +67,12 @@ def random_scene(
             c, s = np.cos(q0[3 * body + 2]), np.sin(q0[3 * body + 2])
             world.append(centre[body] + local @ np.array([[c, s], [-s, c]]))
         stop = start + -(-g.count // VECTOR) * VECTOR
-        member = np.zeros((8, stop - start))
+        member = np.zeros((MEMBER, stop - start))
         member[0:2, : g.count], member[2:4, : g.count] = p.T, q.T
         member[4, : g.count] = np.hypot(*(world[1] - world[0]).T)
-        member[5:8, : g.count] = np.array([[g.stiffness], [g.damping], [g.preload]]) * rng.uniform(0.5, 1.5, g.count)
+        member[STIFFNESS:, : g.count] = np.array([[g.stiffness], [g.damping], [g.preload]]) * rng.uniform(
+            0.5, 1.5, g.count
+        )
         rows.append(member)
         pair = pairs.index((g.a, g.b))
         reach[pair] = max(reach[pair], 0.57)
@@ -92,14 +94,21 @@ def random_scene(
         force[i, :, 0], force[i, :, 1] = jump * values[i], (values[i + 1] - values[i]) / length
         load_force[i, :, :, 0], load_force[i, :, :, 1] = extra[i], (extra[i + 1] - extra[i]) / length
     model = Model(
-        inv_mass=inv_mass, q0=q0, v0=v0, pair=np.array(pairs, dtype=np.int64), reach=reach,
+        inv_mass=inv_mass, q0=np.zeros(n), v0=v0, home=home_at(q0), pair=np.array(pairs, dtype=np.int64), reach=reach,
         shortest=np.full(len(pairs), 1e-3), block=np.array(blocks, dtype=np.int64), power=np.array(powers),
+        near=np.full((len(blocks), 2), 0.01),
         member=np.concatenate(rows, axis=1), times=times, force=force,
         load_body=np.arange(turning, dtype=np.int64) % len(masses),
         load_follows=np.arange(turning, dtype=np.int64) % 2,
         load_arm=rng.uniform(-0.3, 0.3, (turning, 2)), load_force=load_force,
     )  # fmt: skip
     return Scene(model, any(g.damping > 0 for g in groups), first)
+
+
+def home_at(q):
+    """(n / 3, HOME): home of bodies at q (n,)."""
+    places = q.reshape(-1, 3)
+    return np.column_stack([places, np.cos(places[:, 2]), np.sin(places[:, 2])])
 
 
 def figure_3(acceleration=(9.8, 0.0), turn=20.0, end=0.2) -> Scene:
@@ -112,19 +121,20 @@ def figure_3(acceleration=(9.8, 0.0), turn=20.0, end=0.2) -> Scene:
     t, one = np.linspace(-0.8, 0.8, 17), np.ones(17)
     Q = np.concatenate([np.c_[-one, t], np.c_[t, -one], np.c_[one, t]]) - (0.0, -1.0)
     p, q = np.repeat(P, 51, axis=0), np.tile(Q, (20, 1))
-    member = np.zeros((8, 1024))
+    member = np.zeros((MEMBER, 1024))
     member[0:2, :1020], member[2:4, :1020] = p.T, q.T
     member[4, :1020] = np.hypot(*(q - p - np.array([0.0, 1.0])).T)
-    member[5, :1020] = 225.0
+    member[STIFFNESS, :1020] = 225.0
     inv_mass = 1 / np.array([60.0, 60.0, 10.0, 2000.0, 2000.0, 6000.0])
     force = np.zeros((1, 6, 2))
     force[0, :, 0] = np.array([0, -9.8, 0, acceleration[0], acceleration[1] - 9.8, turn]) / inv_mass
     q0 = np.array([0.0, 0, 0, 0, -1, 0])
     model = Model(
-        inv_mass=inv_mass, q0=q0, v0=np.zeros(6), pair=np.array([[0, 1]]), reach=np.array([2.1]),
-        shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020, 0, 0]]), power=np.ones(1), member=member,
-        times=np.array([0.0, end]), force=force, load_body=np.zeros(0, np.int64),
-        load_follows=np.zeros(0, np.int64), load_arm=np.zeros((0, 2)), load_force=np.zeros((1, 0, 2, 2)),
+        inv_mass=inv_mass, q0=np.zeros(6), v0=np.zeros(6), home=home_at(q0), pair=np.array([[0, 1]]),
+        reach=np.array([2.1]), shortest=np.array([0.1]), block=np.array([[0, 0, 1024, 0, 0, 1020, 0, 0]]),
+        power=np.ones(1), near=np.full((1, 2), 0.01), member=member, times=np.array([0.0, end]), force=force,
+        load_body=np.zeros(0, np.int64), load_follows=np.zeros(0, np.int64), load_arm=np.zeros((0, 2)),
+        load_force=np.zeros((1, 0, 2, 2)),
     )  # fmt: skip
     return Scene(model, False, 1020)
 
@@ -223,7 +233,7 @@ class Bench:
 
 
 def energies(scene: Scene, q):
-    """Stored energy of every design member (N,) at unit strength in the pose q (n,), and mu (N,)."""
+    """Stored energy of every design member (N,) at unit strength where the bodies have moved by q (n,), and mu (N,)."""
     m = scene.model
     out, power = np.zeros(scene.n_design), np.zeros(scene.n_design)
     for (pair, start, _, _, first, count, _, _), mu in zip(m.block.tolist(), m.power.tolist(), strict=True):
@@ -231,7 +241,7 @@ def energies(scene: Scene, q):
             continue
         ends = []
         for row, body in zip((0, 2), m.pair[pair], strict=True):
-            x, y, psi = q[3 * body : 3 * body + 3]
+            x, y, psi = m.home[body, :3] + q[3 * body : 3 * body + 3]
             local = m.member[row : row + 2, start : start + count]
             ends.append(
                 [
@@ -240,7 +250,7 @@ def energies(scene: Scene, q):
                 ]
             )
         stretch = np.hypot(*np.subtract(ends[1], ends[0])) - m.member[4, start : start + count]
-        out[first : first + count] = 0.5 * m.member[5, start : start + count] * stretch**2
+        out[first : first + count] = 0.5 * m.member[STIFFNESS, start : start + count] * stretch**2
         power[first : first + count] = mu
     return out, power
 

@@ -40,10 +40,14 @@ def _far(member, before, after):
 
 
 def scene(law, seed=0):
-    """Members (5, COUNT), the last six of the block padding; their scales; parameters; a pose with its rate."""
+    """Members (6, COUNT), at home where the relative pose is none; their scales; parameters; a pose with its rate.
+
+    The last six of the block are padding.
+    """
     rng = np.random.default_rng(seed)
-    member, scale = rng.normal(size=(5, COUNT)), rng.uniform(0.1, 1.0, COUNT)
+    member, scale = rng.normal(size=(6, COUNT)), rng.uniform(0.1, 1.0, COUNT)
     member[4] = np.abs(member[4])
+    member[5] = (member[2] - member[0]) ** 2 + (member[3] - member[1]) ** 2 - member[4] ** 2
     member[:, STOP - 6 : STOP] = scale[STOP - 6 : STOP] = 0.0
     x, rate = rng.normal(size=3), rng.normal(size=3)
     return member, scale, np.array(LAWS[law]), x, rate
@@ -52,6 +56,7 @@ def scene(law, seed=0):
 def pose(x, rate):
     r = np.zeros(POSE)
     r[:7] = x[0], x[1], np.cos(x[2]), np.sin(x[2]), *rate
+    r[10:] = x[0], x[1], -2.0 * np.sin(0.5 * x[2]) ** 2, np.sin(x[2])
     return r
 
 
@@ -116,6 +121,7 @@ def test_the_design_gradient_is_each_member_s_work_and_energy(law):
 def test_a_member_without_length_has_energy_but_no_force():
     member, scale, p, x, rate = scene("damped", 3)
     member[:4, START:STOP] = 0.0
+    member[5] = -(member[4] ** 2)
     x[:] = 0.0
     o = sums(member, scale, p, x, rate)
     assert o[3] == pytest.approx((scale * 0.5 * p[0] * member[4] ** 2)[START:STOP].sum(), rel=1e-13)

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from mdstopo.case.model import JOINTS, DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
 from mdstopo.mechanics.joints import table
-from mdstopo.mechanics.joints.revolute import PLACES
-from mdstopo.mechanics.joints.revolute import turn as fill
+from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.mechanics.joints.table import CODES, WIDTH, describe, kernels_of, parameters
+from mdstopo.scene.model import HOME
 
 #: how many rows each has
 ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
@@ -32,47 +32,50 @@ many = settings(max_examples=25, deadline=None, derandomize=True)
 
 # Kernels have no Python wrapper: these are their callers.
 @numba.njit
-def turned(w):
-    """w (6,) with the turns of both bodies behind it."""
+def turned(w, par):
+    """The places of two bodies that are at w (6,); behind the parameters par there is where they are at home."""
+    home = par[WIDTH:].reshape((2, HOME))
+    q = np.empty(6)
+    for i in range(6):
+        q[i] = w[i] - home[i // 3, i % 3]
     places = np.empty(PLACES)
-    places[:6] = w
-    fill(places)
+    place_joint(home, 0, 1, q, places)
     return places
 
 
 @numba.njit
 def _rows(code, par, w, phi, jac):
-    table.joint_rows(code, par, turned(w), phi, jac)
+    table.joint_rows(code, par, turned(w, par), phi, jac)
 
 
 @numba.njit
 def _gamma(code, par, w, wd, gamma):
-    table.joint_gamma(code, par, turned(w), wd, gamma)
+    table.joint_gamma(code, par, turned(w, par), wd, gamma)
 
 
 @numba.njit
 def _velocity_slope(code, par, w, wd, out):
-    table.joint_velocity_slope(code, par, turned(w), wd, out)
+    table.joint_velocity_slope(code, par, turned(w, par), wd, out)
 
 
 @numba.njit
 def _acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
-    table.joint_acceleration_slopes(code, par, turned(w), wd, wdd, by_q, by_v)
+    table.joint_acceleration_slopes(code, par, turned(w, par), wd, wdd, by_q, by_v)
 
 
 @numba.njit
 def _stiffness(code, par, w, lam, k):
-    table.joint_stiffness(code, par, turned(w), lam, k)
+    table.joint_stiffness(code, par, turned(w, par), lam, k)
 
 
 @numba.njit
 def _reaction(code, rows, par, w, lam, out):
-    table.joint_reaction(code, rows, par, turned(w), lam, out)
+    table.joint_reaction(code, rows, par, turned(w, par), lam, out)
 
 
 @numba.njit
 def _transmitted(code, par, w, lam, which, by_lam, by_q):
-    return table.joint_transmitted(code, par, turned(w), lam, which, by_lam, by_q)
+    return table.joint_transmitted(code, par, turned(w, par), lam, which, by_lam, by_q)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,6 +115,15 @@ def joint_of(kind, at_first, at_second, axis=(1.0, 0.0), length=1.0, name="hip",
     )
 
 
+def with_home(joint, angle_first=0.0, angle_second=0.0, places=((0.0, 0.0), (0.0, 0.0))):
+    """The parameters of a joint between two bodies at home, and behind them this home."""
+    angles = (angle_first, angle_second)
+    home = np.array(
+        [(*place, angle, np.cos(angle), np.sin(angle)) for place, angle in zip(places, angles, strict=True)]
+    )
+    return np.array([*parameters(joint, home, 0, 1), *home.ravel()])
+
+
 def setting(kind, seed):
     """A generic one: points off the centres of mass, joints that do not fit, a link that is not short."""
     rng = np.random.default_rng(seed)
@@ -127,7 +139,7 @@ def setting(kind, seed):
     w[3:5] = w[:2] + turn(w[2]) @ arms[0] + apart - turn(w[5]) @ arms[1]
     lam = np.zeros(3)
     lam[: ROWS[kind]] = rng.uniform(-5.0, 5.0, ROWS[kind])
-    par = np.array(parameters(joint, *angles))
+    par = with_home(joint, *angles, rng.normal(size=(2, 2)))
     return Setting(kind, joint, angles, par, w, rng.uniform(-3.0, 3.0, 6), rng.uniform(-5.0, 5.0, 6), lam)
 
 
@@ -321,7 +333,7 @@ def test_rows_that_a_joint_has_not_stay_as_they_are(kind):
 def test_a_pendulum_has_its_centripetal_acceleration():
     # the second body hangs from the origin of ground by an arm l along its own y axis and turns at omega
     arm, omega = 0.7, 3.0
-    par = np.array(parameters(joint_of("revolute", (0.0, 0.0), (0.0, arm)), 0.0, 0.0))
+    par = with_home(joint_of("revolute", (0.0, 0.0), (0.0, arm)))
     w = np.array([0.0, 0.0, 0.0, 0.0, -arm, 0.0])
     wd = np.array([0.0, 0.0, 0.0, omega * arm, 0.0, omega])
     phi, jac, gamma = np.zeros(3), np.zeros((3, 6)), np.zeros(3)
@@ -337,7 +349,7 @@ def test_a_pendulum_has_its_centripetal_acceleration():
 def test_a_slider_on_a_turning_guide_has_its_coriolis_acceleration():
     # the guide turns at omega about the origin, the slider is at radius r on it and moves outward at u
     radius, omega, u = 0.4, 2.0, 1.5
-    par = np.array(parameters(joint_of("prismatic", (0.0, 0.0), (0.0, 0.0)), 0.0, 0.0))
+    par = with_home(joint_of("prismatic", (0.0, 0.0), (0.0, 0.0)))
     w = np.array([0.0, 0.0, 0.0, radius, 0.0, 0.0])
     wd = np.array([0.0, 0.0, omega, u, omega * radius, omega])
     phi, jac, gamma = np.zeros(3), np.zeros((3, 6)), np.zeros(3)
@@ -350,7 +362,7 @@ def test_a_slider_on_a_turning_guide_has_its_coriolis_acceleration():
 
 def test_a_turning_link_has_its_centripetal_acceleration():
     length, speed = 2.0, 3.0
-    par = np.array(parameters(joint_of("distance", (0.0, 0.0), (0.0, 0.0), length=length), 0.0, 0.0))
+    par = with_home(joint_of("distance", (0.0, 0.0), (0.0, 0.0), length=length))
     wd = np.array([0.0, 0.0, 0.0, 0.0, speed, 0.0])
     gamma = np.zeros(3)
     _gamma(CODES["distance"], par, np.array([0.0, 0.0, 0.0, length, 0.0, 0.0]), wd, gamma)
@@ -480,7 +492,7 @@ def test_what_transmits_nothing_has_no_slope(kind, which):
 def test_a_link_whose_points_meet_has_zero_rows_and_no_nan(gap):
     s = setting("distance", 9)
     joint = joint_of("distance", (0.0, 0.0), (0.0, 0.0), length=0.8)
-    s = dataclasses.replace(s, joint=joint, par=np.array(parameters(joint, 0.0, 0.0)))
+    s = dataclasses.replace(s, joint=joint, par=with_home(joint))
     s = s.at([0.0, 0.0, 0.3, gap, gap, -0.4])
     phi, jac = rows_of(s)
     assert phi[0] == pytest.approx(-0.8, abs=1e-15)
@@ -493,7 +505,7 @@ def test_a_link_whose_points_meet_has_zero_rows_and_no_nan(gap):
 def test_a_very_short_link_still_has_its_direction():
     s = setting("distance", 9)
     joint = joint_of("distance", (0.0, 0.0), (0.0, 0.0), length=0.8)
-    s = dataclasses.replace(s, joint=joint, par=np.array(parameters(joint, 0.0, 0.0)))
+    s = dataclasses.replace(s, joint=joint, par=with_home(joint))
     short = 1e-149
     _, jac = rows_of(s.at([0.0, 0.0, 0.0, 0.6 * short, 0.8 * short, 0.0]))
     assert close(jac[0], np.array([-0.6, -0.8, 0.0, 0.6, 0.8, 0.0]), 1e-12)
@@ -507,19 +519,23 @@ def test_codes_and_rows_know_every_joint_of_the_format():
 
 
 @every_kind
-def test_a_parameter_row_holds_points_normal_start_angle_and_length(kind):
+def test_a_parameter_row_holds_points_normal_length_and_misfit_at_home(kind):
     joint = joint_of(kind, (1.0, 2.0), (3.0, 4.0), (0.6, 0.8), 5.0)
-    row = parameters(joint, 0.25, 1.0)
+    home = np.array([[0.0, 0.0, angle, np.cos(angle), np.sin(angle)] for angle in (0.25, 1.0)])
+    row = parameters(joint, home, 0, 1)
     assert len(row) == WIDTH == 12
     assert all(type(value) is float for value in row)
     assert row[:4] == [1.0, 2.0, 3.0, 4.0]
     if kind == "prismatic":
         assert row[4:6] == [-0.8, 0.6]
-    if kind in ("prismatic", "fixed"):
-        assert row[6] == 0.75
+    apart = turn(1.0) @ [3.0, 4.0] - turn(0.25) @ [1.0, 2.0]
+    misfit = [*apart, 0.0, 0.0]
+    if kind == "prismatic":
+        misfit[:2] = turn(0.25) @ [-0.8, 0.6] @ apart, 0.0
     if kind == "distance":
         assert row[7] == 5.0
-    assert row[8:] == [0.0] * 4
+        misfit[:2] = apart @ apart - 25.0, 0.0
+    assert row[8:] == pytest.approx(misfit, rel=1e-14)
 
 
 def test_joints_are_named_as_their_author_named_them():

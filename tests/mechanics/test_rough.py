@@ -11,7 +11,7 @@ from mdstopo.mechanics.passes import SUMS, member_sums
 from mdstopo.mechanics.rough import may_be_rough, rough_sums
 from mdstopo.scene import compile as scenes
 from mdstopo.scene.grids import STRIDE
-from mdstopo.scene.model import Springs
+from mdstopo.scene.model import STIFFNESS, Springs
 from tests.engine.scenes import read
 from tests.mechanics.test_grids import grids
 
@@ -20,7 +20,7 @@ with_vectors()
 
 @numba.njit
 def _sums(block, member, chunk, strength, rel, exact, rough):
-    springs = Springs(block, member, chunk, 0)
+    springs = Springs(block, member, chunk, 0, np.zeros((block.shape[0], 2)))
     member_sums(springs, strength, rel, rel.shape[0], True, exact)
     rough_sums(springs, strength, rel, rel.shape[0], rough)
 
@@ -51,7 +51,7 @@ def test_sums_in_single_precision_are_near_the_exact_ones(p, q):
     model = model_of(read(web(p, q)))
     assert may_be_rough.py_func(model)
     rng = np.random.default_rng(p)
-    strength = rng.uniform(0.5, 1.0, (3, model.member.shape[1])) * model.member[5]
+    strength = rng.uniform(0.5, 1.0, (3, model.member.shape[1])) * model.member[STIFFNESS]
     turns = rng.uniform(-1.0, 1.0, (9, 1))
     rel = np.zeros((9, 1, POSE))
     rel[:, :, :2] = rng.uniform(-1.0, 1.0, (9, 1, 2))

@@ -12,7 +12,7 @@ from mdstopo.mechanics.laws.spring import shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, _scale_chunks, _unscale_chunks, member_sums
 from mdstopo.scene.grids import places_of
-from mdstopo.scene.model import START, STOP, WIDTH, Springs
+from mdstopo.scene.model import EXCESS, L0, START, STIFFNESS, STOP, WIDTH, Springs
 from mdstopo.scene.packing import chunks_of
 from tests.engine.scenes import read
 from tests.mechanics.test_grids import grids
@@ -32,8 +32,9 @@ def _unscaled(threads, chunk, block, power, alpha, padded, out):
 
 
 @numba.njit
-def _sums(block, member, strength, rel, sums):
-    member_sums(Springs(block, member, np.zeros((0, 3), np.int64), 0), strength, rel, rel.shape[0], True, sums)
+def _sums(block, member, near, strength, rel, sums):
+    springs = Springs(block, member, np.zeros((0, 3), np.int64), 0, np.full((block.shape[0], 2), near))
+    member_sums(springs, strength, rel, rel.shape[0], True, sums)
 
 
 @numba.njit
@@ -73,7 +74,7 @@ def test_strengths_and_gradients_are_each_variable_s_own(p, q, last, power, thre
     strength = np.zeros((3, member.shape[1]))
     _scaled(threads, chunk, block, power_of, member, alpha, strength)
     expected = np.zeros(member.shape[1])
-    expected[places] = alpha**power * member[5, places]
+    expected[places] = alpha**power * member[STIFFNESS, places]
     np.testing.assert_allclose(strength[0], expected, rtol=1e-15, atol=0.0)
     assert not strength[1:].any()
     padded = rng.uniform(0.1, 1.0, member.shape[1])
@@ -84,22 +85,24 @@ def test_strengths_and_gradients_are_each_variable_s_own(p, q, last, power, thre
     assert (held[-GUARD:] == 7.0).all()
 
 
-def test_a_member_of_a_grid_without_length_adds_what_one_of_no_grid_does():
+@pytest.mark.parametrize("near", [0.0, 1.0])
+def test_a_member_of_a_grid_without_length_adds_what_one_of_no_grid_does(near):
     model = model_of(20, 51)
     block, member = np.array(model.block), np.array(model.member)
     _, start, _, _, _, _, width, _ = block[1].tolist()
     place = start + 3 * width + 7
     member[0, place - 7 : place - 7 + width] = member[2, start + 7 : start + 20 * width : width] = 0.25
     member[1, place - 7 : place - 7 + width] = member[3, start + 7 : start + 20 * width : width] = -0.5
+    member[EXCESS] = (member[2] - member[0]) ** 2 + (member[3] - member[1]) ** 2 - member[L0] ** 2
     rng = np.random.default_rng(2)
-    strength = rng.uniform(0.5, 1.0, (3, member.shape[1])) * member[5]
+    strength = rng.uniform(0.5, 1.0, (3, member.shape[1])) * member[STIFFNESS]
     rel = np.zeros((1, 1, POSE))
     rel[0, 0, 2] = 1.0
     plain = block.copy()
     plain[:, WIDTH] = 0
     found, expected = np.zeros((2, 1, 1, SUMS))
-    _sums(block, member, strength, rel, found)
-    _sums(plain, member, strength, rel, expected)
+    _sums(block, member, near, strength, rel, found)
+    _sums(plain, member, near, strength, rel, expected)
     size = np.abs(expected).max()
     assert np.abs(found - expected).max() <= 1e-13 * size
     # and it would be seen: its stiffness is a good part of the tangent

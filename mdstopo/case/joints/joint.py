@@ -68,7 +68,7 @@ class Joint(Value):
         return None
 
     def row(self) -> dict[int, float]:
-        """Numbers of its own for the kernels, by their place in the parameters: 4, 5 and 7 to 11."""
+        """Numbers of its own for the kernels, by their place in the parameters: 4 to 7."""
         return {}
 
 

@@ -3,14 +3,16 @@
     Phi' = e . d',    Phi'' = e . d'' + (|d'|^2 - Phi'^2)/|d|
 
 Where the points meet the link has no direction, and its rows are zero (which the balance reports as singular).
-Parameters: s_A (2), s_B (2), -, -, -, L.
+Parameters: s_A (2), s_B (2), -, -, -, L, |d|^2 - L^2 at home.
 """
 
 import math
 
+from mdstopo.case.joints import DistanceJoint
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints.kernels import JointKernels
-from mdstopo.mechanics.joints.revolute import arms
+from mdstopo.mechanics.joints.kernels import FITTED, AtHome, JointKernels
+from mdstopo.mechanics.joints.revolute import apart_since, arms
+from mdstopo.mechanics.laws.spring import elongation_of
 
 
 @kernel
@@ -39,7 +41,8 @@ def distance_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     inverse = 1.0 / length if length > 1e-150 else 0.0
     ex = x * inverse
     ey = y * inverse
-    phi[0] = length - par[7]
+    ux, uy = apart_since(par, w)
+    phi[0] = elongation_of(x, y, length, ux, uy, par[7], par[8])
     jac[0, 0] = -ex
     jac[0, 1] = -ey
     jac[0, 2] = ex * py - ey * px
@@ -140,7 +143,15 @@ def _across(i, ex, ey, px, py, cx, cy):  # type: ignore[no-untyped-def]
     return ey * cy + ex * cx
 
 
+def distance_at_home(joint: DistanceJoint, home: AtHome) -> dict[int, float]:
+    """The square of the distance less that of the length; what only rounding has left of it is zero."""
+    length = math.hypot(home.x, home.y)
+    off = (length - joint.length) * (length + joint.length)
+    return {8: off if abs(length - joint.length) > FITTED * home.size else 0.0}
+
+
 KERNELS = JointKernels(
+    at_home=distance_at_home,
     steady=((),),
     phi=distance_rows,
     gamma=distance_gamma,

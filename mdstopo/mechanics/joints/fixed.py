@@ -1,11 +1,12 @@
 """The fixed joint: two points coincide, as in the revolute one, and the angle psi_B - psi_A stays theta_0.
 
-Parameters: s_A (2), s_B (2), -, -, theta_0.
+Parameters: those of the revolute joint. theta_0 is the angle at home.
 """
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.joints.kernels import JointKernels
 from mdstopo.mechanics.joints.revolute import (
+    point_at_home,
     revolute_acceleration_slopes,
     revolute_gamma,
     revolute_rows,
@@ -18,7 +19,7 @@ from mdstopo.mechanics.joints.revolute import (
 def fixed_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     """Phi (3) and its slopes; the angle's are constant, so all else is the revolute joint's."""
     revolute_rows(par, w, phi, jac)
-    phi[2] = w[5] - w[2] - par[6]
+    phi[2] = w[5] - w[2]
     for i in range(6):
         jac[2, i] = 0.0
     jac[2, 2] = -1.0
@@ -57,6 +58,7 @@ def fixed_moment(lam, by_lam):  # type: ignore[no-untyped-def]
 
 
 KERNELS = JointKernels(
+    at_home=point_at_home,
     steady=((0, 1), (0, 1), (0, 1, 2)),
     phi=fixed_rows,
     gamma=fixed_gamma,

@@ -2,9 +2,9 @@
 
 A kernel takes what it needs of the following, in any order, by these names:
 
-    par (WIDTH,)     the joint's parameters: its point on either body (4), two numbers of its own, the bodies'
-                     angle at the start, and further numbers of its own (`Joint.row`)
-    w (PLACES,)      coordinates of the first and the second body, with the turns of `revolute.turn`
+    par (WIDTH,)     the joint's parameters: its point on either body (4), its own numbers (`Joint.row`), and from
+                     place 8 on what Phi is at home (`at_home`)
+    w (PLACES,)      where both bodies are (`revolute.place_joint`); angles are those since home
     wd, wdd (6,)     their derivatives by time
     lam (3,)         multipliers, one a row
     phi (3,), jac (3, 6), gamma (3,), out (3, 6), by_q, by_v (3, 6), k (6, 6), by_lam (3,)    what it writes
@@ -12,11 +12,27 @@ A kernel takes what it needs of the following, in any order, by these names:
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from mdstopo.compiler.kernel import Kernel
 
 Function = Kernel | Callable[..., Any]
+
+
+#: misfit of a joint at home, relative to its coordinates, that only rounding has left
+FITTED = 4e-15
+
+
+class AtHome(NamedTuple):
+    """A joint at home. x, y: from its point on the first body to that on the second, m; c, s: of the first body's
+    angle; size: what rounding of the points is measured against, m.
+    """
+
+    x: float
+    y: float
+    c: float
+    s: float
+    size: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +48,7 @@ class JointKernels:
     force_rows: of how many of the first rows the multipliers are the components of the force that the joint transmits,
     along directions that are perpendicular: 2, 1 or none. moment (par, w, lam, by_lam, by_q): the moment that it
     transmits, with its slopes; None where it transmits none.
+    at_home (joint, home): parameters by their place, 8 to 11, that say what Phi is at home; None where that is zero.
     is_point: whether its rows are those of the revolute joint, and linear ones behind them, which spares work.
     """
 
@@ -43,6 +60,7 @@ class JointKernels:
     stiffness: Function | None = None
     force_rows: int = 0
     moment: Function | None = None
+    at_home: Callable[[Any, AtHome], dict[int, float]] | None = None
     is_point: bool = False
 
     @property

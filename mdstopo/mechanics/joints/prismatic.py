@@ -5,12 +5,13 @@ n . p is constant, so with E = x_B + c - x_A and m = n turned by a right angle
 
     Phi'_1 = n . E' + omega_A m . E,     Phi''_1 = n . E'' + 2 omega_A m . E' + omega_A' m . E - omega_A^2 n . E
 
-Parameters: s_A (2), s_B (2), n_0 (2), theta_0.
+Parameters: s_A (2), s_B (2), n_0 (2), -, -, n . D at home. theta_0 is the angle at home.
 """
 
+from mdstopo.case.joints import PrismaticJoint
 from mdstopo.compiler.jit import kernel
-from mdstopo.mechanics.joints.kernels import JointKernels
-from mdstopo.mechanics.joints.revolute import arms
+from mdstopo.mechanics.joints.kernels import AtHome, JointKernels
+from mdstopo.mechanics.joints.revolute import apart_since, arms
 
 
 @kernel
@@ -28,8 +29,13 @@ def _frame(par, w):  # type: ignore[no-untyped-def]
 def prismatic_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     """Phi (2) and its slopes."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
-    phi[0] = nx * ex + ny * ey - (par[4] * par[0] + par[5] * par[1])
-    phi[1] = w[5] - w[2] - par[6]
+    # n . D less n_h . D_h at home, in what n and D have changed by
+    px, py, _, _ = arms(par, w)
+    dx, dy = apart_since(par, w)
+    turned_x = w[14] * par[4] - w[15] * par[5]
+    turned_y = w[15] * par[4] + w[14] * par[5]
+    phi[0] = par[8] + (nx * dx + ny * dy) + (turned_x * (ex - px - dx) + turned_y * (ey - py - dy))
+    phi[1] = w[5] - w[2]
     jac[0, 0] = -nx
     jac[0, 1] = -ny
     jac[0, 2] = nx * ey - ny * ex
@@ -138,7 +144,14 @@ def prismatic_moment(par, w, lam, by_lam, by_q):  # type: ignore[no-untyped-def]
     return lam[1] - lam[0] * lever
 
 
+def prismatic_at_home(joint: PrismaticJoint, home: AtHome) -> dict[int, float]:
+    """How far the second point is off the axis."""
+    nx, ny = -joint.axis[1], joint.axis[0]
+    return {8: (home.c * nx - home.s * ny) * home.x + (home.s * nx + home.c * ny) * home.y}
+
+
 KERNELS = JointKernels(
+    at_home=prismatic_at_home,
     steady=((), ()),
     phi=prismatic_rows,
     gamma=prismatic_gamma,

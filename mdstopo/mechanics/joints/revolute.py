@@ -1,24 +1,47 @@
 """The revolute joint: two points coincide. Phi = x_B + c - x_A - p with arms p = R_A s_A, c = R_B s_B (global axes).
 
-Parameters: s_A (2), s_B (2). Used by the fixed joint too, which adds a row of its own.
+Parameters: s_A (2), s_B (2), -, -, -, -, Phi at home (2). Used by the fixed joint too, which adds a row of its own.
 """
 
-import math
+from mdstopo.compiler.jit import part
+from mdstopo.mechanics.geometry import turned_body
+from mdstopo.mechanics.joints.kernels import AtHome, JointKernels
 
-from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.joints.kernels import JointKernels
-
-#: places of w: x, y, psi of both bodies, then cos and sin of both angles, which many joints share
-PLACES = 10
+#: places of w: x, y of a body and by what angle it has turned since home, for both; cos and sin of both angles psi;
+#: then what has changed since home: x and y of both, cos and sin of both
+PLACES = 18
 
 
-@kernel
-def turn(w):  # type: ignore[no-untyped-def]
-    """Fill in cos and sin of both angles of w (PLACES,)."""
-    w[6] = math.cos(w[2])
-    w[7] = math.sin(w[2])
-    w[8] = math.cos(w[5])
-    w[9] = math.sin(w[5])
+@part
+def place_turned(home, a, b, q, turns_a, turns_b, w):  # type: ignore[no-untyped-def]
+    """Fill w (PLACES,) of bodies a and b from q (n,) and what `turned_body` gives of them."""
+    for side in range(2):
+        body = a if side == 0 else b
+        c, s, c_since, s_since = turns_a if side == 0 else turns_b
+        w[3 * side] = home[body, 0] + q[3 * body]
+        w[3 * side + 1] = home[body, 1] + q[3 * body + 1]
+        w[3 * side + 2] = q[3 * body + 2]
+        w[6 + 2 * side] = c
+        w[7 + 2 * side] = s
+        w[10 + 2 * side] = q[3 * body]
+        w[11 + 2 * side] = q[3 * body + 1]
+        w[14 + 2 * side] = c_since
+        w[15 + 2 * side] = s_since
+
+
+@part
+def place_joint(home, a, b, q, w):  # type: ignore[no-untyped-def]
+    """Fill w (PLACES,) of bodies a and b from q (n,)."""
+    place_turned(home, a, b, q, turned_body(home, a, q[3 * a + 2]), turned_body(home, b, q[3 * b + 2]), w)
+
+
+@part
+def apart_since(par, w):  # type: ignore[no-untyped-def]
+    """What x_B + c - x_A - p has changed by since home."""
+    return (
+        w[12] - w[10] + (w[16] * par[2] - w[17] * par[3]) - (w[14] * par[0] - w[15] * par[1]),
+        w[13] - w[11] + (w[17] * par[2] + w[16] * par[3]) - (w[15] * par[0] + w[14] * par[1]),
+    )
 
 
 @part
@@ -40,8 +63,9 @@ def arms(par, w):  # type: ignore[no-untyped-def]
 def revolute_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
     """Phi (2) and its slopes."""
     px, py, cx, cy = arms(par, w)
-    phi[0] = w[3] + cx - w[0] - px
-    phi[1] = w[4] + cy - w[1] - py
+    x, y = apart_since(par, w)
+    phi[0] = par[8] + x
+    phi[1] = par[9] + y
     for r in range(2):
         for i in range(6):
             jac[r, i] = 0.0
@@ -122,7 +146,13 @@ def revolute_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
     k[5, 5] -= lam[0] * cx + lam[1] * cy
 
 
+def point_at_home(_: object, home: AtHome) -> dict[int, float]:
+    """Phi of the points."""
+    return {8: home.x, 9: home.y}
+
+
 KERNELS = JointKernels(
+    at_home=point_at_home,
     steady=((0, 1), (0, 1)),
     phi=revolute_rows,
     gamma=revolute_gamma,

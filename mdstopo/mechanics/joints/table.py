@@ -1,6 +1,6 @@
 """The joints: by code in kernels, by record in Python. All of it follows from `JointKernels` of each joint.
 
-w (PLACES,): coordinates of the first and the second body, with the turns of `revolute.turn`; wd, wdd (6,): their time
+w (PLACES,): where the first and the second body are (`revolute.place_joint`); wd, wdd (6,): their time
 derivatives. The equations of motion are
 M a + Phi_q^T lam = F, so the force of a joint on its first body is -Phi_q^T lam. Codes follow the order of
 `case.joints.JOINTS`; the branches by code are made by `compiler.choice`.
@@ -12,15 +12,15 @@ import math
 import numpy as np
 
 from mdstopo.case.joints import JOINTS, Joint
+from mdstopo.case.model import Pair
 from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.joints.kernels import JointKernels
+from mdstopo.mechanics.joints.kernels import FITTED, AtHome, JointKernels
 from mdstopo.mechanics.joints.revolute import arms
+from mdstopo.scene.model import HOME_ANGLE, HOME_COS, HOME_X, HOME_Y, FloatArray
 
 WIDTH = 12
-#: place of the bodies' angle at the start in the parameters
-ANGLE = 6
 #: what a joint transmits (`joint_transmitted`)
 FORCE, MOMENT, ACROSS = range(3)
 
@@ -53,13 +53,35 @@ for _joint in JOINTS.values():
         enter(_joint)
 
 
-def parameters(joint: Joint, angle_first: float, angle_second: float) -> list[float]:
-    """The parameter row (WIDTH,) of a joint between bodies that start at these angles (rad)."""
+def parameters(joint: Joint, home: FloatArray, first: int, second: int) -> list[float]:
+    """The parameter row (WIDTH,) of a joint between two bodies at home (n_body, HOME)."""
     row = [*joint.at_first, *joint.at_second] + [0.0] * (WIDTH - 4)
-    row[ANGLE] = angle_second - angle_first
-    for place, value in joint.row().items():
+    x, y = apart_at_home(home, first, second, joint.at_first, joint.at_second)
+    at_home = kernels_of(type(joint)).at_home
+    own = joint.row()
+    if at_home is not None:
+        c, s = home[first, HOME_COS:].tolist()
+        own |= at_home(joint, AtHome(x, y, c, s, _size(home, first, second, joint)))
+    for place, value in own.items():
         row[place] = value
     return row
+
+
+def apart_at_home(home: FloatArray, first: int, second: int, at_first: Pair, at_second: Pair) -> list[float]:
+    """The vector between a point of each of two bodies at home, m; what only rounding has left of it is zero."""
+    ends, size = [], 0.0
+    for body, (x, y) in ((first, at_first), (second, at_second)):
+        c, s = home[body, HOME_COS:].tolist()
+        ends.append((home[body, HOME_X] + c * x - s * y, home[body, HOME_Y] + s * x + c * y))
+        size += abs(x) + abs(y) + abs(home[body, HOME_X]) + abs(home[body, HOME_Y])
+    apart = [float(two - one) for one, two in zip(*ends, strict=True)]
+    return [value if abs(value) > FITTED * size else 0.0 for value in apart]
+
+
+def _size(home: FloatArray, first: int, second: int, joint: Joint) -> float:
+    """What rounding of the ends of a joint is measured against, m."""
+    places = float(np.abs(home[[first, second], :HOME_ANGLE]).sum())
+    return places + sum(abs(value) for value in (*joint.at_first, *joint.at_second))
 
 
 def describe(joint: Joint) -> str:

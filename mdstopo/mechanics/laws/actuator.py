@@ -101,9 +101,16 @@ def actuator_switches(p):  # type: ignore[no-untyped-def]
     return p[3] > 0.0
 
 
+@inline
+def actuator_unstretched(p):  # type: ignore[no-untyped-def]
+    """What steers to the target from no elongation."""
+    return abs(p[0] * p[2])
+
+
 KERNELS = LawKernels(
     force=actuator_force,
     slopes=actuator_slopes,
+    unstretched=actuator_unstretched,
     modes=Modes(
         margin=actuator_margin,
         margin_slopes=actuator_margin_slopes,

@@ -1,7 +1,7 @@
 """The spring law over members that share its parameters: what `general.members` does member by member, in vectors.
 
 The geometry and the sums are those of `mechanics.laws.spring`, with f = k x + c x' + preload, x = Delta, times
-s = alpha^mu of each member. Arguments: member (5 M,), the rows P, Q and free length of all members behind each other,
+s = alpha^mu of each member. Arguments: member (6 M,), the rows of `spring` of all members behind each other,
 width M of each; scale, s from member 0 on; start, stop: the members meant, padding included, where s = 0; p: k, c,
 preload; r (POSE,): the relative pose. A member of zero length has no direction: no force, but the energy that its
 elongation has.
@@ -10,25 +10,18 @@ elongation has.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.compiler.vector import inverse_root, lanes, larger, largest, load, store, total, zero
-from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_parts, elastic_work
+from mdstopo.compiler.vector import lanes, larger, largest, load, store, total, zero
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_parts, elastic_work, seen_members
 from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
 
 
 @kernel
 def _seen(member, width, i, r):  # type: ignore[no-untyped-def]
     """R q, 1/L, b and Delta of the members from i on."""
-    u = load(member, 2 * width + i)
-    v = load(member, 3 * width + i)
-    ax = r[2] * u - r[3] * v
-    ay = r[3] * u + r[2] * v
-    rx = ax - (load(member, i) - r[0])
-    ry = ay - (load(member, width + i) - r[1])
-    r2 = rx * rx + ry * ry
-    y = inverse_root(r2, ZERO_LENGTH_SQUARED)
+    ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r, np.bool_(True))
     bx = y * rx
     by = y * ry
-    return ax, ay, y, bx, by, ax * by - ay * bx, r2 * y - load(member, 4 * width + i)
+    return ax, ay, y, bx, by, ax * by - ay * bx, stretch
 
 
 @kernel
@@ -187,9 +180,10 @@ def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ign
         v = load(member, 2 * width + i)
         w = load(member, 3 * width + i)
         free = load(member, 4 * width + i)
+        more = load(member, 5 * width + i)
         work = zero()
         for j in range(rel.shape[0]):
-            work += elastic_work(x, y, v, w, free, rel[j, p], u[j, p])
+            work += elastic_work(x, y, v, w, free, more, rel[j, p], u[j, p])
         store(out, i, load(out, i) + k * work)
 
 
@@ -233,8 +227,9 @@ def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, o
         v = load(member, 2 * width + i)
         w = load(member, 3 * width + i)
         free = load(member, 4 * width + i)
+        more = load(member, 5 * width + i)
         for j in range(poses):
-            force, rx, ry, moment = elastic_parts(x, y, v, w, free, rel[j, pair])
+            force, rx, ry, moment = elastic_parts(x, y, v, w, free, more, rel[j, pair])
             at = 4 * vector * j
             store(room, at, force)
             store(room, at + vector, rx)

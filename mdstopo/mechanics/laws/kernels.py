@@ -72,6 +72,7 @@ class LawKernels:
 
     force: f, f_x, f_xd, V, V_x: force in N, its slopes by x and xd, stored energy in J and its slope by x.
     slopes: df/dp, dV/dp by the parameter at a place; None where no parameter may vary.
+    unstretched (p): the largest force that does not come from elongation; None where there is none, or it is given.
     modes: of a law that switches. permanent_set: of one that remembers, which switches too.
     linear: the force is p[0] x + p[1] xd + p[2], for which there are vectors over many members.
     inertial: the force is p[0] d2Delta/dt2: part of the mass (`general.forces`), with no kernel here.
@@ -83,6 +84,7 @@ class LawKernels:
 
     force: Function | None = None
     slopes: Function | None = None
+    unstretched: Function | None = None
     modes: Modes | None = None
     permanent_set: PermanentSet | None = None
     linear: bool = False

@@ -21,4 +21,10 @@ def linear_slopes(p, place, x, xd):  # type: ignore[no-untyped-def]
     return 1.0, 0.0
 
 
-KERNELS = LawKernels(force=linear_force, slopes=linear_slopes, linear=True)
+@inline
+def linear_unstretched(p):  # type: ignore[no-untyped-def]
+    """The preload."""
+    return abs(p[2])
+
+
+KERNELS = LawKernels(force=linear_force, slopes=linear_slopes, unstretched=linear_unstretched, linear=True)

@@ -43,4 +43,10 @@ def pulse_landings(record: PulseLaw, fine: bool) -> list[float]:
     return [time + side * part * width for part in (1.0, 2.5, 4.0, 6.0) for side in (-1.0, 1.0)] + [time]
 
 
-KERNELS = LawKernels(force=pulse_force, slopes=pulse_slopes, landings=pulse_landings)
+@inline
+def pulse_unstretched(p):  # type: ignore[no-untyped-def]
+    """The peak."""
+    return abs(p[0])
+
+
+KERNELS = LawKernels(force=pulse_force, slopes=pulse_slopes, unstretched=pulse_unstretched, landings=pulse_landings)

@@ -13,8 +13,11 @@ All kernels return sums over the tile, which is all that anything at body level 
 
 with k, c and preload already multiplied by alpha^mu. A member of zero length has no direction and adds no force.
 
+Delta is no difference of lengths (`elongation`). Member arrays (6, n) are P, Q, l0 and its excess: L0^2 - l0^2 of the
+length L0 at home.
+
 Kernels come in two kinds, elastic (no damping, no preload: E_xi = -Q, K symmetric, C absent) and viscous.
-Arguments: member arrays (n,), then the pose d_x, d_y, cos theta, sin theta, then (viscous) its rate.
+Arguments: member arrays (n,), then the pose r (POSE,).
 """
 
 import math
@@ -22,7 +25,7 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import inline, kernel, member_kernel, part
-from mdstopo.compiler.vector import inverse_root, lanes, larger, largest, load, store, total, zero
+from mdstopo.compiler.vector import inverse_root, lanes, larger, largest, load, store, total, where_larger, zero
 from mdstopo.mechanics.laws.sums import upper_triangle
 
 ELASTIC = 0
@@ -37,23 +40,60 @@ def _inverse_length(r2):  # type: ignore[no-untyped-def]
     return 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
 
 
-@part
-def elastic_force(member, width, scale, start, stop, r):  # type: ignore[no-untyped-def]
-    """Return Q (3 numbers) and E of the undamped springs from start to stop at the relative pose r (4 or more,).
+@inline
+def _elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-def]
+    """`elongation` in numbers, without a branch."""
+    x = r2 * y - free
+    squares = excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))
+    off = 0.5 * y * (x * (r2 * y + free) - squares)
+    return x - (off if ux * ux + uy * uy < r2 else 0.0)
 
-    member (5 width or more,): the rows P, Q and free length behind each other, width of each; scale (stop or more,): k.
+
+@part
+def hardly_moved(r, near):  # type: ignore[no-untyped-def]
+    """Whether a pose r (POSE,) is so near home that members would lose digits in a difference of lengths.
+
+    near (2,): a row of `scene.model.Model.near`. Beyond it, elongations from displacements are no better.
     """
-    dx = r[0]
-    dy = r[1]
-    c = r[2]
-    s = r[3]
+    return r[10] * r[10] + r[11] * r[11] < near[0] and r[12] * r[12] + r[13] * r[13] < near[1]
+
+
+@part
+def elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-def]
+    """Delta = L - l0 of members with r, r^2, 1/L and u, what r has changed by since home; excess: L0^2 - l0^2.
+
+    L^2 - l0^2 = excess + u . (2 r - u) has all digits of u, and one step of Newton's method for
+    Delta (Delta + 2 l0) = L^2 - l0^2 leaves of what L - l0 has lost the square. Where u is longer than r, L itself is
+    the more accurate.
+    """
+    x = r2 * y - free
+    squares = excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))
+    off = 0.5 * y * (x * (r2 * y + free) - squares)
+    return x - where_larger(r2 - (ux * ux + uy * uy), 0.0, off)
+
+
+@inline
+def elongation_of(rx, ry, length, ux, uy, free, excess):  # type: ignore[no-untyped-def]
+    """`elongation` of one member."""
+    u2 = ux * ux + uy * uy
+    if u2 < length * length:
+        return (excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))) / (length + free)
+    return length - free
+
+
+@part
+def elastic_force(member, width, scale, start, stop, r, close):  # type: ignore[no-untyped-def]
+    """Return Q (3 numbers) and E of the undamped springs from start to stop at the relative pose r (POSE,).
+
+    member (6 width or more,): the rows behind each other, width of each; scale (stop or more,): k; close: whether
+    elongations come from displacements (`hardly_moved`).
+    """
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
     energy = zero()
     for i in range(start, stop, lanes()):
-        ax, ay, rx, ry, r2, y = _seen(member, width, i, dx, dy, c, s)
-        stretch = r2 * y - load(member, 4 * width + i)
+        ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r, close)
         w = load(scale, i) * stretch
         energy += w * stretch
         w *= y
@@ -64,29 +104,33 @@ def elastic_force(member, width, scale, start, stop, r):  # type: ignore[no-unty
 
 
 @part
-def _seen(member, width, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
-    """R q, r, |r|^2 and 1/L of the members from i on."""
+def seen_members(member, width, i, r, close):  # type: ignore[no-untyped-def]
+    """R q, r, |r|^2, 1/L and Delta of the members from i on."""
     u = load(member, 2 * width + i)
     v = load(member, 3 * width + i)
-    ax = c * u - s * v
-    ay = s * u + c * v
-    rx = ax - (load(member, i) - dx)
-    ry = ay - (load(member, width + i) - dy)
+    ax = r[2] * u - r[3] * v
+    ay = r[3] * u + r[2] * v
+    rx = ax - (load(member, i) - r[0])
+    ry = ay - (load(member, width + i) - r[1])
     r2 = rx * rx + ry * ry
-    return ax, ay, rx, ry, r2, inverse_root(r2, ZERO_LENGTH_SQUARED)
+    y = inverse_root(r2, ZERO_LENGTH_SQUARED)
+    free = load(member, 4 * width + i)
+    if close:
+        ux = r[10] + (r[12] * u - r[13] * v)
+        uy = r[11] + (r[13] * u + r[12] * v)
+        stretch = elongation(rx, ry, r2, y, ux, uy, free, load(member, 5 * width + i))
+    else:
+        stretch = r2 * y - free
+    return ax, ay, rx, ry, r2, y, stretch
 
 
 @part
-def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-untyped-def]
+def elastic_tangent(member, width, scale, start, stop, r, close):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K; arguments as of `elastic_force`.
 
     The lengths of the next members are found while these are summed: one chain of operations from coordinates to sums
     would be longer than a processor looks ahead.
     """
-    dx = r[0]
-    dy = r[1]
-    c = r[2]
-    s = r[3]
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
@@ -101,11 +145,10 @@ def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-un
     kyt = zero()
     ktt = zero()
     last = stop - lanes()
-    ax, ay, rx, ry, r2, y = _seen(member, width, start, dx, dy, c, s)
+    ax, ay, rx, ry, _, y, stretch = seen_members(member, width, start, r, close)
     for i in range(start, stop, lanes()):
-        following = _seen(member, width, min(i + lanes(), last), dx, dy, c, s)
+        following = seen_members(member, width, min(i + lanes(), last), r, close)
         stiffness = load(scale, i)
-        stretch = r2 * y - load(member, 4 * width + i)
         w = stiffness * stretch
         energy += w * stretch
         w *= y
@@ -125,7 +168,7 @@ def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-un
         sum_wx += w * ax
         sum_wy += w * ay
         ktt += g * (t * t) - w * (ax * (rx - ax) + ay * (ry - ay))
-        ax, ay, rx, ry, r2, y = following
+        ax, ay, rx, ry, _, y, stretch = following
     return (
         -total(sum_x),
         -total(sum_y),
@@ -136,7 +179,7 @@ def elastic_tangent(member, width, scale, start, stop, r):  # type: ignore[no-un
 
 
 @member_kernel
-def viscous_force(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt):  # type: ignore[no-untyped-def]
+def viscous_force(px, py, qx, qy, l0, excess, k, damping, preload, r):  # type: ignore[no-untyped-def]
     """Return Q, E and E_xi of a tile of springs with damping or preload."""
     sum_x = 0.0
     sum_y = 0.0
@@ -146,15 +189,17 @@ def viscous_force(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy,
     ey = 0.0
     et = 0.0
     for i in range(k.shape[0]):
-        ax = c * qx[i] - s * qy[i]
-        ay = s * qx[i] + c * qy[i]
-        rx = dx + ax - px[i]
-        ry = dy + ay - py[i]
+        ax = r[2] * qx[i] - r[3] * qy[i]
+        ay = r[3] * qx[i] + r[2] * qy[i]
+        rx = r[0] + ax - px[i]
+        ry = r[1] + ay - py[i]
         r2 = rx * rx + ry * ry
         y = _inverse_length(r2)
+        ux = r[10] + (r[12] * qx[i] - r[13] * qy[i])
+        uy = r[11] + (r[13] * qx[i] + r[12] * qy[i])
+        stretch = _elongation(rx, ry, r2, y, ux, uy, l0[i], excess[i])
         t = ax * ry - ay * rx
-        stretch = r2 * y - l0[i]
-        rate = y * (rx * vx + ry * vy + t * vt)
+        rate = y * (rx * r[4] + ry * r[5] + t * r[6])
         w = k[i] * stretch
         energy += w * stretch
         f = y * (w + damping[i] * rate + preload[i])
@@ -169,8 +214,11 @@ def viscous_force(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy,
 
 
 @member_kernel
-def viscous_tangent(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt):  # type: ignore[no-untyped-def]
+def viscous_tangent(px, py, qx, qy, l0, excess, k, damping, preload, r):  # type: ignore[no-untyped-def]
     """Return Q, E, E_xi, K (nine, by rows) and the upper triangle of C of a tile of general springs."""
+    vx = r[4]
+    vy = r[5]
+    vt = r[6]
     sum_x = 0.0
     sum_y = 0.0
     sum_t = 0.0
@@ -194,16 +242,18 @@ def viscous_tangent(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, v
     cyt = 0.0
     ctt = 0.0
     for i in range(k.shape[0]):
-        ax = c * qx[i] - s * qy[i]
-        ay = s * qx[i] + c * qy[i]
-        rx = dx + ax - px[i]
-        ry = dy + ay - py[i]
+        ax = r[2] * qx[i] - r[3] * qy[i]
+        ay = r[3] * qx[i] + r[2] * qy[i]
+        rx = r[0] + ax - px[i]
+        ry = r[1] + ay - py[i]
         r2 = rx * rx + ry * ry
         y = _inverse_length(r2)
+        ux = r[10] + (r[12] * qx[i] - r[13] * qy[i])
+        uy = r[11] + (r[13] * qx[i] + r[12] * qy[i])
+        stretch = _elongation(rx, ry, r2, y, ux, uy, l0[i], excess[i])
         bx = y * rx
         by = y * ry
         bt = ax * by - ay * bx
-        stretch = r2 * y - l0[i]
         rate = bx * vx + by * vy + bt * vt
         elastic = k[i] * stretch
         energy += elastic * stretch
@@ -268,8 +318,8 @@ def viscous_tangent(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, v
 
 
 @kernel
-def elastic_design(px, py, qx, qy, l0, k, pose, u, out):  # type: ignore[no-untyped-def]
-    """Add sum_j f_i (b_i . u_j) of each undamped spring at pose (m, >= 4) j to out.
+def elastic_design(px, py, qx, qy, l0, excess, k, pose, u, out):  # type: ignore[no-untyped-def]
+    """Add sum_j f_i (b_i . u_j) of each undamped spring at pose (m, POSE) j to out.
 
     u (m, 3): virtual changes of the relative pose.
     """
@@ -279,29 +329,22 @@ def elastic_design(px, py, qx, qy, l0, k, pose, u, out):  # type: ignore[no-unty
         v = load(qx, i)
         w = load(qy, i)
         free = load(l0, i)
+        more = load(excess, i)
         work = zero()
         for j in range(pose.shape[0]):
-            work += elastic_work(x, y, v, w, free, pose[j], u[j])
+            work += elastic_work(x, y, v, w, free, more, pose[j], u[j])
         store(out, i, load(out, i) + load(k, i) * work)
 
 
 @kernel
-def elastic_work(x, y, v, w, free, pose, u):  # type: ignore[no-untyped-def]
+def elastic_work(x, y, v, w, free, excess, pose, u):  # type: ignore[no-untyped-def]
     """Delta (b . u) of the members with P = (x, y), Q = (v, w) and these free lengths at one pose."""
-    c = pose[2]
-    s = pose[3]
-    ax = c * v - s * w
-    ay = s * v + c * w
-    rx = ax - (x - pose[0])
-    ry = ay - (y - pose[1])
-    r2 = rx * rx + ry * ry
-    z = inverse_root(r2, ZERO_LENGTH_SQUARED)
-    along = rx * u[0] + ry * u[1] + (ax * ry - ay * rx) * u[2]
-    return (r2 * z - free) * z * along
+    force, rx, ry, moment = elastic_parts(x, y, v, w, free, excess, pose)
+    return force * (rx * u[0] + ry * u[1] + moment * u[2])
 
 
 @kernel
-def elastic_parts(x, y, v, w, free, pose):  # type: ignore[no-untyped-def]
+def elastic_parts(x, y, v, w, free, excess, pose):  # type: ignore[no-untyped-def]
     """Of `elastic_work`: Delta / L, and L b, with which it is Delta / L (L b . u)."""
     c = pose[2]
     s = pose[3]
@@ -311,12 +354,28 @@ def elastic_parts(x, y, v, w, free, pose):  # type: ignore[no-untyped-def]
     ry = ay - (y - pose[1])
     r2 = rx * rx + ry * ry
     z = inverse_root(r2, ZERO_LENGTH_SQUARED)
-    return (r2 * z - free) * z, rx, ry, ax * ry - ay * rx
+    ux = pose[10] + (pose[12] * v - pose[13] * w)
+    uy = pose[11] + (pose[13] * v + pose[12] * w)
+    return elongation(rx, ry, r2, z, ux, uy, free, excess) * z, rx, ry, ax * ry - ay * rx
 
 
 @member_kernel
-def viscous_design(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy, vt, ux, uy, ut, out):  # type: ignore[no-untyped-def]
+def viscous_design(px, py, qx, qy, l0, excess, k, damping, preload, r, u, out):  # type: ignore[no-untyped-def]
     """Add f_i (b_i . u) of each general spring to out; u is a virtual change of the relative pose."""
+    dx = r[0]
+    dy = r[1]
+    c = r[2]
+    s = r[3]
+    sx = r[10]
+    sy = r[11]
+    sc = r[12]
+    ss = r[13]
+    vx = r[4]
+    vy = r[5]
+    vt = r[6]
+    zx = u[0]
+    zy = u[1]
+    zt = u[2]
     for i in range(k.shape[0]):
         ax = c * qx[i] - s * qy[i]
         ay = s * qx[i] + c * qy[i]
@@ -324,19 +383,34 @@ def viscous_design(px, py, qx, qy, l0, k, damping, preload, dx, dy, c, s, vx, vy
         ry = dy + ay - py[i]
         r2 = rx * rx + ry * ry
         y = _inverse_length(r2)
+        ux = sx + (sc * qx[i] - ss * qy[i])
+        uy = sy + (ss * qx[i] + sc * qy[i])
+        stretch = _elongation(rx, ry, r2, y, ux, uy, l0[i], excess[i])
         t = ax * ry - ay * rx
         rate = y * (rx * vx + ry * vy + t * vt)
-        f = k[i] * (r2 * y - l0[i]) + damping[i] * rate + preload[i]
-        out[i] += f * y * (rx * ux + ry * uy + t * ut)
+        f = k[i] * stretch + damping[i] * rate + preload[i]
+        out[i] += f * y * (rx * zx + ry * zy + t * zt)
 
 
 @member_kernel
-def stored_energy(px, py, qx, qy, l0, k, dx, dy, c, s, weight, out):  # type: ignore[no-untyped-def]
+def stored_energy(px, py, qx, qy, l0, excess, k, r, weight, out):  # type: ignore[no-untyped-def]
     """Add weight V_i = weight k_i Delta_i^2 / 2 of each spring to out."""
+    dx = r[0]
+    dy = r[1]
+    c = r[2]
+    s = r[3]
+    sx = r[10]
+    sy = r[11]
+    sc = r[12]
+    ss = r[13]
     for i in range(k.shape[0]):
         rx = dx + c * qx[i] - s * qy[i] - px[i]
         ry = dy + s * qx[i] + c * qy[i] - py[i]
-        stretch = np.sqrt(rx * rx + ry * ry) - l0[i]
+        r2 = rx * rx + ry * ry
+        y = _inverse_length(r2)
+        ux = sx + (sc * qx[i] - ss * qy[i])
+        uy = sy + (ss * qx[i] + sc * qy[i])
+        stretch = _elongation(rx, ry, r2, y, ux, uy, l0[i], excess[i])
         out[i] += weight * 0.5 * k[i] * stretch * stretch
 
 

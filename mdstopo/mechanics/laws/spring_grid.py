@@ -9,7 +9,8 @@ a = R q of a column and e = d - p of a row, r = a + e; so in a column, where a s
 
 Rows are padded by members of no stiffness at the row's last point, so that vectors take whole columns.
 Arguments: member arrays (n,) of whole rows, beginning at the first of them; the places of a row; the columns from
-`first` to `last`; the pose; room (rows, 2) for what belongs to rows.
+`first` to `last`; the pose r (POSE,); close, whether it is near home
+(`spring.hardly_moved`); room (rows, 2) for what belongs to rows.
 """
 
 import math
@@ -40,33 +41,35 @@ def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
 
 
 @part
-def grid_force(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
+def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):  # type: ignore[no-untyped-def]
     """Return Q (3 numbers) and E.
 
     As in `spring.elastic_tangent`, the lengths of the next row (after the last, of the next columns' first) are found
     while this one is summed.
     """
-    begin_rows(px, py, width, dx, dy, room)
+    begin_rows(px, py, width, r[0], r[1], room)
+    nothing_moved = zero(), zero(), zero()
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
     energy = zero()
-    ax, ay = turned_columns(qx, qy, first, c, s)
+    ax, ay = turned_columns(qx, qy, first, r[2], r[3])
     seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
-        bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), c, s)
+        bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
+        moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own_x = zero()
         own_y = zero()
         at = i
         for j in range(1, room.shape[0]):
             following = _seen(ax, ay, room, j)
-            w, energy = _weight(energy, seen, load(k, at), load(l0, at))
+            w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             own_x += w * seen[0]
             own_y += w * seen[1]
             at += width
             seen = following
         following = _seen(bx, by, room, np.int64(0))
-        w, energy = _weight(energy, seen, load(k, at), load(l0, at))
+        w, energy = _weight(energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         own_x += w * seen[0]
         own_y += w * seen[1]
         seen = following
@@ -87,12 +90,32 @@ def turned_columns(qx, qy, i, c, s):  # type: ignore[no-untyped-def]
 
 
 @part
-def _weight(energy, seen, k, l0):  # type: ignore[no-untyped-def]
+def moved_columns(qx, qy, i, r):  # type: ignore[no-untyped-def]
+    """2 u and u^2 of the columns from i on: what r has changed by since home, alike in all rows."""
+    x, y = turned_columns(qx, qy, i, r[12], r[13])
+    x += r[10]
+    y += r[11]
+    return x + x, y + y, x * x + y * y
+
+
+@part
+def _stretch(seen, moved, l0, excess, at, close):  # type: ignore[no-untyped-def]
+    """Delta of the members at a place (`spring.elongation`); close: whether bodies have hardly moved, so that u < r."""
+    rx, ry, r2, y = seen
+    x = r2 * y - l0
+    if close:
+        twice_x, twice_y, u2 = moved
+        squares = (load(excess, at) - u2) + twice_x * rx + twice_y * ry
+        x -= 0.5 * y * (x * (r2 * y + l0) - squares)
+    return x
+
+
+@part
+def _weight(energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-untyped-def]
     """w of a member, and twice the energy with it."""
-    _, _, r2, y = seen
-    stretch = r2 * y - l0
+    stretch = _stretch(seen, moved, l0, excess, at, close)
     w = k * stretch
-    return w * y, energy + w * stretch
+    return w * seen[3], energy + w * stretch
 
 
 @part
@@ -151,28 +174,30 @@ def force_and_tangent(sums):  # type: ignore[no-untyped-def]
 
 
 @part
-def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):  # type: ignore[no-untyped-def]
+def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):  # type: ignore[no-untyped-def]
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
 
     Ahead of its sums as in `grid_force`.
     """
-    begin_rows(px, py, width, dx, dy, room)
+    begin_rows(px, py, width, r[0], r[1], room)
+    nothing_moved = zero(), zero(), zero()
     nothing = zero()
     sums = no_columns(nothing)
     energy = nothing
-    ax, ay = turned_columns(qx, qy, first, c, s)
+    ax, ay = turned_columns(qx, qy, first, r[2], r[3])
     seen = _seen(ax, ay, room, np.int64(0))
     for i in range(first, last, lanes()):
-        bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), c, s)
+        bx, by = turned_columns(qx, qy, min(i + lanes(), last - lanes()), r[2], r[3])
+        moved = moved_columns(qx, qy, i, r) if close else nothing_moved
         own = no_members(nothing)
         at = i
         for j in range(1, room.shape[0]):
             following = _seen(ax, ay, room, j)
-            own, energy = _add(own, energy, seen, load(k, at), load(l0, at))
+            own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
             at += width
             seen = following
         following = _seen(bx, by, room, np.int64(0))
-        own, energy = _add(own, energy, seen, load(k, at), load(l0, at))
+        own, energy = _add(own, energy, seen, moved, load(k, at), load(l0, at), excess, at, close)
         seen = following
         sums = add_column(sums, ax, ay, own)
         ax = bx
@@ -182,10 +207,10 @@ def grid_tangent(px, py, qx, qy, l0, k, width, first, last, dx, dy, c, s, room):
 
 
 @part
-def _add(own, energy, seen, k, l0):  # type: ignore[no-untyped-def]
+def _add(own, energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-untyped-def]
     """The sums of a column, and the energy, with a member more."""
     rx, ry, r2, y = seen
-    w, energy = _weight(energy, seen, k, l0)
+    w, energy = _weight(energy, seen, moved, k, l0, excess, at, close)
     # a member without direction has no n: its k must not enter the trace
     return add_member(own, rx, ry, y, w, where_larger(r2, ZERO_LENGTH_SQUARED, k - w)), energy
 
@@ -199,11 +224,24 @@ def _seen_at(turned, room, j, m):  # type: ignore[no-untyped-def]
     return rx, ry, r2, inverse_root(r2, ZERO_LENGTH_SQUARED)
 
 
+@kernel
+def _moved_at(turned, m):  # type: ignore[no-untyped-def]
+    """What `moved_columns` gave at pose m."""
+    return load(turned[m, 2], 0), load(turned[m, 3], 0), load(turned[m, 4], 0)
+
+
 @part
-def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
+def _work(seen, moved, along, l0, excess, at, close):  # type: ignore[no-untyped-def]
+    """f/k b . u = Delta/L r . (u + e x u_theta), of which the last are `along` (2,); of no length, r is nothing."""
+    return _stretch(seen, moved, l0, excess, at, close) * seen[3] * (seen[0] * along[2] + seen[1] * along[3])
+
+
+@part
+def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
     """Add sum_j f_i (b_i . u_j) and sum_e weight_e V_i of each spring to out: f, b at the first poses, V at the others.
 
-    pose (poses, >= 4), u (m, 3), weight (poses - m,). Room: room (rows, poses, 4); turned (poses, 2, lanes) for a.
+    pose (poses, POSE), close (poses,) of `spring.hardly_moved`, u (m, 3), weight (poses - m,). Room: room (rows,
+    poses, 4); turned (poses, 5, lanes) for a, 2 u and u^2 (`moved_columns`).
     """
     rows = room.shape[0]
     many = u.shape[0]
@@ -224,23 +262,26 @@ def grid_design(px, py, qx, qy, l0, k, width, first, last, pose, u, weight, room
             ax, ay = turned_columns(qx, qy, i, pose[m, 2], pose[m, 3])
             store(turned[m, 0], 0, ax)
             store(turned[m, 1], 0, ay)
+            if close[m]:
+                twice_x, twice_y, u2 = moved_columns(qx, qy, i, pose[m])
+                store(turned[m, 2], 0, twice_x)
+                store(turned[m, 3], 0, twice_y)
+                store(turned[m, 4], 0, u2)
         at = i
-        rx, ry, _, y = _seen_at(turned, room, np.int64(0), np.int64(0))
+        seen = _seen_at(turned, room, np.int64(0), np.int64(0))
         for j in range(rows):
             free = load(l0, at)
             work = zero()
-            # f/k b . u = (1 - l0/L) r . (u + e x u_theta); of no length, r is nothing
             for m in range(1, many):
                 following = _seen_at(turned, room, j, m)
-                work += (1.0 - free * y) * (rx * room[j, m - 1, 2] + ry * room[j, m - 1, 3])
-                rx, ry, _, y = following
+                work += _work(seen, _moved_at(turned, m - 1), room[j, m - 1], free, excess, at, close[m - 1])
+                seen = following
             if many > 0:
                 following = _seen_at(turned, room, min(j + 1, rows - 1), np.int64(0))
-                work += (1.0 - free * y) * (rx * room[j, many - 1, 2] + ry * room[j, many - 1, 3])
-                rx, ry, _, y = following
+                work += _work(seen, _moved_at(turned, many - 1), room[j, many - 1], free, excess, at, close[many - 1])
+                seen = following
             for m in range(many, poses):
-                _, _, r2, inverse = _seen_at(turned, room, j, m)
-                stretch = r2 * inverse - free
+                stretch = _stretch(_seen_at(turned, room, j, m), _moved_at(turned, m), free, excess, at, close[m])
                 work += 0.5 * weight[m - many] * stretch * stretch
             store(out, at, load(out, at) + load(k, at) * work)
             at += width

@@ -82,6 +82,18 @@ def law_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[n
     return _own_slopes(code, p, place, x, xd, mode, t, value, curves)
 
 
+@chosen(LISTED, lambda each: each.unstretched, inline)
+def law_unstretched(code, p):  # type: ignore[no-untyped-def]
+    """The largest force by the law's parameters that does not come from elongation, N."""
+    return 0.0
+
+
+@chosen(LISTED, lambda each: True if each.signal else None, inline)
+def law_is_given(code):  # type: ignore[no-untyped-def]
+    """Whether the force is given over time."""
+    return False
+
+
 # Modes
 
 
