@@ -37,14 +37,14 @@ ASIDE, VANISHING = 1e-6, 0.02
 
 
 @kernel
-def free_only(model, x):  # type: ignore[no-untyped-def]
+def free_only(model, x):
     """What is driven does not answer: its entries of x (n,) become zero."""
     for i in range(model.driven.shape[0]):
         x[model.driven[i]] = 0.0
 
 
 @kernel
-def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, out):  # type: ignore[no-untyped-def]
+def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, out):
     """Pull cotangents behind the events of a state back to before them (saltation), in place.
 
     bar_set (slots,): those of the sets (`permanent_sets`). drops (E,): by how much an integrand falls at each event
@@ -77,7 +77,7 @@ def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, 
 
 
 @kernel
-def sweep(  # type: ignore[no-untyped-def]
+def sweep(
     tag, model, tables, strength, track, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops, looked,
     square, desk, out, work,
 ):  # fmt: skip
@@ -122,9 +122,7 @@ def sweep(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def row_cotangents(  # type: ignore[no-untyped-def]
-    tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work
-):
+def row_cotangents(tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work):
     """What a row pulls on the state where it is read: bars (3, n), q and v (a is used up); and on the members there.
 
     across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector pulls,
@@ -200,7 +198,7 @@ def row_cotangents(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _first_event(track, state):  # type: ignore[no-untyped-def]
+def _first_event(track, state):
     """The first event of a state whose time varies, or -1."""
     if state == 0:
         return -1
@@ -215,7 +213,7 @@ def _first_event(track, state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):  # type: ignore[no-untyped-def]
+def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):
     """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out.
 
     start (n,), or no length: the cotangent of the start's positions comes out.
@@ -244,7 +242,7 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
 
 
 @kernel
-def event_drops(model, strength, track, count, j, square, desk):  # type: ignore[no-untyped-def]
+def event_drops(model, strength, track, count, j, square, desk):
     """(E,): g_j (or its square) before each event, less that after it; the integral feels when the event is."""
     events = track.index[count, 3]
     drops = np.zeros(events)
@@ -265,7 +263,7 @@ def event_drops(model, strength, track, count, j, square, desk):  # type: ignore
 
 
 @kernel
-def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows):  # type: ignore[no-untyped-def]
+def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows):
     """g_j at a stage, its slopes into own (3, n) and own_rows (n_row,), and whose force it is; who < 0: the largest."""
     stage = track.stage[at]
     t = track.when[at]
@@ -280,7 +278,7 @@ def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows): 
 
 
 @kernel
-def one_sided(  # type: ignore[no-untyped-def]
+def one_sided(
     model, strength, segment, track, at, inside, j, who, value, mine, size, slopes, rows, desk, own, own_rows
 ):
     """g_j and its slopes at a stage as they go on from inside the step, which ends where g_j has a kink.
@@ -335,7 +333,7 @@ def one_sided(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _turn(slopes, rows):  # type: ignore[no-untyped-def]
+def _turn(slopes, rows):
     for i in range(slopes.shape[0]):
         for d in range(slopes.shape[1]):
             slopes[i, d] = -slopes[i, d]
@@ -344,7 +342,7 @@ def _turn(slopes, rows):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integral_cotangents(  # type: ignore[no-untyped-def]
+def integral_cotangents(
     tag, model, tables, strength, track, count, j, square, bars, rows_bar, sets_bar, desk, out, work
 ):
     """The integral over time of g_j (or of its square), by the weights of the stages.

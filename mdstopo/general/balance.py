@@ -62,7 +62,7 @@ bundle(Desk, DESK)
 
 
 @kernel
-def make_desk(model):  # type: ignore[no-untyped-def]
+def make_desk(model):
     """Room for one balance."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
@@ -99,7 +99,7 @@ def make_desk(model):  # type: ignore[no-untyped-def]
 
 
 @part
-def gather(model, j, x, out):  # type: ignore[no-untyped-def]
+def gather(model, j, x, out):
     """out (6,) = the entries of x (n,) of the two bodies of joint j."""
     a = 3 * model.joint[j, 1]
     b = 3 * model.joint[j, 2]
@@ -109,7 +109,7 @@ def gather(model, j, x, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def gather_turned(model, j, q, turned, w):  # type: ignore[no-untyped-def]
+def gather_turned(model, j, q, turned, w):
     """w (PLACES,) of joint j from q (n,) and the turns of `forces.turn_bodies`."""
     one = model.joint[j, 1]
     two = model.joint[j, 2]
@@ -118,7 +118,7 @@ def gather_turned(model, j, q, turned, w):  # type: ignore[no-untyped-def]
 
 
 @part
-def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
+def gather_multipliers(model, j, lam, out):
     """out (3,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
     for r in range(3):
         i = model.row[j, r]
@@ -126,7 +126,7 @@ def gather_multipliers(model, j, lam, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
+def joint_state(model, q, v, desk):
     """Phi, Phi_q and gamma of all joints of bodies that are turned on the desk (`forces.turn_bodies`)."""
     w = desk.own[0]
     wd = desk.own[1]
@@ -138,7 +138,7 @@ def joint_state(model, q, v, desk):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def joint_slopes(model, q, v, a, lam, desk):  # type: ignore[no-untyped-def]
+def joint_slopes(model, q, v, a, lam, desk):
     """G_q and G_v of all joints, and their stiffness added to K."""
     w = desk.own[0]
     wd = desk.own[1]
@@ -156,7 +156,7 @@ def joint_slopes(model, q, v, a, lam, desk):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type: ignore[no-untyped-def]
+def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
     """Factorise W(w_q, w_v), or its transpose, for `solve_unknowns`; k, c, mass (n_pair, 6, 6), turn (n,).
 
     The joints' Phi_q, G_q and G_v are those on the desk. Returns the place of the unknown at which it is singular, or
@@ -229,7 +229,7 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):  # type:
 
 
 @kernel
-def put(band, half, scale, row, column, value, transposed):  # type: ignore[no-untyped-def]
+def put(band, half, scale, row, column, value, transposed):
     """band[row, column] += value in scaled unknowns, or the mirrored entry."""
     value *= scale[row] * scale[column]
     if transposed:
@@ -239,7 +239,7 @@ def put(band, half, scale, row, column, value, transposed):  # type: ignore[no-u
 
 
 @kernel
-def factorise_at(band, half, pivots, tangent):  # type: ignore[no-untyped-def]
+def factorise_at(band, half, pivots, tangent):
     """Factorise; -1, or the place at which the matrix is singular (without tangents: to rounding)."""
     regular = factorise(band, half, pivots)
     for p in range(band.shape[0]):
@@ -250,7 +250,7 @@ def factorise_at(band, half, pivots, tangent):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
+def solve_unknowns(model, desk, a, lam):
     """Solve with the factors on the desk for the right side a (n,), lam (n_row,), in place; driven parts become 0."""
     if desk.switches[OF_JOINTS] != 0:
         solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.diagonal, desk.x, a, lam)
@@ -273,7 +273,7 @@ def solve_unknowns(model, desk, a, lam):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: ignore[no-untyped-def]
+def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):
     """Accelerations a (n,) and multipliers lam (n_row,) at one state, whose driven part is put in place first.
 
     With `tangent`, desk.k, .c, .turn, .by_q, .by_v hold the tangents of the whole balance (with the switch APART those
@@ -323,7 +323,7 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):  # type: 
 
 
 @kernel
-def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):
     """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,): driven parts 0."""
     pair = model.pair
     joint = model.joint
@@ -348,14 +348,14 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):  # type: ignore[no-u
 
 
 @kernel
-def pull_matrices(pair, k, z, bar):  # type: ignore[no-untyped-def]
+def pull_matrices(pair, k, z, bar):
     """bar (n,) -= K^T z, K by pairs (n_pair, 6, 6)."""
     for p in range(pair.shape[0]):
         _pull_matrix(pair, p, k[p], z, bar)
 
 
 @part
-def _pull_matrix(pair, p, m, z, bar):  # type: ignore[no-untyped-def]
+def _pull_matrix(pair, p, m, z, bar):
     one = 3 * pair[p, 0]
     two = 3 * pair[p, 1]
     z0 = z[one]
@@ -370,14 +370,14 @@ def _pull_matrix(pair, p, m, z, bar):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pull_turns(turn, z, bar):  # type: ignore[no-untyped-def]
+def pull_turns(turn, z, bar):
     """bar (n,) += (slope of the turning loads)^T z."""
     for d in range(z.shape[0]):
         bar[d - d % 3 + 2] += turn[d] * z[d]
 
 
 @kernel
-def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):  # type: ignore[no-untyped-def]
+def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):
     """`pull_back` without the joints: k and c (n_pair, 6, 6) of pairs that carry more than these."""
     damped = desk.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
@@ -389,7 +389,7 @@ def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):  # type: ignore[no-u
 
 
 @kernel
-def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):
     """`pull_back` of the joints alone, at a state with a (n,), lam (n_row,) of bodies that are turned on the desk."""
     w = desk.own[0]
     wd = desk.own[1]
@@ -431,7 +431,7 @@ def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):  # type: ignore[
 
 
 @kernel
-def push_forward(model, desk, k, c, turn, dq, dv, force, row):  # type: ignore[no-untyped-def]
+def push_forward(model, desk, k, c, turn, dq, dv, force, row):
     """force (n,) -= K dq + C dv (turning loads with their sign), row (n_row,) -= G_q dq + G_v dv."""
     damped = desk.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):

@@ -27,7 +27,7 @@ HELD, HOPELESS = 1000, 10.0
 
 
 @kernel
-def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken, tolerance):  # type: ignore[no-untyped-def]
+def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken, tolerance):
     """Estimated error of a step's sliding velocities relative to `slip`, the largest of all contacts that drag.
 
     What counts is the error of T / (mu N) = tanh(slide / slip), of which 1 / (slip (1 + (slide / slip)^2)) is the slope
@@ -81,7 +81,7 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken
 
 
 @kernel
-def brake_rate(model, strength, q, v, enough, desk):  # type: ignore[no-untyped-def]
+def brake_rate(model, strength, q, v, enough, desk):
     """The fastest rate, 1/s, at which closed contacts brake velocities at a state, at most; and which brakes most.
 
     Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, damping c; with rows B and the mobility

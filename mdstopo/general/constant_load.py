@@ -19,7 +19,7 @@ from mdstopo.general.track import carve_track, copy_vector, restore_modes
 
 
 @entry
-def hold(  # type: ignore[no-untyped-def]
+def hold(
     tag,
     ints,
     floats,

@@ -22,7 +22,7 @@ from mdstopo.mechanics.geometry import turned_body
 
 
 @kernel
-def contact_rows(model, j, q, v, rows, rates):  # type: ignore[no-untyped-def]
+def contact_rows(model, j, q, v, rows, rates):
     """along, height of contact j; rows (2, 6) = their slopes by the coordinates of both bodies, rates (2, 6) = d/dt."""
     p = model.contact_pair[j]
     c = model.contact[j]
@@ -64,7 +64,7 @@ def contact_rows(model, j, q, v, rows, rates):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):  # type: ignore[no-untyped-def]
+def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):
     """f (n,) += the forces of all closed contacts; on demand k_out, c_out (n_pair, 6, 6) -= dF/dq, dF/dv."""
     rows = np.empty((2, 6))
     rates = np.empty((2, 6))
@@ -119,7 +119,7 @@ def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):  # type: igno
 
 
 @kernel
-def contact_switch(model, strength, q, v, a, j, slopes):  # type: ignore[no-untyped-def]
+def contact_switch(model, strength, q, v, a, j, slopes):
     """As `events.switch_of`, of contact j: the next mode, how far it goes beyond; slopes (2, n)."""
     n = q.shape[0]
     p = model.contact_pair[j]

@@ -22,7 +22,7 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 
 @kernel
-def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out):  # type: ignore[no-untyped-def]
+def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out):
     """out (4 n + s n, 4 n + 1): what unit changes of q, v, the carried rows, and each stage's force, do at the end.
 
     The last column is what they do to an integral with cotangents bars (s, 3, n), rows_bar (s, n_row) of the stages (no
@@ -72,7 +72,7 @@ def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out)
 
 
 @kernel
-def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):  # type: ignore[no-untyped-def]
+def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):
     """f_i at unit strength of member i of block k, and B_i over its bodies into row (6,)."""
     if model.block[k, 3] == INERTER:
         return inerter_force(model, k, i, q, v, a, row)
@@ -84,7 +84,7 @@ def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):  # typ
 
 
 @kernel
-def through_step(  # type: ignore[no-untyped-def]
+def through_step(
     tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, sets_bar, desk, column, sets, matrix, spare
 ):
     """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
@@ -141,7 +141,7 @@ def through_step(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare):  # type: ignore[no-untyped-def]
+def _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare):
     """The rows of `column` behind the members, derivatives by parameters, through the map of step w.
 
     sets as of `through_step`, by_set (slots, 4 n + 1): what they do at the end.
@@ -186,7 +186,7 @@ def _parameters_through_step(model, strength, track, w, column, sets, by_set, ma
 
 
 @kernel
-def shift_times(model, track, strength, count, state, j, square, column):  # type: ignore[no-untyped-def]
+def shift_times(model, track, strength, count, state, j, square, column):
     """What shifting the times of laws that begin or end at a state does to the derivatives by them (`parameters`)."""
     n = model.mass.shape[0]
     dv = np.empty(n)
@@ -202,7 +202,7 @@ def shift_times(model, track, strength, count, state, j, square, column):  # typ
 
 
 @kernel
-def jump(model, track, strength, count, state, column, sets, drops, j, square):  # type: ignore[no-untyped-def]
+def jump(model, track, strength, count, state, column, sets, drops, j, square):
     """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows.
 
     sets as of `through_step`; drops as of `adjoint.through_events`: the last column, an integral's derivative, takes
@@ -236,7 +236,7 @@ def jump(model, track, strength, count, state, column, sets, drops, j, square): 
 
 
 @kernel
-def begin(model, track, first, column, sets):  # type: ignore[no-untyped-def]
+def begin(model, track, first, column, sets):
     """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows).
 
     The sets that members begin with depend on parameters besides.
@@ -250,7 +250,7 @@ def begin(model, track, first, column, sets):  # type: ignore[no-untyped-def]
 
 
 @entry
-def push(  # type: ignore[no-untyped-def]
+def push(
     tag,
     ints,
     floats,
@@ -343,7 +343,7 @@ def push(  # type: ignore[no-untyped-def]
 
 
 @entry
-def follow(  # type: ignore[no-untyped-def]
+def follow(
     tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, first, work
 ):
     """out (count + 1, N) = dg_j/dalpha at the start and at the end of every step, the time held fixed.

@@ -32,32 +32,32 @@ DUTIES: dict[str, dict[int, Any]] = {
 }
 
 
-def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
     """Duty 1."""
     raise NotImplementedError
 
 
-def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
     """Duty 2."""
     raise NotImplementedError
 
 
-def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
     """Duty 3."""
     raise NotImplementedError
 
 
-def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
     """Duty 4."""
     raise NotImplementedError
 
 
-def derivatives(tag):  # type: ignore[no-untyped-def]
+def derivatives(tag):
     """Duty 4."""
     raise NotImplementedError
 
 
-def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+def weights_of(tag, model, tables, track, w, out):
     """Duty 5."""
     raise NotImplementedError
 
@@ -73,30 +73,30 @@ def _of(name: str, tag: Any) -> Any:
 
 
 @by_type(point_of)
-def _point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+def _point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
     return _of("point_of", tag)
 
 
 @by_type(step_back)
-def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
     return _of("step_back", tag)
 
 
 @by_type(step_forward)
-def _step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def _step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
     return _of("step_forward", tag)
 
 
 @by_type(beside)
-def _beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+def _beside(tag, track, k, c, e, q, v, a, q_out, v_out):
     return _of("beside", tag)
 
 
 @by_type(derivatives)
-def _derivatives(tag):  # type: ignore[no-untyped-def]
+def _derivatives(tag):
     return _of("derivatives", tag)
 
 
 @by_type(weights_of)
-def _weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+def _weights_of(tag, model, tables, track, w, out):
     return _of("weights_of", tag)

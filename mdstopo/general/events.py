@@ -41,7 +41,7 @@ SLACK = 0.03
 
 
 @kernel
-def has_switches(model, knots):  # type: ignore[no-untyped-def]
+def has_switches(model, knots):
     """Whether any member can switch at all; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
@@ -51,7 +51,7 @@ def has_switches(model, knots):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-def]
+def smallest_margin(model, segment, strength, rel):
     """The smallest margin of all acting members and contacts at relative poses rel (n_pair, POSE), and whose it is."""
     best = np.inf
     who = -1
@@ -80,7 +80,7 @@ def smallest_margin(model, segment, strength, rel):  # type: ignore[no-untyped-d
 
 
 @kernel
-def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[no-untyped-def]
+def first_dip(model, segment, strength, rel0, rel1, h, parts):
     """The earliest fraction of a step at which the cubic through a margin's values and rates at both ends has a
     minimum below zero although both ends are not; 2 where there is none. For members that come and go within a step.
 
@@ -146,7 +146,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):  # type: ignore[n
 
 
 @kernel
-def lowest_between(s0, d0, s1, d1):  # type: ignore[no-untyped-def]
+def lowest_between(s0, d0, s1, d1):
     """Where the cubic with values s0, s1 and slopes d0, d1 at 0 and 1 is lowest between them, and its value there.
 
     2, infinite where it has no minimum inside, or where s0 or s1 is negative.
@@ -164,7 +164,7 @@ def lowest_between(s0, d0, s1, d1):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def probes_needed(model, segment, rel0, rel1):  # type: ignore[no-untyped-def]
+def probes_needed(model, segment, rel0, rel1):
     """In how many parts a step is looked through: more where the bodies move far compared with a member's length."""
     needed = 4.0
     for k in range(model.block.shape[0]):
@@ -187,7 +187,7 @@ def probes_needed(model, segment, rel0, rel1):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):  # type: ignore[no-untyped-def]
+def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):
     """The earliest fraction of a step at which a member seems to leave its mode and come back before the end, or 2.
 
     Looked for on the cubic through the states at both ends (n,), in as many parts as the motion asks for, and in each
@@ -227,7 +227,7 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise): 
 
 
 @inline
-def member_between(model, i, one, two, q, turn_one, turn_two):  # type: ignore[no-untyped-def]
+def member_between(model, i, one, two, q, turn_one, turn_two):
     """The arms p and q of member i of two bodies in global axes, its vector, its length and Delta.
 
     turn_one, turn_two: of `turned_body`.
@@ -252,7 +252,7 @@ def member_between(model, i, one, two, q, turn_one, turn_two):  # type: ignore[n
 
 
 @kernel
-def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-def]
+def member_rows(model, p, i, q, v, row, row_rate):
     """Delta, dDelta/dt, B (6,) and dB/dt (6,) of member i over the coordinates of its pair p."""
     one = model.pair[p, 0]
     two = model.pair[p, 1]
@@ -287,7 +287,7 @@ def member_rows(model, p, i, q, v, row, row_rate):  # type: ignore[no-untyped-de
 
 
 @kernel
-def switch_any(model, segment, strength, rel, q, v, a, who, slopes):  # type: ignore[no-untyped-def]
+def switch_any(model, segment, strength, rel, q, v, a, who, slopes):
     """Of member or contact `who`, whose margin is used up at poses rel: the mode it goes to, how far it goes beyond,
     what a touch that only just happens does (`law_grazes`), -s_x / s' and by how much its permanent set grows; slopes
     (2, n) as of `switch_of`.
@@ -310,7 +310,7 @@ def switch_any(model, segment, strength, rel, q, v, a, who, slopes):  # type: ig
 
 
 @kernel
-def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[no-untyped-def]
+def switch_of(model, segment, strength, q, v, a, i, k, slopes):
     """The mode that member i of block k goes to, s'^2 / (2 |s''|), and -s_x / s'; slopes (2, n) = s_q / s', s_v / s'.
 
     How far it goes is told of margins of Delta alone (infinite for others). A permanent set shortens Delta.
@@ -344,7 +344,7 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):  # type: ignore[
 
 
 @kernel
-def block_of(model, i):  # type: ignore[no-untyped-def]
+def block_of(model, i):
     """The block of padded member i."""
     for k in range(model.block.shape[0]):
         if model.block[k, 1] <= i and i < model.block[k, 2]:

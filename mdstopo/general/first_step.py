@@ -33,7 +33,7 @@ PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
 
 
 @kernel
-def unstretched_force(model, k):  # type: ignore[no-untyped-def]
+def unstretched_force(model, k):
     """The largest force of a member of block k at unit strength that does not come from its elongation."""
     code = model.block[k, 3]
     most = law_unstretched(code, model.law[k])
@@ -46,7 +46,7 @@ def unstretched_force(model, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):  # type: ignore[no-untyped-def]
+def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):
     """noise (n_pair,) of `rounding_of_pairs`; of pairs with a body that is driven, what is of the size of the pair.
 
     Joints hand forces on, and springs that hold against them may be elsewhere.
@@ -79,7 +79,7 @@ def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):  # typ
 
 
 @kernel
-def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):  # type: ignore[no-untyped-def]
+def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):
     """scale (n_pair,): what the errors of a pair's motion are measured against, m; q (n,), rel (n_pair, POSE): where it
     is.
 
@@ -95,9 +95,7 @@ def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):  #
 
 
 @kernel
-def first_step(  # type: ignore[no-untyped-def]
-    model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q, v, a, work
-):
+def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q, v, a, work):
     """Length of a first step from the state q0, v0 (n,) at the start, whose accelerations are a0, towards time `end`.
 
     rel0, motion, noise, tolerance as of `motion_scale`. Scratch: lam (n_row,); q, v, a (n,).

@@ -21,14 +21,14 @@ from mdstopo.mechanics.passes import FIRST_TANGENT, SUMS
 
 
 @part
-def turn_bodies(q, turned):  # type: ignore[no-untyped-def]
+def turn_bodies(q, turned):
     """turned (n_body, 2) = cos - 1 and sin of the angle that every body has turned by: pairs and joints share them."""
     for b in range(turned.shape[0]):
         turned[b, 0], turned[b, 1] = small_turn(q[3 * b + 2])
 
 
 @part
-def turned_pose(model, p, turned, q, v, rel):  # type: ignore[no-untyped-def]
+def turned_pose(model, p, turned, q, v, rel):
     """`mechanics.geometry.relative_pose` of pair p, of bodies that are turned by `turn_bodies`."""
     one = model.pair[p, 0]
     two = model.pair[p, 1]
@@ -36,7 +36,7 @@ def turned_pose(model, p, turned, q, v, rel):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def drive_state(model, segment, t, q, v):  # type: ignore[no-untyped-def]
+def drive_state(model, segment, t, q, v):
     """Put the driven coordinates of q and v (n,) where they have to be at time t."""
     tau = t - model.times[segment]
     for i in range(model.driven.shape[0]):
@@ -47,7 +47,7 @@ def drive_state(model, segment, t, q, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def drive_acceleration(model, segment, t, a):  # type: ignore[no-untyped-def]
+def drive_acceleration(model, segment, t, a):
     """Put the accelerations of the driven coordinates into a (n,)."""
     tau = t - model.times[segment]
     for i in range(model.driven.shape[0]):
@@ -56,7 +56,7 @@ def drive_acceleration(model, segment, t, a):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_bushings(model, rel, q, tangent, sums):  # type: ignore[no-untyped-def]
+def add_bushings(model, rel, q, tangent, sums):
     """sums (n_pair, SUMS) += Q, K and C of the bushings: u = d + R q - p and theta against springs along A's axes."""
     for j in range(model.bushing_pair.shape[0]):
         b = model.bushing[j]
@@ -95,7 +95,7 @@ def add_bushings(model, rel, q, tangent, sums):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pose_acceleration(pair, rel, p, a, out):  # type: ignore[no-untyped-def]
+def pose_acceleration(pair, rel, p, a, out):
     """out (3,) = xi'' of pair p from accelerations a (n,)."""
     i = 3 * pair[p, 0]
     j = 3 * pair[p, 1]
@@ -112,7 +112,7 @@ def pose_acceleration(pair, rel, p, a, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):  # type: ignore[no-untyped-def]
+def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):
     """B of member i as a row over its two bodies (6,): dDelta/dt = row . v; and d(row)/dt . v; returns the length.
 
     In global axes: u = x_B + R_B q - x_A - R_A p, L' = e . u', L'' = e . u'' + (|u'|^2 - L'^2)/L.
@@ -154,7 +154,7 @@ def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):  # type: ignore[
 
 
 @kernel
-def add_inerters(model, segment, strength, q, v, mass, f):  # type: ignore[no-untyped-def]
+def add_inerters(model, segment, strength, q, v, mass, f):
     """mass (n_pair, 6, 6) = sum s b B^T B of the inerters; f (n,) -= sum s b B^T (B' v)."""
     mass[:] = 0.0
     row = np.empty(6)
@@ -177,7 +177,7 @@ def add_inerters(model, segment, strength, q, v, mass, f):  # type: ignore[no-un
 
 
 @kernel
-def inerter_force(model, k, i, q, v, a, row):  # type: ignore[no-untyped-def]
+def inerter_force(model, k, i, q, v, a, row):
     """Force b d2Delta/dt2 of inerter i of block k at unit strength, and its row (6,)."""
     p = model.block[k, 0]
     a_body = 3 * model.pair[p, 0]
@@ -192,7 +192,7 @@ def inerter_force(model, k, i, q, v, a, row):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):  # type: ignore[no-untyped-def]
+def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
     """k_out, c_out (n_pair, 6, 6) += d/dq, d/dv of sum s b B^T d2Delta/dt2 at fixed a (the reverse of `inerter_row`).
 
     With g = dL''/du, h = dL''/du' = 2 (u' - L' e)/L: g = (u'' - e (e . u''))/L - 2 L' (u' - L' e)/L^2
@@ -290,7 +290,7 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):  # ty
 
 
 @kernel
-def general_forces(model, strength, segment, t, q, v, tangent, desk):  # type: ignore[no-untyped-def]
+def general_forces(model, strength, segment, t, q, v, tangent, desk):
     """F (n,) without inerters at one state, and on demand tangents: f, k, c and turn of the desk; with turned; rel
     and sums of the pairs that carry more than joints.
     """

@@ -18,7 +18,7 @@ from mdstopo.mechanics.laws.table import SPRING, law
 
 
 @kernel
-def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # type: ignore[no-untyped-def]
+def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):
     """out (M_padded,) -= f_i (b_i . T z) at unit strength, += weight V_i, of all design members at one state.
 
     Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
@@ -38,7 +38,7 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):  # t
 
 
 @kernel
-def add_designs(model, segment, track, o, strength, z, out, work):  # type: ignore[no-untyped-def]
+def add_designs(model, segment, track, o, strength, z, out, work):
     """`add_design` of the stages from o on, as many as z (S, n) has, without energy: springs are read once."""
     end = o + z.shape[0]
     work[DESIGN] += z.shape[0]
@@ -52,7 +52,7 @@ def add_designs(model, segment, track, o, strength, z, out, work):  # type: igno
 
 
 @kernel
-def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type: ignore[no-untyped-def]
+def _add(model, segment, when, strength, stage, turned, z, weight, out):
     """`add_design` at the times when (S,), of stage (S, 3, n) with the bodies turned (S, n_body, 2)."""
     count = z.shape[0]
     n_pair = model.pair.shape[0]
@@ -90,7 +90,7 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):  # type
 
 
 @kernel
-def _virtual(pair, rel, p, z, out):  # type: ignore[no-untyped-def]
+def _virtual(pair, rel, p, z, out):
     """out (3,) = -T z."""
     pair_displacement(pair, rel, p, z, out)
     for i in range(3):
@@ -98,7 +98,7 @@ def _virtual(pair, rel, p, z, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):
     """out (M_padded,) += scale df*/d(alpha^mu) at fixed motion, where g_j is the force f* of member `who`.
 
     f* has a sign; its absolute value is what is looked at (`force_sign`).
@@ -111,7 +111,7 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):  # 
 
 
 @kernel
-def force_sign(model, segment, j, who, t, strength, q, v, a):  # type: ignore[no-untyped-def]
+def force_sign(model, segment, j, who, t, strength, q, v, a):
     """The sign of f* where g_j is the force of member `who`; else 1.
 
     It is that of the very number that `response` takes the absolute value of: near zero another formula for the same
@@ -126,7 +126,7 @@ def force_sign(model, segment, j, who, t, strength, q, v, a):  # type: ignore[no
 
 
 @kernel
-def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):
     """out (M_padded,) += scale times the force of each law of a member at unit strength."""
     row = np.empty(6)
     rel = np.empty((model.pair.shape[0], POSE))
@@ -145,7 +145,7 @@ def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):  # type
 
 
 @kernel
-def _unit_force(model, k, i, segment, t, r, strength):  # type: ignore[no-untyped-def]
+def _unit_force(model, k, i, segment, t, r, strength):
     c = r[2]
     s = r[3]
     ax = c * model.member[2, i] - s * model.member[3, i]

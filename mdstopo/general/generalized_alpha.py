@@ -43,7 +43,7 @@ TAG = (0, 0)
 
 
 @entry
-def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):  # type: ignore[no-untyped-def]
+def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):
     """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
 
     As `general.runge_kutta.simulate`; tables (1,): the spectral radius; settings[2]: the step, or, where negative, so

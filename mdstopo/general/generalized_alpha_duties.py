@@ -17,27 +17,27 @@ from mdstopo.integrators.steps import REVERSE
 
 
 @kernel
-def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
     """The cubic between the ends of step k, and its derivative."""
     cubic(track.state[k], track.state[k + 1], track.t[k + 1] - track.t[k], c, q, v)
     return k
 
 
 @kernel
-def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
     """Further along the cubic."""
     h = track.t[k + 1] - track.t[k]
     cubic(track.state[k], track.state[k + 1], h, c + e / h, q_out, v_out)
 
 
 @kernel
-def derivatives(tag):  # type: ignore[no-untyped-def]
+def derivatives(tag):
     """Velocities only: the cubic's second derivative is not the acceleration."""
     return 1
 
 
 @kernel
-def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+def weights_of(tag, model, tables, track, w, out):
     """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion."""
     h = track.t[w + 1] - track.t[w]
     out[:] = 0.0
@@ -51,7 +51,7 @@ def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-de
 
 
 @kernel
-def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
     """Duty 2."""
     count, n = lam_q.shape
     o = track.index[w, 0]
@@ -95,7 +95,7 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
 
 
 @part
-def _stage_row_back(  # type: ignore[no-untyped-def]
+def _stage_row_back(
     model, track, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q, start_v,
     desk,
 ):  # fmt: skip
@@ -146,7 +146,7 @@ def _stage_row_back(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
     """Duty 3."""
     n = dq.shape[0]
     o = track.index[w, 0]

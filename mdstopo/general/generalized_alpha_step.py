@@ -24,7 +24,7 @@ from mdstopo.integrators.steps import (
 
 
 @kernel
-def rate_of(model, desk):  # type: ignore[no-untyped-def]
+def rate_of(model, desk):
     """Angular frequency of the fastest vibration at the balanced state on the desk, rad/s (an estimate)."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
@@ -43,7 +43,7 @@ def rate_of(model, desk):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance(  # type: ignore[no-untyped-def]
+def advance(
     model,
     radius,
     strength,
@@ -194,7 +194,7 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def copy_state(source, target):  # type: ignore[no-untyped-def]
+def copy_state(source, target):
     """target (4, n) = source."""
     for i in range(4):
         for d in range(source.shape[1]):

@@ -24,13 +24,13 @@ SINGULAR = 1e-12
 
 
 @kernel
-def index(i):  # type: ignore[no-untyped-def]
+def index(i):
     """An index that is not negative: else every access has code for counting from the end."""
     return np.uint64(i)
 
 
 @kernel
-def inverse_masses(model):  # type: ignore[no-untyped-def]
+def inverse_masses(model):
     """(n,): 1 over the mass of each coordinate; 0 for what is driven, which does not answer."""
     inverse = np.zeros(model.mass.shape[0])
     for d in range(inverse.shape[0]):
@@ -40,7 +40,7 @@ def inverse_masses(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def spread_masses(model):  # type: ignore[no-untyped-def]
+def spread_masses(model):
     """(n_joint, 3, 6): `inverse_masses` of the coordinates that slopes of the joints are by."""
     inverse = inverse_masses(model)
     spread = np.empty((model.joint.shape[0], 3, 6))
@@ -52,7 +52,7 @@ def spread_masses(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):  # type: ignore[no-untyped-def]
+def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
     """Factors of the joints' matrix at slopes jac (n_joint, 3, 6); spread: as of `spread_masses`.
 
     Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (size[3],), L by rows from their first entries on, the diagonal unused;
@@ -83,7 +83,7 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):  # typ
 
 
 @kernel
-def decompose(envelope, gram, diagonal):  # type: ignore[no-untyped-def]
+def decompose(envelope, gram, diagonal):
     """Factor a matrix in place, as `factor_joints` describes; -1, or a singular row."""
     i = 0
     while i < envelope.shape[0]:
@@ -96,7 +96,7 @@ def decompose(envelope, gram, diagonal):  # type: ignore[no-untyped-def]
 
 
 @part
-def in_pairs(envelope, i):  # type: ignore[no-untyped-def]
+def in_pairs(envelope, i):
     """Whether row i and the next one begin at the same place, as those of a joint do: then both are taken at once, and
     one waits less for the other.
     """
@@ -104,7 +104,7 @@ def in_pairs(envelope, i):  # type: ignore[no-untyped-def]
 
 
 @part
-def _decompose_one(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
+def _decompose_one(envelope, gram, diagonal, i):
     inverse = diagonal[1]
     first = envelope[i, 0]
     own = envelope[i, 1]
@@ -128,7 +128,7 @@ def _decompose_one(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
 
 
 @part
-def _decompose_two(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
+def _decompose_two(envelope, gram, diagonal, i):
     """`_decompose_one` of rows i and i + 1."""
     inverse = diagonal[1]
     first = envelope[i, 0]
@@ -172,7 +172,7 @@ def _decompose_two(envelope, gram, diagonal, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def growth(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+def growth(envelope, gram, diagonal, x):
     """What the smallest eigenvalue shows itself by in factors of `decompose`: a sum of squares, and the row that has
     most of it.
 
@@ -199,14 +199,14 @@ def growth(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def weakest(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+def weakest(envelope, gram, diagonal, x):
     """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `decompose`, or -1."""
     size, worst = growth(envelope, gram, diagonal, x)
     return worst if size * SINGULAR > envelope.shape[0] else -1
 
 
 @kernel
-def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):  # type: ignore[no-untyped-def]
+def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
     """Solve with the factors for the right side a (n,), lam (n_row,), in place; driven parts become 0. x: (n_row,)."""
     line = model.line
     envelope = model.envelope
@@ -233,7 +233,7 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):  # type: igno
 
 
 @kernel
-def substitute(envelope, gram, diagonal, x):  # type: ignore[no-untyped-def]
+def substitute(envelope, gram, diagonal, x):
     """Solve with the factors of `decompose` for the right side x (n_row,), in place."""
     count = envelope.shape[0]
     i = 0

@@ -20,7 +20,7 @@ NEAR, AIM = 50.0, 5.0
 
 
 @kernel
-def next_look(low, high, at_low, at_high, rounding, resolution, look):  # type: ignore[no-untyped-def]
+def next_look(low, high, at_low, at_high, rounding, resolution, look):
     """A length of the step between low and high, where the margins are at_low and at_high < 0; -1: high will do.
 
     The secant through both, aimed behind the switch by more than rounding; after many looks every other is a bisection.
@@ -37,7 +37,7 @@ def next_look(low, high, at_low, at_high, rounding, resolution, look):  # type: 
 
 
 @kernel
-def narrowed(low, high, at_low, at_high, middle, value, rounding, side):  # type: ignore[no-untyped-def]
+def narrowed(low, high, at_low, at_high, middle, value, rounding, side):
     """low, high, at_low, at_high, side after the margin at `middle` has been seen: Illinois' rule."""
     if value < -rounding:
         return low, middle, (0.5 * at_low if side == 1 else at_low), value, 1
@@ -45,7 +45,7 @@ def narrowed(low, high, at_low, at_high, middle, value, rounding, side):  # type
 
 
 @kernel
-def cut_at(dip, near, low, high):  # type: ignore[no-untyped-def]
+def cut_at(dip, near, low, high):
     """Where to cut the piece of a step between low and high, from what `first_sign` says of it; -1: nowhere."""
     c = dip if dip < 1.0 else near
     if not (c > EDGE and c < 1.0 - EDGE):
@@ -54,7 +54,7 @@ def cut_at(dip, near, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def matters(model, strength, rel, i):  # type: ignore[no-untyped-def]
+def matters(model, strength, rel, i):
     """Whether it makes a difference to derivatives that member or contact i only just does not leave its mode.
 
     rel (n_pair, POSE): where.

@@ -9,7 +9,7 @@ from mdstopo.general.track import carve_track
 
 
 @entry
-def pull(  # type: ignore[no-untyped-def]
+def pull(
     tag,
     ints,
     floats,

@@ -32,7 +32,7 @@ KNOTTED = 12
 
 
 @kernel
-def scale_general(block, power, alpha, strength):  # type: ignore[no-untyped-def]
+def scale_general(block, power, alpha, strength):
     """strength row SCALE = alpha^mu (Eq. 12); 1 for members that are no design variables."""
     for k in range(block.shape[0]):
         first = block[k, 4]
@@ -43,7 +43,7 @@ def scale_general(block, power, alpha, strength):  # type: ignore[no-untyped-def
 
 
 @inline
-def direction(member, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
+def direction(member, i, dx, dy, c, s):
     """Length, b (3 numbers), the inverse length (0 at none) and R q of member i."""
     ax = c * member[2, i] - s * member[3, i]
     ay = s * member[2, i] + c * member[3, i]
@@ -55,7 +55,7 @@ def direction(member, i, dx, dy, c, s):  # type: ignore[no-untyped-def]
 
 
 @inline
-def stretched(member, i, r, length):  # type: ignore[no-untyped-def]
+def stretched(member, i, r, length):
     """Delta of member i, which has a length at the relative pose r (POSE,)."""
     x = member[2, i]
     y = member[3, i]
@@ -67,14 +67,14 @@ def stretched(member, i, r, length):  # type: ignore[no-untyped-def]
 
 
 @inline
-def stretch_of(member, i, r):  # type: ignore[no-untyped-def]
+def stretch_of(member, i, r):
     """Delta and dDelta/dt of member i at the relative pose r (POSE,)."""
     length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
     return stretched(member, i, r, length), bx * r[4] + by * r[5] + bt * r[6]
 
 
 @part
-def rate_of_row(model, p, row, v):  # type: ignore[no-untyped-def]
+def rate_of_row(model, p, row, v):
     """row (6,) of pair p times v (n,), velocities or virtual displacements."""
     total = 0.0
     for r in range(6):
@@ -83,7 +83,7 @@ def rate_of_row(model, p, row, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no-untyped-def]
+def add_block(model, k, segment, t, strength, r, tangent, o):
     """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C.
 
     Springs are summed by `add_springs`.
@@ -148,7 +148,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):  # type: ignore[no
 
 
 @part
-def add_springs(model, k, strength, r, tangent, o):  # type: ignore[no-untyped-def]
+def add_springs(model, k, strength, r, tangent, o):
     """`add_block` of a block of springs."""
     member = model.member
     p = model.law[k]
@@ -175,7 +175,7 @@ def add_springs(model, k, strength, r, tangent, o):  # type: ignore[no-untyped-d
 
 
 @kernel
-def general_sums(model, segment, t, strength, rel, tangent, sums):  # type: ignore[no-untyped-def]
+def general_sums(model, segment, t, strength, rel, tangent, sums):
     """sums (n_pair, SUMS) += those of all acting blocks at relative poses rel (n_pair, POSE)."""
     for k in range(model.block.shape[0]):
         if model.active[segment, k] != 0 and model.block[k, 3] != INERTER:
@@ -187,7 +187,7 @@ def general_sums(model, segment, t, strength, rel, tangent, sums):  # type: igno
 
 
 @kernel
-def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped-def]
+def set_modes(model, strength, rel, rel_rate, knots):
     """The modes at the start from elongation, rate and second derivative (rel_rate: the pose of the accelerations).
 
     knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of many
@@ -219,7 +219,7 @@ def set_modes(model, strength, rel, rel_rate, knots):  # type: ignore[no-untyped
 
 
 @inline
-def second_rate(member, i, r, acc):  # type: ignore[no-untyped-def]
+def second_rate(member, i, r, acc):
     """d2Delta/dt2 = b . xi'' + xi' . B2 xi' of member i; acc (3,): xi''."""
     _, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
     hxx = y * (1.0 - bx * bx)
@@ -242,7 +242,7 @@ def second_rate(member, i, r, acc):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  # type: ignore[no-untyped-def]
+def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):
     """out (M_padded,) += f_i (b_i . u) + weight V_i of the members of block k at unit strength.
 
     r (POSE,): relative pose; u (3,): virtual change of it; weight: of the stored energy. modes_of (M_padded,).
@@ -270,7 +270,7 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):  
 
 
 @kernel
-def unscale_general(block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
+def unscale_general(block, power, alpha, padded, out):
     """out (N + P,) = mu alpha^(mu - 1) times the padded gradient by alpha^mu, summed over the laws of a member.
 
     Behind the N come the derivatives by parameters, of which padded (M_padded + P,) has as many behind its members.
@@ -291,7 +291,7 @@ def unscale_general(block, power, alpha, padded, out):  # type: ignore[no-untype
 
 
 @kernel
-def meeting(model, segment, t, strength, before, after):  # type: ignore[no-untyped-def]
+def meeting(model, segment, t, strength, before, after):
     """Padded index of a member whose ends meet between two relative poses while it would carry a force, or -1."""
     for k in range(model.block.shape[0]):
         if model.active[segment, k] == 0 or model.block[k, 3] == INERTER:

@@ -133,7 +133,7 @@ def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
 
 
 @kernel
-def unpack_general(ints, floats):  # type: ignore[no-untyped-def]
+def unpack_general(ints, floats):
     """The `GeneralModel` whose arrays are views of the packed ones."""
     n = ints[0]
     n_pair = ints[1]

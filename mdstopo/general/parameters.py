@@ -41,7 +41,7 @@ from mdstopo.mechanics.laws.table import (
 
 
 @kernel
-def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate):  # type: ignore[no-untyped-def]
+def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate):
     """df/dp and dV/dp of member i of block k at unit strength, and its B over its bodies into row (6,)."""
     if model.block[k, 3] == INERTER:
         first = 3 * model.pair[model.block[k, 0], 0]
@@ -59,7 +59,7 @@ def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row
 
 
 @kernel
-def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):  # type: ignore[no-untyped-def]
+def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):
     """out (M_padded + P,), behind the members, += s (weight V_p - f_p (b . T z)) of all parameters at one state."""
     row = np.empty(6)
     row_rate = np.empty(6)
@@ -79,7 +79,7 @@ def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):  # typ
 
 
 @kernel
-def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale, out):  # type: ignore[no-untyped-def]
+def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale, out):
     """out, behind the members, += scale df*/dp at fixed motion of member `who` of a group."""
     row = np.empty(6)
     row_rate = np.empty(6)
@@ -97,7 +97,7 @@ def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale
 
 
 @kernel
-def event_slope(model, track, strength, event, e):  # type: ignore[no-untyped-def]
+def event_slope(model, track, strength, event, e):
     """dt_e/dp = -m_p/m' of an event by the parameter of entry e of `varied`; 0 where it has nothing to do with it."""
     k = model.varied[e, 0]
     place = model.varied[e, 1]
@@ -138,7 +138,7 @@ def event_slope(model, track, strength, event, e):  # type: ignore[no-untyped-de
 
 
 @kernel
-def add_event(model, track, strength, event, factor, out):  # type: ignore[no-untyped-def]
+def add_event(model, track, strength, event, factor, out):
     """out, behind the members, += factor dt_e/dp of an event; modes are not what they were before the call."""
     if factor == 0.0:
         return
@@ -147,7 +147,7 @@ def add_event(model, track, strength, event, factor, out):  # type: ignore[no-un
 
 
 @kernel
-def begins_or_ends(model, track, count, state, e):  # type: ignore[no-untyped-def]
+def begins_or_ends(model, track, count, state, e):
     """Whether the law of entry e begins (1) or ceases (-1) to act at a state, at the time that varies; else 0."""
     place = model.varied[e, 1]
     if place < ACTIVE_FROM:
@@ -168,7 +168,7 @@ def begins_or_ends(model, track, count, state, e):  # type: ignore[no-untyped-de
 
 
 @kernel
-def time_jump(model, track, strength, count, state, e, j, square, dv):  # type: ignore[no-untyped-def]
+def time_jump(model, track, strength, count, state, e, j, square, dv):
     """What shifting the time of entry e does at a state: dv (n,) behind it, and to the integral of g_j (of its square).
 
     Returns whether it does anything, and the latter (0 for j < 0). Only the first entry of a value does: it stands for
@@ -215,7 +215,7 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):  # type: 
 
 
 @kernel
-def add_times(model, track, strength, count, state, j, square, lam_v, rate, out):  # type: ignore[no-untyped-def]
+def add_times(model, track, strength, count, state, j, square, lam_v, rate, out):
     """out, behind the members, += what shifting the times of laws that begin or end at a state does.
 
     lam_v (n,): its cotangent of the velocities behind the state; rate: dg/dt of a peak that stands there, which moves

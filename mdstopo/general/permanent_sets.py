@@ -34,7 +34,7 @@ from mdstopo.mechanics.laws.table import (
 
 
 @kernel
-def count_sets(model):  # type: ignore[no-untyped-def]
+def count_sets(model):
     """How many members have a set; where there are none, nothing here is asked again."""
     total = 0
     for k in range(model.block.shape[0]):
@@ -44,7 +44,7 @@ def count_sets(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def slot_of(model, i):  # type: ignore[no-untyped-def]
+def slot_of(model, i):
     """The slot of padded member i and its block, or -1, -1."""
     slot = 0
     for k in range(model.block.shape[0]):
@@ -57,14 +57,14 @@ def slot_of(model, i):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def set_slopes(model, k, i, strength, x, rate):  # type: ignore[no-untyped-def]
+def set_slopes(model, k, i, strength, x, rate):
     """Slopes of s f and of s V of member i of block k by its set; x: the elongation without it."""
     _, by_x, _, _, pull = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), 0.0, 0.0, model.curves)
     return -strength[0, i] * by_x, -strength[0, i] * pull
 
 
 @kernel
-def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no-untyped-def]
+def add_sets(model, segment, strength, q, v, z, weight, out):
     """out (slots,) += what the sets do to the forces at a state with virtual displacement z (n,), and to weight V."""
     rel = np.empty((model.pair.shape[0], POSE))
     u = np.empty(3)
@@ -90,7 +90,7 @@ def add_sets(model, segment, strength, q, v, z, weight, out):  # type: ignore[no
 
 
 @kernel
-def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):  # type: ignore[no-untyped-def]
+def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):
     """out (slots,) += scale dg_j/dp at fixed motion of a member force, whose slopes are bars (3, n)."""
     if model.response[j, 0] != MEMBER_FORCE:
         return
@@ -118,7 +118,7 @@ def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale,
 
 
 @kernel
-def add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):  # type: ignore[no-untyped-def]
+def add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):
     """out (slots,) += scale dg_j/dp at fixed motion of any response, whose slopes are bars (3, n)."""
     if model.response[j, 0] == ENERGY:
         add_sets(model, segment, strength, q, v, np.zeros(q.shape[0]), scale, out)
@@ -127,7 +127,7 @@ def add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, o
 
 
 @kernel
-def made_set(model, track, e):  # type: ignore[no-untyped-def]
+def made_set(model, track, e):
     """Slot and block of the member whose set event e has made, or -1, -1."""
     slot, k = slot_of(model, track.event[e, 1])
     if slot < 0:
@@ -139,7 +139,7 @@ def made_set(model, track, e):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def time_back(model, track, e, pulled, bar):  # type: ignore[no-untyped-def]
+def time_back(model, track, e, pulled, bar):
     """bar (slots,) of the set that the time of event e depends on, which pulls `pulled` on that time's slopes."""
     slot, _ = slot_of(model, track.event[e, 1])
     if slot >= 0:
@@ -147,14 +147,14 @@ def time_back(model, track, e, pulled, bar):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def time_forward(model, track, e, sets, i):  # type: ignore[no-untyped-def]
+def time_forward(model, track, e, sets, i):
     """What the change sets[:, i] of its member's set adds to the time of event e."""
     slot, _ = slot_of(model, track.event[e, 1])
     return -track.kept[e, 2] * sets[slot, i] if slot >= 0 else 0.0
 
 
 @kernel
-def own_slope(model, track, e, entry, rate):  # type: ignore[no-untyped-def]
+def own_slope(model, track, e, entry, rate):
     """Slope of the set that event e has made by the parameter of an entry of `varied`; rate: dDelta/dt there."""
     place = model.varied[entry, 1]
     k = model.varied[entry, 0]
@@ -168,7 +168,7 @@ def own_slope(model, track, e, entry, rate):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def begins_divided(model, strength, q, v, near):  # type: ignore[no-untyped-def]
+def begins_divided(model, strength, q, v, near):
     """A member (padded) that begins, within `near` (m), with a set that depends on parameters that vary on one side
     only; or -1.
     """
@@ -189,7 +189,7 @@ def begins_divided(model, strength, q, v, near):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sets_back(model, track, e, bar, lam_q, out):  # type: ignore[no-untyped-def]
+def sets_back(model, track, e, bar, lam_q, out):
     """Behind event e the cotangent of the set that it made, bar (slots,), becomes one of the pose, lam_q (n,), and of
     what parameters do to it, out (M_padded + P,) behind the members.
     """
@@ -210,7 +210,7 @@ def sets_back(model, track, e, bar, lam_q, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def keep_start(model, track, lam_q, bar, start, out):  # type: ignore[no-untyped-def]
+def keep_start(model, track, lam_q, bar, start, out):
     """start (n,) = the cotangents lam_q of the start's positions, with those of the sets that members begin with.
 
     Nothing where start has no length. out: as of `sets_back`.
@@ -225,7 +225,7 @@ def keep_start(model, track, lam_q, bar, start, out):  # type: ignore[no-untyped
 
 
 @kernel
-def sets_forward(model, track, e, column, sets):  # type: ignore[no-untyped-def]
+def sets_forward(model, track, e, column, sets):
     """sets (slots, M_padded), the derivatives of the sets, behind event e; column as of `direct.through_step`."""
     slot, k = made_set(model, track, e)
     if slot < 0:
@@ -244,7 +244,7 @@ def sets_forward(model, track, e, column, sets):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def through_sets(model, strength, track, w, matrix, out):  # type: ignore[no-untyped-def]
+def through_sets(model, strength, track, w, matrix, out):
     """out (slots, 4 n + 1): what unit sets do at the end of step w, by its map (`direct.step_map`)."""
     n = model.mass.shape[0]
     segment = track.index[w, 2]

@@ -33,7 +33,7 @@ SWEEPS, SETTLED = 8, 1e-16
 
 
 @kernel
-def misfit(model, phi, rows):  # type: ignore[no-untyped-def]
+def misfit(model, phi, rows):
     """Largest |Phi| of the joints (m or rad), and its place in `rows` of joint numbers."""
     worst = 0.0
     for j in range(model.joint.shape[0]):
@@ -45,7 +45,7 @@ def misfit(model, phi, rows):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
+def project(model, scale, q, v, desk, mu, nu):
     """Move q, v (n,) onto the joints; mu, nu (n_row,) are the multipliers that did it.
 
     scale: size of the scene, m. Returns the place of the unknown at which the joints are singular, or -1; or, behind
@@ -112,7 +112,7 @@ def project(model, scale, q, v, desk, mu, nu):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[no-untyped-def]
+def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
     """h_mu, h_nu (n_pair, 6, 6) = d(Phi_q^T mu)/dq and with nu; slope (n_joint, 3, 6) = d(Phi_q v)/dq."""
     w = np.empty(PLACES)
     wd = np.empty(6)
@@ -132,7 +132,7 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):  # type: ignore[
 
 
 @kernel
-def swept(model, desk, h, x, y):  # type: ignore[no-untyped-def]
+def swept(model, desk, h, x, y):
     """Solve [M + H^T, Phi_q^T; Phi_q, 0] with the factors of H = 0 on the desk, by sweeps: x (n,), y (n_row,) in place.
 
     H (n_pair, 6, 6) is as small as what a step has drifted. Returns whether the sweeps have settled; else x is as it
@@ -166,7 +166,7 @@ def swept(model, desk, h, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-untyped-def]
+def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
     """Pull cotangents of the projected state q, v back to the one before; bar_q, bar_v (R, n) in place."""
     n = q.shape[0]
     count = bar_q.shape[0]
@@ -214,7 +214,7 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):  # type: ignore[no-un
 
 
 @kernel
-def project_forward(model, q, v, mu, nu, desk, dq, dv):  # type: ignore[no-untyped-def]
+def project_forward(model, q, v, mu, nu, desk, dq, dv):
     """Push changes dq, dv (n,) of the state before through the projection, in place."""
     n = q.shape[0]
     if mu.shape[0] == 0:

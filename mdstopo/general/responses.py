@@ -38,34 +38,34 @@ APART = 3e-4
 
 
 @chosen(LISTED, lambda each: each.absolute or None, part)
-def _is_absolute(kind):  # type: ignore[no-untyped-def]
+def _is_absolute(kind):
     return False
 
 
 @chosen(LISTED, lambda each: True if each.vector else None, part)
-def _is_vector(kind):  # type: ignore[no-untyped-def]
+def _is_vector(kind):
     return False
 
 
 @chosen(LISTED, lambda each: True if each.needs_balance else None, part)
-def needs_balance(kind):  # type: ignore[no-untyped-def]
+def needs_balance(kind):
     """Whether responses of a kind need more than the state: accelerations, multipliers, sums of forces."""
     return False
 
 
 @chosen(LISTED, lambda each: True if each.by_state else None, part)
-def _is_by_state(kind):  # type: ignore[no-untyped-def]
+def _is_by_state(kind):
     return False
 
 
 @kernel
-def kinked(model, j):  # type: ignore[no-untyped-def]
+def kinked(model, j):
     """Whether response j is a norm, an absolute value, or a largest one, which may have kinks in time."""
     return _is_absolute(model.response[j, 0]) or is_norm(model, j)
 
 
 @kernel
-def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  # type: ignore[no-untyped-def]
+def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
     """f* of member i of a group, all its laws together; slopes (3, 6) by q, v, a of its bodies; own: scratch (2, 6).
 
     Returns f*, its pair.
@@ -100,7 +100,7 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):  
 
 
 @kernel
-def group_forces(model, strength, segment, t, group, q, v, a, out):  # type: ignore[no-untyped-def]
+def group_forces(model, strength, segment, t, group, q, v, a, out):
     """out (M,) = f* of all members of a group: that of `member_force`, to the bit, without slopes."""
     row = np.empty(6)
     out[:] = 0.0
@@ -133,7 +133,7 @@ def group_forces(model, strength, segment, t, group, q, v, a, out):  # type: ign
 
 
 @kernel
-def largest_force(model, strength, segment, t, group, q, v, a):  # type: ignore[no-untyped-def]
+def largest_force(model, strength, segment, t, group, q, v, a):
     """The member of a group that carries the largest |f*|."""
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
@@ -148,7 +148,7 @@ def largest_force(model, strength, segment, t, group, q, v, a):  # type: ignore[
 
 
 @kernel
-def members_of(model, group):  # type: ignore[no-untyped-def]
+def members_of(model, group):
     """How many members a group has."""
     count = 0
     for k in range(model.block.shape[0]):
@@ -158,7 +158,7 @@ def members_of(model, group):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def equal_forces(model, strength, segment, t, group, stage, largest, tied):  # type: ignore[no-untyped-def]
+def equal_forces(model, strength, segment, t, group, stage, largest, tied):
     """Which members of a group carry the largest |f*| at a stage (3, n), to TIE: into tied (members,); how many."""
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
@@ -172,12 +172,12 @@ def equal_forces(model, strength, segment, t, group, stage, largest, tied):  # t
 
 
 @chosen(LISTED, lambda each: each.value, part)
-def _value(kind, model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):  # type: ignore[no-untyped-def]
+def _value(kind, model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):
     return np.nan
 
 
 @kernel
-def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):  # type: ignore[no-untyped-def]
+def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):
     """g_j at a balanced state; bars (3, n), row_bar (n_row,) = its slopes by q, v, a and lam (set, not added to).
 
     who: the member looked at, for member forces.
@@ -188,7 +188,7 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
 
 
 @kernel
-def energy_value(model, desk, bars):  # type: ignore[no-untyped-def]
+def energy_value(model, desk, bars):
     """Stored energy."""
     value = 0.0
     for p in range(model.pair.shape[0]):
@@ -199,7 +199,7 @@ def energy_value(model, desk, bars):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def members_value(model, strength, segment, j, who, t, q, v, a, bars):  # type: ignore[no-untyped-def]
+def members_value(model, strength, segment, j, who, t, q, v, a, bars):
     """|f*| of member `who` of a group."""
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
@@ -216,25 +216,25 @@ def members_value(model, strength, segment, j, who, t, q, v, a, bars):  # type: 
 
 
 @kernel
-def motion_value(model, j, q, v, a, bars):  # type: ignore[no-untyped-def]
+def motion_value(model, j, q, v, a, bars):
     """The component of a point's motion, or the angle, that is asked for."""
     return _motion(model, j, model.response[j, 3], q, v, a, bars)
 
 
 @kernel
-def joint_force_value(model, j, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+def joint_force_value(model, j, q, lam, bars, row_bar):
     """Norm of the force that a joint transmits."""
     return _transmitted(model, j, FORCE, q, lam, bars, row_bar)
 
 
 @kernel
-def joint_moment_value(model, j, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+def joint_moment_value(model, j, q, lam, bars, row_bar):
     """Norm of the couple that a joint transmits."""
     return _transmitted(model, j, MOMENT, q, lam, bars, row_bar)
 
 
 @kernel
-def _motion(model, j, component, q, v, a, bars):  # type: ignore[no-untyped-def]
+def _motion(model, j, component, q, v, a, bars):
     """A component of a point's motion (or an angle's) that response j looks at; its slopes are added to bars (3, n)."""
     slope = np.empty((6, 3))
     b = 3 * model.response[j, 1]
@@ -266,7 +266,7 @@ def _motion(model, j, component, q, v, a, bars):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _transmitted(model, j, which, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+def _transmitted(model, j, which, q, lam, bars, row_bar):
     """What the joint transmits that response j looks at (`joint_transmitted`); slopes as of `response`."""
     joint = model.response[j, 5]
     w = np.empty(PLACES)
@@ -285,7 +285,7 @@ def _transmitted(model, j, which, q, lam, bars, row_bar):  # type: ignore[no-unt
 
 
 @kernel
-def is_norm(model, j):  # type: ignore[no-untyped-def]
+def is_norm(model, j):
     """Whether response j is the Euclidean norm of a vector (2,), which has a direction of its own."""
     return _is_vector(model.response[j, 0]) and model.response[j, 3] == NORM
 
@@ -301,12 +301,12 @@ def has_kinks(model: GeneralModel, j: int) -> bool:
 
 
 @chosen(LISTED, lambda each: each.vector and each.vector.across, part)
-def _across(kind, model, j, q, v, a, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+def _across(kind, model, j, q, v, a, lam, bars, row_bar):
     return np.nan
 
 
 @kernel
-def across_slopes(model, j, q, v, a, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+def across_slopes(model, j, q, v, a, lam, bars, row_bar):
     """Slopes of the component perpendicular to the vector whose norm response j is (`is_norm`), its direction held.
 
     bars (3, n), row_bar (n_row,): as of `response`; zero where the vector is.
@@ -317,24 +317,24 @@ def across_slopes(model, j, q, v, a, lam, bars, row_bar):  # type: ignore[no-unt
 
 
 @kernel
-def motion_across(model, j, q, v, a, bars):  # type: ignore[no-untyped-def]
+def motion_across(model, j, q, v, a, bars):
     """The component of a point's motion perpendicular to it."""
     return _motion(model, j, ACROSS_MOTION, q, v, a, bars)
 
 
 @kernel
-def joint_force_across(model, j, q, lam, bars, row_bar):  # type: ignore[no-untyped-def]
+def joint_force_across(model, j, q, lam, bars, row_bar):
     """The component of the force that a joint transmits perpendicular to it."""
     return _transmitted(model, j, ACROSS_FORCE, q, lam, bars, row_bar)
 
 
 @chosen(LISTED, lambda each: each.vector and each.vector.components, part)
-def _components(kind, model, j, q, v, a, lam, out):  # type: ignore[no-untyped-def]
+def _components(kind, model, j, q, v, a, lam, out):
     """out (2,) = the vector whose norm response j is, in the frame in which it is formed."""
 
 
 @kernel
-def motion_components(model, j, q, v, a, out):  # type: ignore[no-untyped-def]
+def motion_components(model, j, q, v, a, out):
     """Both components of a point's motion."""
     spare = np.zeros((3, q.shape[0]))
     out[0] = _motion(model, j, X, q, v, a, spare)
@@ -342,7 +342,7 @@ def motion_components(model, j, q, v, a, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def joint_force_components(model, j, lam, out):  # type: ignore[no-untyped-def]
+def joint_force_components(model, j, lam, out):
     """Both components of the force that a joint transmits."""
     mine = np.empty(3)
     gather_multipliers(model, model.response[j, 5], lam, mine)
@@ -351,7 +351,7 @@ def joint_force_components(model, j, lam, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):  # type: ignore[no-untyped-def]
+def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):
     """Rate in time, at a state of step k, of the component of `across_slopes`; differenced as `rated` does.
 
     a (n,), lam (n_row,) and the desk are used up.
@@ -380,7 +380,7 @@ def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):  #
 
 
 @kernel
-def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # type: ignore[no-untyped-def]
+def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):
     """Slopes by q and v of an inerter's force, by sixth-order differences of its formula: rarely needed."""
     own = np.empty(6)
     for k in range(model.block.shape[0]):
@@ -410,7 +410,7 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):  # t
 
 
 @kernel
-def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-untyped-def]
+def value_at(model, strength, segment, t, state, j, desk):
     """g_j at a state (2, n), in the modes that members are in."""
     n = model.mass.shape[0]
     q = state[0].copy()
@@ -427,7 +427,7 @@ def value_at(model, strength, segment, t, state, j, desk):  # type: ignore[no-un
 
 
 @kernel
-def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, lam, bars, row_bar, near):  # type: ignore[no-untyped-def]
+def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, lam, bars, row_bar, near):
     """g_j and dg_j/dt at a state of step k; a, lam, the desk and the slopes are those of it afterwards.
 
     j < 0: no response is asked for; without `rates` the rate may be meaningless, and costs nothing, and where g is one

@@ -22,7 +22,7 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH, SPRING, law
 
 
 @kernel
-def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work):  # type: ignore[no-untyped-def]
+def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work):
     """out (R, M_padded + P) += what `gather.add_designs` adds for each row; z (R, 17, n), at `stages` stages from o."""
     count = z.shape[0]
     n_pair = model.pair.shape[0]
@@ -75,7 +75,7 @@ def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work
 
 
 @kernel
-def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):  # type: ignore[no-untyped-def]
+def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):
     """Block k at stage j, where it has the relative pose r; seen (4, M): room for f and b."""
     p = model.law[k]
     pair = model.block[k, 0]
@@ -103,7 +103,7 @@ def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):  # type: igno
 
 
 @kernel
-def _add_inerters(model, k, stage, z, j, out):  # type: ignore[no-untyped-def]
+def _add_inerters(model, k, stage, z, j, out):
     """Block k of inerters at stage j."""
     row = np.empty(6)
     for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
@@ -113,7 +113,7 @@ def _add_inerters(model, k, stage, z, j, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _add_parameters(model, segment, t, strength, stage, z, j, out):  # type: ignore[no-untyped-def]
+def _add_parameters(model, segment, t, strength, stage, z, j, out):
     """`parameters.add_parameters` without energy, of all rows at stage j."""
     row = np.empty(6)
     row_rate = np.empty(6)

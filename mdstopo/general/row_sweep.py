@@ -21,9 +21,7 @@ from mdstopo.general.track import carve_track, restore_modes
 
 
 @kernel
-def step_of_rows(  # type: ignore[no-untyped-def]
-    tag, model, tables, strength, track, count, w, c, lam_q, lam_v, lam_x, bar_set, z, y, desk, out, work
-):
+def step_of_rows(tag, model, tables, strength, track, count, w, c, lam_q, lam_v, lam_x, bar_set, z, y, desk, out, work):
     """Pull the cotangents of R rows, of fraction c (R,) of step w's motion, back to its start and before its events.
 
     lam_q, lam_v (R, n), lam_x (R, 2, n), bar_set (R, slots), in place; out (R, M_padded + P) is added to; z (R, 17, n),
@@ -57,9 +55,7 @@ def step_of_rows(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def rows_gradients(  # type: ignore[no-untyped-def]
-    tag, model, tables, strength, track, count, which, rows, desk, starts, out, work
-):
+def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk, starts, out, work):
     """out (R, M_padded + P) = derivatives of R rows of `extremes` (R, COLUMNS), the latest first, by alpha^mu.
 
     which (R, 2): the response, and whether the component across is meant (`adjoint.row_cotangents`). starts (R, n), or
@@ -104,7 +100,7 @@ def rows_gradients(  # type: ignore[no-untyped-def]
 
 
 @entry
-def pull_rows(  # type: ignore[no-untyped-def]
+def pull_rows(
     tag, ints, floats, tables, alpha, limits, count, which, rows, room, room_ints, strength, padded, out, starts, work
 ):
     """out (R, N + P) = derivatives of R rows of `extremes` by alpha (N,) and values; as of `rows_gradients`.

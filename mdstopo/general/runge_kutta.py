@@ -66,7 +66,7 @@ CHATTER = 400
 
 
 @kernel
-def advance(  # type: ignore[no-untyped-def]
+def advance(
     model, table, s, strength, segment, t, h, q0, v0, tangent, o, desk, lam, q, v, a, track, ends, push, size, work
 ):
     """One step of length h from q0, v0: stages into q, v, a (s, n), the end on the joints into ends (2, n).
@@ -117,7 +117,7 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def scene_size(model):  # type: ignore[no-untyped-def]
+def scene_size(model):
     """A length of the scene, m: what rounding of positions is measured against."""
     size = 0.0
     for p in range(model.reach.shape[0]):
@@ -128,7 +128,7 @@ def scene_size(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def start_modes(model, strength, desk, q, v, a, lam, knots):  # type: ignore[no-untyped-def]
+def start_modes(model, strength, desk, q, v, a, lam, knots):
     """The modes at the start: by elongation, then its rate, then its second derivative with what is surely closed.
 
     knots: as of `members.set_modes`.
@@ -149,7 +149,7 @@ def start_modes(model, strength, desk, q, v, a, lam, knots):  # type: ignore[no-
 
 
 @kernel
-def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, graze, noise, work, where):  # type: ignore[no-untyped-def]
+def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, graze, noise, work, where):
     """Switch every member whose margin is used up, one after the other; returns how many events there are now.
 
     -1: no room; a (n,) holds the accelerations behind the last one. The loop ends because each member switches at
@@ -195,7 +195,7 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
 
 
 @entry
-def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):  # type: ignore[no-untyped-def]
+def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):
     """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
 
     Arguments as `integrators.runge_kutta.simulate`'s, limits and rooms those of `track`. where (3,), each -1 where

@@ -12,7 +12,7 @@ from mdstopo.integrators.runge_kutta_tables import STAGES
 
 
 @kernel
-def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
     """A step of length c h from the start of step k; kept as step count + 1 where asked."""
     n = q.shape[0]
     method = 1 if model.size[2] != 0 else 0
@@ -44,20 +44,20 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
 
 
 @kernel
-def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):  # type: ignore[no-untyped-def]
+def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
     """Duty 2; a point inside a step is a partial step's end, so c is always 1."""
     explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work)
 
 
 @kernel
-def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):  # type: ignore[no-untyped-def]
+def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
     """Duty 3; nothing is implicit here."""
     explicit_forward(model, tables, track, w, dq, dv, force, changes, rows, desk)
     return True
 
 
 @kernel
-def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyped-def]
+def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
     """The parabola: the motion has the accelerations of its balance everywhere."""
     for d in range(q.shape[0]):
         q_out[d] = q[d] + e * (v[d] + 0.5 * e * a[d])
@@ -65,13 +65,13 @@ def beside(tag, track, k, c, e, q, v, a, q_out, v_out):  # type: ignore[no-untyp
 
 
 @kernel
-def derivatives(tag):  # type: ignore[no-untyped-def]
+def derivatives(tag):
     """Velocities and accelerations."""
     return 2
 
 
 @kernel
-def weights_of(tag, model, tables, track, w, out):  # type: ignore[no-untyped-def]
+def weights_of(tag, model, tables, track, w, out):
     """An integral is the velocity of one more coordinate."""
     method = 1 if model.size[2] != 0 else 0
     for j in range(STAGES[method]):

@@ -14,7 +14,7 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH
 
 
 @kernel
-def rest(model, alpha, strength, q, v):  # type: ignore[no-untyped-def]
+def rest(model, alpha, strength, q, v):
     """Strengths and modes of members at q (n,), where nothing moves: v (n,) = 0; what is driven is put in place."""
     scale_general(model.block, model.power, alpha, strength)
     drive_state(model, np.int64(0), model.times[0], q, v)
@@ -26,7 +26,7 @@ def rest(model, alpha, strength, q, v):  # type: ignore[no-untyped-def]
 
 
 @entry
-def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):  # type: ignore[no-untyped-def]
+def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
     """force (n,) at rest at q (n,), stiffness (n, n) = -dF/dq + d(Phi_q^T lam)/dq, rows (n_row, n) = Phi_q, phi
     (n_row,).
 
@@ -62,7 +62,7 @@ def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
 
 
 @entry
-def unit_forces(ints, floats, alpha, strength, q, out):  # type: ignore[no-untyped-def]
+def unit_forces(ints, floats, alpha, strength, q, out):
     """out (M_padded, n) = dF/d(alpha^mu) of each design member at rest at q (n,): -f_i B_i^T."""
     model = unpack_general(ints, floats)
     n = model.mass.shape[0]
@@ -84,7 +84,7 @@ def unit_forces(ints, floats, alpha, strength, q, out):  # type: ignore[no-untyp
 
 
 @entry
-def value_forces(ints, floats, alpha, strength, q, out):  # type: ignore[no-untyped-def]
+def value_forces(ints, floats, alpha, strength, q, out):
     """out (P, n) = dF/dp by each value of the laws' variables at rest at q (n,): -sum s f_p B^T over its members.
 
     By times at which laws begin or end to act there is none, nor by what multiplies rates.

@@ -37,7 +37,7 @@ SAFE = 1e-3
 
 
 @kernel
-def least_singular_value(model, desk):  # type: ignore[no-untyped-def]
+def least_singular_value(model, desk):
     """sigma at the state whose joints have just been factorised on the desk, about; 1 where that is not known."""
     if desk.switches[OF_JOINTS] == 0 or model.envelope.shape[0] == 0:
         return 1.0
@@ -46,7 +46,7 @@ def least_singular_value(model, desk):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def way_to_pose(h, before, now, largest):  # type: ignore[no-untyped-def]
+def way_to_pose(h, before, now, largest):
     """Time until sigma vanishes, that was `before` a step of length h and is `now`; infinite where it need not."""
     if not now < before or now > WATCH * largest:
         return np.inf
@@ -54,7 +54,7 @@ def way_to_pose(h, before, now, largest):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step_beside(h, way, must, nodes, s):  # type: ignore[no-untyped-def]
+def step_beside(h, way, must, nodes, s):
     """A step of about h that neither ends nor has a stage near the pose that is `way` ahead.
 
     must: whether it has to cross the pose, however short h is; nodes (s,): where its stages are.
@@ -81,13 +81,13 @@ def step_beside(h, way, must, nodes, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def crosses(h, way):  # type: ignore[no-untyped-def]
+def crosses(h, way):
     """Whether a step of length h goes across the pose that is `way` ahead, as `step_beside` means it to."""
     return h > 0.99 * LEAST * way
 
 
 @kernel
-def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):  # type: ignore[no-untyped-def]
+def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):
     """The estimated error `whole` (`integrators.runge_kutta._error`) of a step without its part across the joints at
     its end, which are factorised on the desk; all of it where it might lead to another branch.
     """

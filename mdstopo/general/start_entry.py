@@ -14,7 +14,7 @@ from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
 
 
 @entry
-def slopes_of(joint, joint_par, home, q, phi, jac):  # type: ignore[no-untyped-def]
+def slopes_of(joint, joint_par, home, q, phi, jac):
     """phi (n_joint, 3), jac (n_joint, 3, 6) of joints (n_joint, 5) with joint_par (n_joint, 12) at q (n,) from home."""
     w = np.empty(PLACES)
     for j in range(joint.shape[0]):
@@ -23,7 +23,7 @@ def slopes_of(joint, joint_par, home, q, phi, jac):  # type: ignore[no-untyped-d
 
 
 @entry
-def assemble(ints, floats, q, v, move, phi, rates):  # type: ignore[no-untyped-def]
+def assemble(ints, floats, q, v, move, phi, rates):
     """phi, rates (n_joint, 3) = Phi and Phi_q v at the start; with `move`, q, v (n,) are put on the joints first."""
     model = unpack_general(ints, floats)
     desk = make_desk(model)
@@ -43,7 +43,7 @@ def assemble(ints, floats, q, v, move, phi, rates):  # type: ignore[no-untyped-d
 
 
 @entry
-def reactions(joint, joint_par, home, row, q, lam, out):  # type: ignore[no-untyped-def]
+def reactions(joint, joint_par, home, row, q, lam, out):
     """out (T, n_joint, 3) = Fx, Fy, M of each joint on its first body at states q (T, n) with lam (T, n_row)."""
     w = np.empty(PLACES)
     mine = np.empty(3)
@@ -56,7 +56,7 @@ def reactions(joint, joint_par, home, row, q, lam, out):  # type: ignore[no-unty
 
 
 @entry
-def linearise(ints, floats, alpha, strength, stiffness, mass, rows):  # type: ignore[no-untyped-def]
+def linearise(ints, floats, alpha, strength, stiffness, mass, rows):
     """stiffness, mass (n, n) and rows (n_row, n) = Phi_q of small motion about the start with design alpha (N,)."""
     model = unpack_general(ints, floats)
     desk = make_desk(model)

@@ -27,7 +27,7 @@ SETTLED = 1e-12
 
 
 @kernel
-def lay_out(model, track, o, desk):  # type: ignore[no-untyped-def]
+def lay_out(model, track, o, desk):
     """Put the joints of stage o on the desk, with their slopes. Returns K and C of the stage."""
     q = track.stage[o, 0]
     v = track.stage[o, 1]
@@ -51,7 +51,7 @@ def lay_out(model, track, o, desk):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):  # type: ignore[no-untyped-def]
+def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):
     """Solve with W(w_q, w_v) of stage o, which is laid out, or its transpose; a (n,), lam (n_row,) in place.
 
     Where factors are kept, weights are 0 and the matrix is symmetric.
@@ -64,7 +64,7 @@ def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):  # type: i
 
 
 @kernel
-def prepare_stage_back(model, track, o, w_q, w_v, desk):  # type: ignore[no-untyped-def]
+def prepare_stage_back(model, track, o, w_q, w_v, desk):
     """Put what `stage_back` needs of stage o on the desk: once for any number of rows."""
     if has_factors(track):
         copy_rows(track.turned[o], desk.turned)
@@ -74,7 +74,7 @@ def prepare_stage_back(model, track, o, w_q, w_v, desk):  # type: ignore[no-unty
 
 
 @kernel
-def stage_back(model, track, o, desk, z, y, bar_q, bar_v):  # type: ignore[no-untyped-def]
+def stage_back(model, track, o, desk, z, y, bar_q, bar_v):
     """From what pulls on a stage's accelerations and multipliers, z (n,) and y (n_row,), to the virtual displacement of
     its balance, in place; and what that pulls on the stage's state, added to bar_q, bar_v (n,).
 
@@ -91,7 +91,7 @@ def stage_back(model, track, o, desk, z, y, bar_q, bar_v):  # type: ignore[no-un
 
 
 @kernel
-def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work):  # type: ignore[no-untyped-def]
+def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work):
     """Pull cotangents lam_q, lam_v (R, n) of the end of step w back to its start, in place.
 
     bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of each stage's q, v, a and lam, the same for all (no rows:
@@ -121,9 +121,7 @@ def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, d
 
 
 @part
-def _explicit_stage_back(  # type: ignore[no-untyped-def]
-    model, table, track, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, desk
-):
+def _explicit_stage_back(model, table, track, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, desk):
     """Stage j of `explicit_back`, which is prepared, for one row: z[j], and what pulls on its q and v, u[j], g[j]."""
     s, n = u.shape
     y[:] = 0.0
@@ -151,7 +149,7 @@ def _explicit_stage_back(  # type: ignore[no-untyped-def]
 
 
 @part
-def _gather_start(model, table, s, h, u, g, lam_q, lam_v):  # type: ignore[no-untyped-def]
+def _gather_start(model, table, s, h, u, g, lam_q, lam_v):
     """lam_q, lam_v (n,) of one row, in place: from the end of a step to its start, with what pulls on the stages."""
     n = lam_q.shape[0]
     for d in range(n):
@@ -167,7 +165,7 @@ def _gather_start(model, table, s, h, u, g, lam_q, lam_v):  # type: ignore[no-un
 
 
 @kernel
-def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_changes, desk):  # type: ignore[no-untyped-def]
+def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_changes, desk):
     """Push changes dq, dv (n,) of the start of step w and forces (s, n) of its stages to its end, in place.
 
     Out: stage_changes (s, 3, n), row_changes (s, n_row): of each stage's q, v, a and lam.
@@ -205,7 +203,7 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
 
 
 @kernel
-def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):  # type: ignore[no-untyped-def]
+def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):
     """force (n,) and row (n_row,), changes of the balance, become those of the accelerations and multipliers of stage o
     whose state changes by dq, dv.
 
@@ -221,7 +219,7 @@ def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row): 
 
 
 @kernel
-def _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row):  # type: ignore[no-untyped-def]
+def _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row):
     """[M Phi^T; Phi 0] x = rhs - (w_q K + w_v C) x by fixed-point sweeps; force, row: the right side, then x."""
     n = force.shape[0]
     n_row = row.shape[0]

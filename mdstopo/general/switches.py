@@ -13,7 +13,7 @@ DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART = range(5)
 
 
 @kernel
-def switches_of(model):  # type: ignore[no-untyped-def]
+def switches_of(model):
     """The switches at first."""
     switches = np.zeros(5, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
@@ -23,7 +23,7 @@ def switches_of(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def is_diagonal(model):  # type: ignore[no-untyped-def]
+def is_diagonal(model):
     """Whether the mass is: nothing but inerters couples accelerations."""
     inertial = 0
     for k in range(model.block.shape[0]):
@@ -32,7 +32,7 @@ def is_diagonal(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def is_damped(model):  # type: ignore[no-untyped-def]
+def is_damped(model):
     """Whether forces may depend on rates: all but springs and bushings without damping are taken to do so."""
     damped = model.contact_pair.shape[0]
     for k in range(model.block.shape[0]):
@@ -44,7 +44,7 @@ def is_damped(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def carriers(model):  # type: ignore[no-untyped-def]
+def carriers(model):
     """(n_pair,): 1 where members, bushings or contacts act between two bodies, 0 where only joints do."""
     found = np.zeros(model.pair.shape[0], np.int64)
     for k in range(model.block.shape[0]):

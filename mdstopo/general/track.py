@@ -62,7 +62,7 @@ def track_room(model: GeneralModel, limits: IndexArray) -> tuple[int, int]:
 
 
 @kernel
-def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
+def carve_track(model, limits, floats, ints):
     """A `Track` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are inerters,
     whether the factors of the joints' matrix are kept.
     """
@@ -116,7 +116,7 @@ def carve_track(model, limits, floats, ints):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-untyped-def]
+def keep_stage(track, o, t, q, v, a, lam, desk, tangent):
     """Store stage o, and with `tangent` the tangents on the desk."""
     track.when[o] = t
     stage = track.stage[o]
@@ -145,25 +145,25 @@ def keep_stage(track, o, t, q, v, a, lam, desk, tangent):  # type: ignore[no-unt
 
 
 @kernel
-def _copy(source, target):  # type: ignore[no-untyped-def]
+def _copy(source, target):
     """target = source, contiguous and of any shape."""
     copy_vector(source.reshape(source.size), target.reshape(target.size))
 
 
 @kernel
-def has_factors(track):  # type: ignore[no-untyped-def]
+def has_factors(track):
     """Whether the stages' factors of the joints' matrix are kept."""
     return track.turned.shape[0] == track.when.shape[0]
 
 
 @kernel
-def mass_of(track, o):  # type: ignore[no-untyped-def]
+def mass_of(track, o):
     """The inerters' mass at stage o."""
     return track.mass[o if track.mass.shape[0] > 1 else 0]
 
 
 @kernel
-def keep_state(track, k, t, q, v, mu, nu):  # type: ignore[no-untyped-def]
+def keep_state(track, k, t, q, v, mu, nu):
     """State k and the multipliers that put it on the joints."""
     track.t[k] = t
     for d in range(q.shape[0]):
@@ -175,7 +175,7 @@ def keep_state(track, k, t, q, v, mu, nu):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def restore_modes(track, happened, strength):  # type: ignore[no-untyped-def]
+def restore_modes(track, happened, strength):
     """The modes and sets of members as they were after so many events."""
     e = strength_cursor(strength)
     while e > happened:
@@ -192,13 +192,13 @@ def restore_modes(track, happened, strength):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def strength_cursor(strength):  # type: ignore[no-untyped-def]
+def strength_cursor(strength):
     """How many events the modes in `strength` include: kept in its last column, which belongs to no member."""
     return int(strength[1, strength.shape[1] - 1])
 
 
 @kernel
-def step_at(track, count, t):  # type: ignore[no-untyped-def]
+def step_at(track, count, t):
     """The step that holds time t: the last one that begins before it."""
     low = 0
     high = count - 1
@@ -212,7 +212,7 @@ def step_at(track, count, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def copy_vector(source, target):  # type: ignore[no-untyped-def]
+def copy_vector(source, target):
     """target = source, one-dimensional."""
     for i in range(source.shape[0]):
         target[i] = source[i]

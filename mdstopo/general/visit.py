@@ -12,7 +12,7 @@ from mdstopo.general.track import carve_track, copy_vector, restore_modes
 
 
 @entry
-def visit(  # type: ignore[no-untyped-def]
+def visit(
     tag,
     ints,
     floats,
@@ -75,7 +75,7 @@ def visit(  # type: ignore[no-untyped-def]
 
 
 @entry
-def compare(  # type: ignore[no-untyped-def]
+def compare(
     tag, ints, floats, tables, limits, count, room, room_ints, strength, exact, j, places, who, top, seen, work
 ):
     """Members beside each other, of the group that response j looks at, at places (K, 2) and `exact` as of `visit`.
@@ -126,7 +126,7 @@ def compare(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def time_at(track, k, c):  # type: ignore[no-untyped-def]
+def time_at(track, k, c):
     """The time at fraction c of step k."""
     if c >= 1.0:
         return track.t[k + 1]
@@ -134,7 +134,7 @@ def time_at(track, k, c):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work):  # type: ignore[no-untyped-def]
+def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work):
     """q, v (n,) at fraction c of step k, with the modes of that step.
 
     ends (6, n): the quintic's, made anew where k is not `last`; the step whose ends they are is returned.
@@ -165,7 +165,7 @@ def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, e
 
 
 @kernel
-def quintic(c, h, ends, q, v):  # type: ignore[no-untyped-def]
+def quintic(c, h, ends, q, v):
     """q, v (n,) at fraction c of a step from both ends' positions, velocities and accelerations, ends (6, n)."""
     for d in range(q.shape[0]):
         v0 = ends[1, d]
@@ -181,7 +181,7 @@ def quintic(c, h, ends, q, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def held_back(model, desk, d, a, lam):  # type: ignore[no-untyped-def]
+def held_back(model, desk, d, a, lam):
     """What inerters and joints take at coordinate d: (sum s b B^T B a + Phi_q^T lam)_d."""
     total = 0.0
     for p in range(model.pair.shape[0]):

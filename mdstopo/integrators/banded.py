@@ -9,7 +9,7 @@ from mdstopo.compiler.jit import kernel
 
 
 @kernel
-def half_width(pair, inv_mass):  # type: ignore[no-untyped-def]
+def half_width(pair, inv_mass):
     """Places between the diagonal and the farthest entry; bodies that are held (infinite mass) connect nothing."""
     gap = 0
     for p in range(pair.shape[0]):
@@ -21,7 +21,7 @@ def half_width(pair, inv_mass):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def factorise(band, half, pivots):  # type: ignore[no-untyped-def]
+def factorise(band, half, pivots):
     """Factorise in place: band (n, 3 half + 1), pivots (n,). Returns False where the matrix is singular."""
     n = band.shape[0]
     for k in range(n):
@@ -50,7 +50,7 @@ def factorise(band, half, pivots):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def solve(band, half, pivots, x):  # type: ignore[no-untyped-def]
+def solve(band, half, pivots, x):
     """Solve with the factors of `factorise`, in place: x (n,)."""
     n = band.shape[0]
     for k in range(n):

@@ -36,32 +36,32 @@ _DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}}
 _MAKERS: dict[int, Implementation] = {}
 
 
-def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
     """Duty 2."""
     raise NotImplementedError
 
 
-def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
     """Duty 2, for a reverse sweep."""
     raise NotImplementedError
 
 
-def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+def sample(steps, count, damped, t, g, d):
     """Duty 9."""
     raise NotImplementedError
 
 
-def parent_of(steps, w):  # type: ignore[no-untyped-def]
+def parent_of(steps, w):
     """Duty 3."""
     raise NotImplementedError
 
 
-def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+def stage_weights(tables, steps, w, out):
     """Duty 4."""
     raise NotImplementedError
 
 
-def reverse_step(  # type: ignore[no-untyped-def]
+def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
@@ -69,17 +69,17 @@ def reverse_step(  # type: ignore[no-untyped-def]
     raise NotImplementedError
 
 
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
     """Duty 6."""
     raise NotImplementedError
 
 
-def carried(steps):  # type: ignore[no-untyped-def]
+def carried(steps):
     """Duty 7."""
     raise NotImplementedError
 
 
-def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+def steps_of(tag, arrays):
     """Duty 8."""
     raise NotImplementedError
 
@@ -105,7 +105,7 @@ def _implementation(name: str, steps: Any) -> Implementation | None:
 
 
 @kernel
-def sample_stages(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+def sample_stages(steps, count, damped, t, g, d):
     """Every stage of a step."""
     first = steps.index[0, 0]
     m = steps.index[count, 0] - first
@@ -117,22 +117,22 @@ def sample_stages(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def
 
 
 @by_type(point_of)
-def _point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def _point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
     return _implementation("point_of", steps)
 
 
 @by_type(parent_of)
-def _parent_of(steps, w):  # type: ignore[no-untyped-def]
+def _parent_of(steps, w):
     return _implementation("parent_of", steps)
 
 
 @by_type(stage_weights)
-def _stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+def _stage_weights(tables, steps, w, out):
     return _implementation("stage_weights", steps)
 
 
 @by_type(reverse_step)
-def _reverse_step(  # type: ignore[no-untyped-def]
+def _reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
@@ -140,25 +140,25 @@ def _reverse_step(  # type: ignore[no-untyped-def]
 
 
 @by_type(tangent_step)
-def _tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+def _tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
     return _implementation("tangent_step", steps)
 
 
 @by_type(carried)
-def _carried(steps):  # type: ignore[no-untyped-def]
+def _carried(steps):
     return _implementation("carried", steps)
 
 
 @by_type(reach)
-def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
     return _implementation("reach", steps)
 
 
 @by_type(sample)
-def _sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+def _sample(steps, count, damped, t, g, d):
     return _implementation("sample", steps)
 
 
 @by_type(steps_of)
-def _steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+def _steps_of(tag, arrays):
     return _MAKERS[len(tag)]

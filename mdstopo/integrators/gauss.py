@@ -80,7 +80,7 @@ MOST_CAUTIOUS = 100.0
 
 
 @entry
-def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
+def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):
     """Integrate alpha (N,) over model.times; returns (code, number of windows, time reached).
 
     In: the packed model; settings: tolerance, the error of the interpolated motion relative to the motion itself;
@@ -118,7 +118,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
 
 
 @part
-def _windows(model, tables, strength, settings, most, damped, turning, steps, own, work):  # type: ignore[no-untyped-def]
+def _windows(model, tables, strength, settings, most, damped, turning, steps, own, work):
     """Window after window from the start to the end; returns as `simulate` does."""
     tolerance = settings[0]
     newton_tolerance = settings[1]
@@ -374,7 +374,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
 
 
 @part
-def caution(coef, weight, s):  # type: ignore[no-untyped-def]
+def caution(coef, weight, s):
     """By how much the last coefficients understate what is left: 1 where they fall fast, up to MOST_CAUTIOUS.
 
     Where they fall slowly, as where a member passes near zero length, the gradient is off by much more than the motion.

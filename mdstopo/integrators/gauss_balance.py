@@ -41,7 +41,7 @@ DENSE = 24
 
 
 @part
-def balance(  # type: ignore[no-untyped-def]
+def balance(
     pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, alike, weight, accuracy, ref, a,
     q, v, work,
 ):  # fmt: skip
@@ -118,13 +118,13 @@ def balance(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def dense_rows(n):  # type: ignore[no-untyped-def]
+def dense_rows(n):
     """Rows of a dense matrix of n coordinates; none where pairs are multiplied one by one."""
     return n if n <= DENSE else 0
 
 
 @part
-def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ignore[no-untyped-def]
+def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):
     """out (s, n, W) = M^-1 (load tangent - K), K (s, n_pair, 6, 6), by columns; transposed: by rows.
 
     Zeros at and beyond n in each row. The few numbers of a few bodies are multiplied faster in whole vectors
@@ -156,7 +156,7 @@ def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):  # type: ig
 
 
 @part
-def fastest_rate(pair, inv_mass, k, c, damped, settled):  # type: ignore[no-untyped-def]
+def fastest_rate(pair, inv_mass, k, c, damped, settled):
     """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration.
 
     settled: relative change at which the iteration ends.
@@ -189,7 +189,7 @@ def fastest_rate(pair, inv_mass, k, c, damped, settled):  # type: ignore[no-unty
 
 
 @part
-def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):  # type: ignore[no-untyped-def]
+def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):
     """u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x; z is room."""
     u[:] = 0.0
     if damped:

@@ -29,7 +29,7 @@ from mdstopo.mechanics.assembly import (
 
 
 @kernel
-def _polynomials(c, s, first, second):  # type: ignore[no-untyped-def]
+def _polynomials(c, s, first, second):
     """first, second (s,) = I1_k, I2_k at c, by recurrence."""
     x = 2.0 * c - 1.0
     below = 1.0
@@ -51,7 +51,7 @@ def _polynomials(c, s, first, second):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
     """The collocation polynomial at fraction c of window k."""
     o = steps.index[k, 0]
     s = steps.index[k + 1, 0] - o
@@ -72,7 +72,7 @@ def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  
 
 
 @kernel
-def _point_weights(legendre, s, c, beta_q, beta_v):  # type: ignore[no-untyped-def]
+def _point_weights(legendre, s, c, beta_q, beta_v):
     """Weights of the node accelerations in q(c) (times h^2) and v(c) (times h)."""
     first = np.empty(s)
     second = np.empty(s)
@@ -86,13 +86,13 @@ def _point_weights(legendre, s, c, beta_q, beta_v):  # type: ignore[no-untyped-d
 
 
 @kernel
-def parent_of(steps, w):  # type: ignore[no-untyped-def]
+def parent_of(steps, w):
     """Windows follow one another."""
     return w - 1
 
 
 @kernel
-def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+def stage_weights(tables, steps, w, out):
     """Gauss weights."""
     level = steps.index[w, 1]
     h = steps.t[w + 1] - steps.t[w]
@@ -101,13 +101,13 @@ def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def carried(steps):  # type: ignore[no-untyped-def]
+def carried(steps):
     """Nothing but q and v."""
     return 0
 
 
 @part
-def reverse_step(  # type: ignore[no-untyped-def]
+def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
@@ -189,7 +189,7 @@ def reverse_step(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
     """Duty 6 of the contract."""
     level = steps.index[w, 1]
     s = COUNTS[level]
@@ -261,7 +261,7 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
 
 
 @kernel
-def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+def steps_of(tag, arrays):
     """The arrays as this method's steps."""
     return GaussSteps(*arrays)
 

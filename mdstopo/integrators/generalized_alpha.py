@@ -59,7 +59,7 @@ RESTART, MOST = 8, 30
 
 
 @kernel
-def weights_of(radius):  # type: ignore[no-untyped-def]
+def weights_of(radius):
     """Return e1, e2, e3, beta, gamma, lag (in steps) for a spectral radius 0..1; x' = e1 a' + e2 a - e3 x."""
     lag = (1.0 - radius) / (1.0 + radius)
     e1 = 1.0 / (2.0 - radius)
@@ -67,7 +67,7 @@ def weights_of(radius):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def effective_matrix(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning, transposed, half, band, pivots):  # type: ignore[no-untyped-def]
+def effective_matrix(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning, transposed, half, band, pivots):
     """Factorise I + M^-1 (w_q (K - load tangent) + w_v C), or its transpose, into band and pivots.
 
     k, c (n_pair, 6, 6), turn (n,) of one stage. Returns False where it is singular.
@@ -98,7 +98,7 @@ def effective_matrix(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning, tran
 
 
 @kernel
-def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps, steps, work):  # type: ignore[no-untyped-def]
+def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps, steps, work):
     """Integrate from the first to the last of model.times; returns (code, number of steps).
 
     tables: (1,) spectral radius. strength: (3, M_padded). step: longest step, s; segments are divided equally.
@@ -291,7 +291,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
 
 
 @kernel
-def rate_at_start(model, strength, damped):  # type: ignore[no-untyped-def]
+def rate_at_start(model, strength, damped):
     """Angular frequency of the fastest vibration at the start, rad/s (an estimate)."""
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -314,7 +314,7 @@ def rate_at_start(model, strength, damped):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def longest_step(model, strength, damped, wanted):  # type: ignore[no-untyped-def]
+def longest_step(model, strength, damped, wanted):
     """The step in s: `wanted`, or, where that is negative, so many radians of the fastest vibration at the start.
 
     So a step that was found good enough (`default_step`) keeps its accuracy when the design becomes stiffer.

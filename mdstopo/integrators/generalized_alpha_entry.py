@@ -20,7 +20,7 @@ __all__ = ["TAG", "rate_at_start", "simulate"]
 
 
 @entry
-def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
+def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):
     """Simulate alpha (N,) once; the steps stay in room, with tangents. Returns (code, steps, time reached)."""
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
@@ -35,6 +35,6 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
 
 
 @entry
-def rate_at_start(ints, floats, strength, damped):  # type: ignore[no-untyped-def]
+def rate_at_start(ints, floats, strength, damped):
     """Angular frequency of the fastest vibration at the start, rad/s; strength (3, M_padded) as left by a run."""
     return _rate_at_start(unpack(ints, floats), strength, damped)

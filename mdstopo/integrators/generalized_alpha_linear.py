@@ -22,7 +22,7 @@ from mdstopo.mechanics.assembly import (
 
 
 @kernel
-def hermite(c):  # type: ignore[no-untyped-def]
+def hermite(c):
     """Weights of q, h v at the start and q, h v at the end in the position at fraction c, and their derivatives."""
     d = 1.0 - c
     return (
@@ -38,7 +38,7 @@ def hermite(c):  # type: ignore[no-untyped-def]
 
 
 @part
-def cubic(start, end, h, c, q, v):  # type: ignore[no-untyped-def]
+def cubic(start, end, h, c, q, v):
     """The cubic between the ends of a step h, whose states (2 or more, n) are q and q'; and its derivative."""
     q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
     for d in range(q.shape[0]):
@@ -47,14 +47,14 @@ def cubic(start, end, h, c, q, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
     """The cubic between the ends of step k, and its derivative."""
     cubic(steps.state[k], steps.state[k + 1], steps.t[k + 1] - steps.t[k], c, q, v)
     return k, c
 
 
 @kernel
-def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+def sample(steps, count, damped, t, g, d):
     """Every end of a step: what else is a stage is there already, or off the motion."""
     for k in range(count - 1):
         o = steps.index[k + 1, 0] - 1
@@ -65,13 +65,13 @@ def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def parent_of(steps, w):  # type: ignore[no-untyped-def]
+def parent_of(steps, w):
     """Steps follow one another."""
     return w - 1
 
 
 @kernel
-def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+def stage_weights(tables, steps, w, out):
     """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion."""
     h = steps.t[w + 1] - steps.t[w]
     out[:] = 0.0
@@ -85,13 +85,13 @@ def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def carried(steps):  # type: ignore[no-untyped-def]
+def carried(steps):
     """The acceleration and the auxiliary one."""
     return 2
 
 
 @part
-def reverse_step(  # type: ignore[no-untyped-def]
+def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
@@ -175,7 +175,7 @@ def reverse_step(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
     """Duty 6 of the contract."""
     n = dq.shape[0]
     o = steps.index[w, 0]
@@ -238,7 +238,7 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
 
 
 @kernel
-def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+def steps_of(tag, arrays):
     """The arrays as this method's steps."""
     return AlphaSteps(*arrays)
 

@@ -11,13 +11,13 @@ from mdstopo.compiler.vector import WIDE, lanes, larger, largest, load, magnitud
 
 
 @part
-def row_width(n):  # type: ignore[no-untyped-def]
+def row_width(n):
     """Length of a row of n coordinates."""
     return (n + WIDE - 1) // WIDE * WIDE
 
 
 @part
-def make_rows(count, n):  # type: ignore[no-untyped-def]
+def make_rows(count, n):
     """Zeros (count, W), no vector of which lies in two lines of the cache: reading those takes half as long again."""
     width = row_width(n)
     room = np.zeros(count * width + WIDE)
@@ -26,7 +26,7 @@ def make_rows(count, n):  # type: ignore[no-untyped-def]
 
 
 @part
-def copy_row(source, target):  # type: ignore[no-untyped-def]
+def copy_row(source, target):
     """target (W,) = source (n,), zeros after it."""
     target[:] = 0.0
     for d in range(source.shape[0]):
@@ -34,7 +34,7 @@ def copy_row(source, target):  # type: ignore[no-untyped-def]
 
 
 @part
-def combine_rows(matrix, s, columns, factor, base, a, out):  # type: ignore[no-untyped-def]
+def combine_rows(matrix, s, columns, factor, base, a, out):
     """out[i] = base[i] + factor sum_j matrix_ij a[j] for i < s, j < columns; base (s, W), a (columns, W)."""
     for d in range(0, out.shape[1], lanes()):
         for i in range(s):
@@ -45,7 +45,7 @@ def combine_rows(matrix, s, columns, factor, base, a, out):  # type: ignore[no-u
 
 
 @part
-def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):  # type: ignore[no-untyped-def]
+def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):
     """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s, j < columns; all rows."""
     for d in range(0, out.shape[1], lanes()):
         x0 = load(start, d)
@@ -58,7 +58,7 @@ def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):  # 
 
 
 @part
-def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx):  # type: ignore[no-untyped-def]
+def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx):
     """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i, j < s, and dx[i] = out[i] - ref[i].
 
     Returns max over i and coordinates of weight times the change of out[i]; NaN where one is not finite.
@@ -83,7 +83,7 @@ def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx): 
 
 
 @part
-def renew_rows(matrix, s, factor, base, a, weight, out):  # type: ignore[no-untyped-def]
+def renew_rows(matrix, s, factor, base, a, weight, out):
     """out[i] = base[i] + factor sum_j matrix_ij a[j] for i, j < s.
 
     Returns max over i and coordinates of weight times the change of out[i], and of weight |out[i]|.
@@ -104,7 +104,7 @@ def renew_rows(matrix, s, factor, base, a, weight, out):  # type: ignore[no-unty
 
 
 @part
-def add_products(matrix, x, s, base, out):  # type: ignore[no-untyped-def]
+def add_products(matrix, x, s, base, out):
     """out[i] = base[i] + sum_d x[i, d] matrix[i, d] for i < s; matrix (s, n, W), a row for each coordinate of x[i]."""
     for e in range(0, out.shape[1], lanes()):
         for i in range(s):
@@ -115,7 +115,7 @@ def add_products(matrix, x, s, base, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def scale_rows(factor, x, s, out):  # type: ignore[no-untyped-def]
+def scale_rows(factor, x, s, out):
     """out[i] = factor x[i] for i < s; factor (W,)."""
     for d in range(0, x.shape[1], lanes()):
         f = load(factor, d)
@@ -124,7 +124,7 @@ def scale_rows(factor, x, s, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def subtract_rows(x, y, s, out):  # type: ignore[no-untyped-def]
+def subtract_rows(x, y, s, out):
     """out[i] = x[i] - y[i] for i < s."""
     for d in range(0, x.shape[1], lanes()):
         for i in range(s):
@@ -132,7 +132,7 @@ def subtract_rows(x, y, s, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def take_rows(x, s, out):  # type: ignore[no-untyped-def]
+def take_rows(x, s, out):
     """out[i] = x[i] for i < s."""
     for d in range(0, x.shape[1], lanes()):
         for i in range(s):
@@ -140,7 +140,7 @@ def take_rows(x, s, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def largest_difference(x, y, weight, s):  # type: ignore[no-untyped-def]
+def largest_difference(x, y, weight, s):
     """max over i < s and coordinates of weight |x[i] - y[i]|; NaN where one is not finite."""
     most = zero()
     lost = zero()

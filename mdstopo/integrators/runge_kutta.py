@@ -52,7 +52,7 @@ MARGIN = 0.1
 
 
 @kernel
-def advance(  # type: ignore[no-untyped-def]
+def advance(
     model,
     table,
     s,
@@ -123,7 +123,7 @@ def advance(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _error(vectors, s, h, longest, a, weight):  # type: ignore[no-untyped-def]
+def _error(vectors, s, h, longest, a, weight):
     """Estimated error of a step relative to the motion; NaN where one appears. longest: step so far (`lasting`)."""
     later = lasting(h, longest)
     worst = 0.0
@@ -150,7 +150,7 @@ def _error(vectors, s, h, longest, a, weight):  # type: ignore[no-untyped-def]
 
 
 @entry
-def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):  # type: ignore[no-untyped-def]
+def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):
     """Integrate alpha (N,) over model.times; returns (code, number of steps, time reached).
 
     In: the packed model; tangent: whether tangents are kept for a reverse sweep; settings: tolerance, the error of a

@@ -18,7 +18,7 @@ from mdstopo.mechanics.passes import SUMS
 
 
 @kernel
-def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, work):  # type: ignore[no-untyped-def]
+def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, work):
     """A step of length c h from the start of step k; its stages are kept behind all others where asked."""
     n = q.shape[0]
     n_pair = model.pair.shape[0]
@@ -47,21 +47,21 @@ def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, wo
 
 
 @kernel
-def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
     """The state after a partial step, which is not kept."""
     _partial(model, tables, strength, steps, count, k, c, damped, np.bool_(False), q, v, work)
     return k, c
 
 
 @kernel
-def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):  # type: ignore[no-untyped-def]
+def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
     """The state after a partial step, which is kept as step count + 1."""
     _partial(model, tables, strength, steps, count, k, c, damped, np.bool_(True), q, v, work)
     return count + 1, -1.0
 
 
 @kernel
-def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
+def sample(steps, count, damped, t, g, d):
     """Starts of steps with their rates; inside, stage values without (a Nystroem stage has no velocity)."""
     s = STAGES[1 if damped else 0]
     m = 0
@@ -93,13 +93,13 @@ def sample(steps, count, damped, t, g, d):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def parent_of(steps, w):  # type: ignore[no-untyped-def]
+def parent_of(steps, w):
     """Kept with each step, because a partial step follows its parent out of order."""
     return steps.index[w, 1]
 
 
 @kernel
-def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
+def stage_weights(tables, steps, w, out):
     """The weights of the velocity: an integral is the velocity of one more coordinate."""
     s = steps.index[w + 1, 0] - steps.index[w, 0]
     vectors = tables[0 if s == STAGES[0] else 1, 2]
@@ -108,13 +108,13 @@ def stage_weights(tables, steps, w, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def carried(steps):  # type: ignore[no-untyped-def]
+def carried(steps):
     """Nothing but q and v."""
     return 0
 
 
 @part
-def reverse_step(  # type: ignore[no-untyped-def]
+def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
@@ -155,7 +155,7 @@ def reverse_step(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):  # type: ignore[no-untyped-def]
+def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
     """Duty 6 of the contract; a point inside a step is a partial step's end."""
     n = dq.shape[0]
     o = steps.index[w, 0]
@@ -190,7 +190,7 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
 
 
 @kernel
-def steps_of(tag, arrays):  # type: ignore[no-untyped-def]
+def steps_of(tag, arrays):
     """The arrays as this method's steps."""
     return RungeKuttaSteps(*arrays)
 

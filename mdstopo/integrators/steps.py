@@ -68,7 +68,7 @@ WORK_NAMES = tuple(work_named(range(WORK)))
 
 
 @kernel
-def solved_to(tolerance, fixed_step):  # type: ignore[no-untyped-def]
+def solved_to(tolerance, fixed_step):
     """To what a linear iteration is solved: to rounding where the step is fixed, else to a part of the tolerance."""
     return 0.0 if fixed_step > 0.0 else 1e-3 * tolerance
 
@@ -96,7 +96,7 @@ Q, V, OWN = range(3)
 
 
 @part
-def carve(floats, ints, n, n_pair, steps, stages, damped, turning):  # type: ignore[no-untyped-def]
+def carve(floats, ints, n, n_pair, steps, stages, damped, turning):
     """The arrays of `FIELDS` with room for so many steps and stages, as views of flat arrays (see `room_for`)."""
     index = ints[: 3 * (steps + 1)].reshape((steps + 1, 3))
     t = floats[: steps + 1]
@@ -130,7 +130,7 @@ def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning
 
 
 @part
-def copy_tangents(source, target):  # type: ignore[no-untyped-def]
+def copy_tangents(source, target):
     """target = source, (n_pair, 6, 6)."""
     for p in range(source.shape[0]):
         for i in range(6):
@@ -139,7 +139,7 @@ def copy_tangents(source, target):  # type: ignore[no-untyped-def]
 
 
 @part
-def keep_state(times, state, k, t, q, v):  # type: ignore[no-untyped-def]
+def keep_state(times, state, k, t, q, v):
     """State k: time, q, v."""
     times[k] = t
     for d in range(state.shape[2]):
@@ -148,7 +148,7 @@ def keep_state(times, state, k, t, q, v):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def step_at(times, count, t):  # type: ignore[no-untyped-def]
+def step_at(times, count, t):
     """The step that holds time t: the last one that begins before it."""
     low = 0
     high = count - 1
@@ -162,7 +162,7 @@ def step_at(times, count, t):  # type: ignore[no-untyped-def]
 
 
 @part
-def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_out, c_out, turn_out):  # type: ignore[no-untyped-def]
+def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_out, c_out, turn_out):
     """Store what the force balance of stage o saw: its state, sums and tangents."""
     energy = 0.0
     rate = 0.0
@@ -188,7 +188,7 @@ def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_ou
 
 
 @part
-def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
+def deflection(rel, rel0, reach, p):
     """How far the pair p has moved from its pose at the start, at its attachment points, m (angle within a turn)."""
     x = rel[p, 10] - rel0[p, 10]
     y = rel[p, 11] - rel0[p, 11]
@@ -198,7 +198,7 @@ def deflection(rel, rel0, reach, p):  # type: ignore[no-untyped-def]
 
 
 @part
-def gross_loads(model, out):  # type: ignore[no-untyped-def]
+def gross_loads(model, out):
     """out (n,) = the largest size of the applied loads of each coordinate, without regard to their signs."""
     out[:] = 0.0
     for segment in range(model.times.shape[0] - 1):
@@ -220,7 +220,7 @@ def gross_loads(model, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def add_gross_force(pair, rel, reach, p, force, out):  # type: ignore[no-untyped-def]
+def add_gross_force(pair, rel, reach, p, force, out):
     """out (n,) += a force of any direction between the bodies of pair p, and its moments."""
     arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
     for side in range(2):
@@ -231,7 +231,7 @@ def add_gross_force(pair, rel, reach, p, force, out):  # type: ignore[no-untyped
 
 
 @part
-def add_preloads(model, strength, rel, out):  # type: ignore[no-untyped-def]
+def add_preloads(model, strength, rel, out):
     """out (n,) += the preloads of all springs, strength (3, M_padded), as gross forces."""
     for k in range(model.block.shape[0]):
         total = 0.0
@@ -243,7 +243,7 @@ def add_preloads(model, strength, rel, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):  # type: ignore[no-untyped-def]
+def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
     """noise (n_pair,): what rounding leaves uncertain of how far each pair has moved, m.
 
     Displacements are summed since the start, so it is a share of what forces move bodies by, not of where these are:
@@ -269,7 +269,7 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):  
 
 
 @part
-def noise_of(pair, noise, rel, reach, q, p):  # type: ignore[no-untyped-def]
+def noise_of(pair, noise, rel, reach, q, p):
     """What rounding leaves uncertain of how far pair p has moved, m, in a state q (n,) with poses rel (n_pair, POSE).
 
     noise: of `rounding_of_pairs`; and what both bodies have moved together is rounded, too.
@@ -284,7 +284,7 @@ def noise_of(pair, noise, rel, reach, q, p):  # type: ignore[no-untyped-def]
 
 
 @part
-def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
+def largest_turn(pair, before, after):
     """How far the bodies of a pair turn against each other between two states (n,), rad, at most."""
     largest = 0.0
     for p in range(pair.shape[0]):
@@ -295,13 +295,13 @@ def largest_turn(pair, before, after):  # type: ignore[no-untyped-def]
 
 
 @part
-def lasting(h, longest):  # type: ignore[no-untyped-def]
+def lasting(h, longest):
     """How many times as far as in a step of length h an error of its velocity leads; longest: step so far."""
     return max(1.0, LASTING * longest / h)
 
 
 @part
-def motion_weights(pair, rel, reach, scale, weight):  # type: ignore[no-untyped-def]
+def motion_weights(pair, rel, reach, scale, weight):
     """weight (n,): change of each coordinate times its weight is at least the displacement relative to the scale.
 
     A turn of a body moves the points of its pairs by at most the distance of the bodies plus their reach.

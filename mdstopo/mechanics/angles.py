@@ -21,7 +21,7 @@ COSINE = tuple((-1.0) ** k / math.factorial(2 * k) for k in range(2, 9))
 
 
 @inline
-def _series(z):  # type: ignore[no-untyped-def]
+def _series(z):
     """(sin r - r)/r^3 and (cos r - 1 + r^2/2)/r^4 from z = r^2."""
     s = SINE[7]
     for k in range(6, -1, -1):
@@ -33,7 +33,7 @@ def _series(z):  # type: ignore[no-untyped-def]
 
 
 @part
-def small_turn(angle):  # type: ignore[no-untyped-def]
+def small_turn(angle):
     """cos - 1 and sin of an angle, rad, both without cancellation where it is small."""
     if abs(angle) <= 0.7:
         z = angle * angle
@@ -44,7 +44,7 @@ def small_turn(angle):  # type: ignore[no-untyped-def]
 
 
 @part
-def cos_sin(angle):  # type: ignore[no-untyped-def]
+def cos_sin(angle):
     """cos and sin of an angle, rad."""
     if not abs(angle) <= FAR:
         return math.cos(angle), math.sin(angle)

@@ -9,7 +9,7 @@ from mdstopo.mechanics.passes import member_sums, springs_of
 
 
 @part
-def add_loads(model, segment, t, q, f):  # type: ignore[no-untyped-def]
+def add_loads(model, segment, t, q, f):
     """f (n or more,) += the applied loads of a segment at time t in state q."""
     tau = t - model.times[segment]
     force = model.force
@@ -32,7 +32,7 @@ def add_loads(model, segment, t, q, f):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def load_tangent(model, segment, t, q, turn):  # type: ignore[no-untyped-def]
+def load_tangent(model, segment, t, q, turn):
     """turn (n,) = derivative of each body's applied load with respect to its own angle."""
     turn[:] = 0.0
     tau = t - model.times[segment]
@@ -51,7 +51,7 @@ def load_tangent(model, segment, t, q, turn):  # type: ignore[no-untyped-def]
 
 
 @part
-def pair_tangents(pair, rel, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
+def pair_tangents(pair, rel, sums, damped, k_out, c_out):
     """Tangents in body coordinates of one pose: k_out (n_pair, 6, 6) = -dF/dq, c_out = -dF/dv (if damped).
 
     K = T^T (K_xi T + C_xi d(Tv)/dq) - d(T^T Q)/dq, C = T^T C_xi T, written in global axes: with D = x_B - x_A and
@@ -62,7 +62,7 @@ def pair_tangents(pair, rel, sums, damped, k_out, c_out):  # type: ignore[no-unt
 
 
 @kernel
-def pair_tangent(p, rel, sums, damped, k_out, c_out):  # type: ignore[no-untyped-def]
+def pair_tangent(p, rel, sums, damped, k_out, c_out):
     """`pair_tangents` of pair p alone."""
     o = sums[p]
     ca = rel[p, 7]
@@ -119,7 +119,7 @@ def pair_tangent(p, rel, sums, damped, k_out, c_out):  # type: ignore[no-untyped
 
 
 @part
-def _turned(c, s, xx, xy, yx, yy):  # type: ignore[no-untyped-def]
+def _turned(c, s, xx, xy, yx, yy):
     """R [xx, xy; yx, yy] R^T, R turning by the angle whose cos and sin are c and s."""
     ax = c * xx - s * yx
     ay = c * xy - s * yy
@@ -129,7 +129,7 @@ def _turned(c, s, xx, xy, yx, yy):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _spread(xx, xy, yx, yy, ax, ay, bx, by, tx, ty, ta, tb, wx, wy, m):  # type: ignore[no-untyped-def]
+def _spread(xx, xy, yx, yy, ax, ay, bx, by, tx, ty, ta, tb, wx, wy, m):
     """m (6, 6) = T~^T N for rows x, y, theta of N with columns D (2), psi_A, psi_B; T~ = [-I w I 0; 0 -1 0 1]."""
     m[3, 0] = -xx
     m[3, 1] = -xy
@@ -156,7 +156,7 @@ def _spread(xx, xy, yx, yy, ax, ay, bx, by, tx, ty, ta, tb, wx, wy, m):  # type:
 
 
 @kernel
-def subtract_products(pair, k, x, out, count):  # type: ignore[no-untyped-def]
+def subtract_products(pair, k, x, out, count):
     """out[i] -= K[i] x[i] for i < count: k (count, n_pair, 6, 6), x and out (count, n)."""
     for i in range(count):
         for p in range(pair.shape[0]):
@@ -181,7 +181,7 @@ def subtract_products(pair, k, x, out, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def subtract_transposed(pair, k, x, out, count):  # type: ignore[no-untyped-def]
+def subtract_transposed(pair, k, x, out, count):
     """out[i] -= K[i]^T x[i] for i < count: k (count, n_pair, 6, 6), x and out (count, n)."""
     for i in range(count):
         for p in range(pair.shape[0]):
@@ -206,7 +206,7 @@ def subtract_transposed(pair, k, x, out, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_turning(turn, x, out, count):  # type: ignore[no-untyped-def]
+def add_turning(turn, x, out, count):
     """out[i] += (load tangent) x[i] for i < count: each body's load changes with its own angle; turn (count, n)."""
     for i in range(count):
         for b in range(0, turn.shape[1], 3):
@@ -215,7 +215,7 @@ def add_turning(turn, x, out, count):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_turning_transposed(turn, x, out, count):  # type: ignore[no-untyped-def]
+def add_turning_transposed(turn, x, out, count):
     """out[i] += (load tangent)^T x[i] for i < count."""
     for i in range(count):
         for b in range(0, turn.shape[1], 3):
@@ -224,7 +224,7 @@ def add_turning_transposed(turn, x, out, count):  # type: ignore[no-untyped-def]
 
 
 @part
-def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
+def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, k_out, c_out, turn):
     """Generalised forces, and on demand tangents, at m states in one pass over the members.
 
     Constant: model, strength. In: segment, m, t (m,), q, v (m, n). Out: rel (m, n_pair, POSE), sums (m, n_pair, SUMS),
@@ -236,14 +236,14 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
 
 
 @part
-def place_bodies(pair, home, q, v, m, rel):  # type: ignore[no-untyped-def]
+def place_bodies(pair, home, q, v, m, rel):
     """rel (m, n_pair, POSE) at m states."""
     for j in range(m):
         relative_pose(pair, home, q[j], v[j], rel[j])
 
 
 @part
-def sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
+def sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn):
     """What `forces` gives, of the members' sums at the poses rel."""
     pair = model.pair
     turning = model.load_body.shape[0] > 0

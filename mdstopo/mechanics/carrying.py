@@ -20,7 +20,7 @@ ROOMY = 12
 
 
 @part
-def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
+def carrying(model, strength, fill):
     """The model without members that carry nothing, its strengths, and how many members are left.
 
     In: strength (3, M_padded), or (ROOMY, M_padded) with room behind; fill: write them there, else they are there from
@@ -39,7 +39,7 @@ def carrying(model, strength, fill):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
+def _that_carry(springs, strength, fill):
     """The same of `Springs`: few arrays to choose between."""
     block = springs.block
     parts = springs.chunk.shape[0]
@@ -86,7 +86,7 @@ def _that_carry(springs, strength, fill):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _count_chunks(counter, chunk, block, strength, count):  # type: ignore[no-untyped-def]
+def _count_chunks(counter, chunk, block, strength, count):
     i = taken(counter)
     while i < chunk.shape[0]:
         count[i] = _count(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, strength)
@@ -94,7 +94,7 @@ def _count_chunks(counter, chunk, block, strength, count):  # type: ignore[no-un
 
 
 @kernel
-def _count(k, start, stop, block, strength):  # type: ignore[no-untyped-def]
+def _count(k, start, stop, block, strength):
     """How many members of the part start..stop of block k carry something."""
     s = strength[0, start:stop]
     found = 0
@@ -110,7 +110,7 @@ def _count(k, start, stop, block, strength):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):  # type: ignore[no-untyped-def]
+def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
     i = taken(counter)
     while i < chunk.shape[0]:
         _gather(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, begin[i], count[i], room)
@@ -118,7 +118,7 @@ def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
 
 
 @kernel
-def _gather(k, start, stop, block, member, strength, begin, count, room):  # type: ignore[no-untyped-def]
+def _gather(k, start, stop, block, member, strength, begin, count, room):
     """Write those of the part start..stop of block k that carry something to room (MEMBER, M_padded) from begin on."""
     viscous = block[k, 3] == 1
     place = np.empty(stop - start, np.int64)

@@ -22,7 +22,7 @@ NEAR = 1e-12
 
 
 @inline
-def contact_pose(c, r):  # type: ignore[no-untyped-def]
+def contact_pose(c, r):
     """along, height, slide, rise at the relative pose r (POSE,) of edge and point."""
     ax = r[2] * c[4] - r[3] * c[5]
     ay = r[3] * c[4] + r[2] * c[5]
@@ -34,7 +34,7 @@ def contact_pose(c, r):  # type: ignore[no-untyped-def]
 
 
 @inline
-def second_rise(c, r, acc):  # type: ignore[no-untyped-def]
+def second_rise(c, r, acc):
     """The rate of rise at the relative pose r (POSE,) with its second derivative acc (3,)."""
     ax = r[2] * c[4] - r[3] * c[5]
     ay = r[3] * c[4] + r[2] * c[5]
@@ -44,7 +44,7 @@ def second_rise(c, r, acc):  # type: ignore[no-untyped-def]
 
 
 @inline
-def contact_force(c, height, rise, slide, mode):  # type: ignore[no-untyped-def]
+def contact_force(c, height, rise, slide, mode):
     """N, N_height, N_rise, T, T_height, T_rise, T_slide."""
     if mode != CLOSED:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -65,7 +65,7 @@ def contact_force(c, height, rise, slide, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def contact_margin(c, along, height, rise, mode):  # type: ignore[no-untyped-def]
+def contact_margin(c, along, height, rise, mode):
     """How far the mode is from its end, in m, or the unclipped N by k + c."""
     if mode == ABOVE:
         return height
@@ -79,7 +79,7 @@ def contact_margin(c, along, height, rise, mode):  # type: ignore[no-untyped-def
 
 
 @inline
-def contact_margin_slopes(c, along, height, rise, mode):  # type: ignore[no-untyped-def]
+def contact_margin_slopes(c, along, height, rise, mode):
     """Slopes of the margin by along, height and rise."""
     if mode == ABOVE:
         return 0.0, 1.0, 0.0
@@ -97,13 +97,13 @@ def contact_margin_slopes(c, along, height, rise, mode):  # type: ignore[no-unty
 
 
 @inline
-def _touching(c, depth, rise):  # type: ignore[no-untyped-def]
+def _touching(c, depth, rise):
     """Closed, or clipped where damping would reverse the force."""
     return CLIPPED if c[1] > 0.0 and c[0] * depth - c[1] * rise < 0.0 else CLOSED
 
 
 @inline
-def contact_next(c, along, height, rise, second, mode):  # type: ignore[no-untyped-def]
+def contact_next(c, along, height, rise, second, mode):
     """The mode to go to where this one's margin is negative; second: the rate of rise."""
     on_edge = along >= 0.0 and along <= c[10]
     if mode == BESIDE:
@@ -126,7 +126,7 @@ def contact_next(c, along, height, rise, second, mode):  # type: ignore[no-untyp
 
 
 @inline
-def contact_start(c, along, height, rise, second):  # type: ignore[no-untyped-def]
+def contact_start(c, along, height, rise, second):
     """The mode at the start; what is inside the edge then is in contact, what rests at it has reached it."""
     if height > NEAR:
         return ABOVE
@@ -139,6 +139,6 @@ def contact_start(c, along, height, rise, second):  # type: ignore[no-untyped-de
 
 
 @inline
-def contact_grazes(c, mode):  # type: ignore[no-untyped-def]
+def contact_grazes(c, mode):
     """As `laws.gap.gap_grazes`: a damped touch that only just happens leaves no derivative of the motion (2)."""
     return 2 if mode == ABOVE and c[1] > 0.0 else 0

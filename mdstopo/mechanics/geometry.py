@@ -20,14 +20,14 @@ POSE = 14
 
 
 @part
-def turned_body(home, body, angle):  # type: ignore[no-untyped-def]
+def turned_body(home, body, angle):
     """cos and sin of a body's psi when it has turned by an angle since home, and by how much they have changed."""
     m, s = small_turn(angle)
     return turned_from(home, body, m, s)
 
 
 @part
-def turned_from(home, body, m, s):  # type: ignore[no-untyped-def]
+def turned_from(home, body, m, s):
     """`turned_body` from cos - 1 and sin of the angle."""
     c0 = home[body, 3]
     s0 = home[body, 4]
@@ -37,7 +37,7 @@ def turned_from(home, body, m, s):  # type: ignore[no-untyped-def]
 
 
 @part
-def relative_pose(pair, home, q, v, rel):  # type: ignore[no-untyped-def]
+def relative_pose(pair, home, q, v, rel):
     """Fill rel (n_pair, POSE) from one state q, v (n,): displacements since home (n_body, 5), and velocities."""
     for p in range(pair.shape[0]):
         ma, sa = small_turn(q[3 * pair[p, 0] + 2])
@@ -46,7 +46,7 @@ def relative_pose(pair, home, q, v, rel):  # type: ignore[no-untyped-def]
 
 
 @part
-def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):  # type: ignore[no-untyped-def]
+def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):
     """Fill rel[p] from one state and cos - 1 and sin of the angles that both bodies have turned by since home.
 
     With D_0 the vector between the bodies at home and w the change of it,
@@ -102,7 +102,7 @@ def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):  # type: ignore[no-unty
 
 
 @part
-def copy_rows(source, target):  # type: ignore[no-untyped-def]
+def copy_rows(source, target):
     """target = source, two-dimensional."""
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
@@ -110,7 +110,7 @@ def copy_rows(source, target):  # type: ignore[no-untyped-def]
 
 
 @part
-def pair_displacement(pair, rel, p, dq, out):  # type: ignore[no-untyped-def]
+def pair_displacement(pair, rel, p, dq, out):
     """out (3,) = T dq for pair p: the change of its relative pose under a change dq (n,) of all coordinates."""
     a = 3 * pair[p, 0]
     b = 3 * pair[p, 1]
@@ -125,7 +125,7 @@ def pair_displacement(pair, rel, p, dq, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def add_pair_force(pair, rel, p, qx, qy, qt, out):  # type: ignore[no-untyped-def]
+def add_pair_force(pair, rel, p, qx, qy, qt, out):
     """out (n,) += T^T (qx, qy, qt): a force on the relative pose as forces and moments on both bodies."""
     a = 3 * pair[p, 0]
     b = 3 * pair[p, 1]

@@ -18,14 +18,14 @@ PLACES = 4 * TILE
 
 
 @kernel
-def tile_of(rows, width):  # type: ignore[no-untyped-def]
+def tile_of(rows, width):
     """Rows and columns of a tile."""
     tall = rows if rows * width <= PLACES else min(rows, ROWS)
     return tall, min(width, PLACES // tall // lanes() * lanes())
 
 
 @part
-def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, sums, column):
     """Add the rows from start to stop of block k to sums (m, columns, SUMS) at the poses rel (m, n_pair, POSE)."""
     p = block[k, 0]
     width = block[k, 6]
@@ -60,7 +60,7 @@ def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, su
 
 
 @part
-def design_grid(start, stop, width, near, member, pose, u, weight, out):  # type: ignore[no-untyped-def]
+def design_grid(start, stop, width, near, member, pose, u, weight, out):
     """Add what `grid_design` does at the poses pose (any, POSE) to out (M_padded,) for the rows from start to stop."""
     rows = (stop - start) // width
     tall, wide = tile_of(rows, width)

@@ -35,19 +35,19 @@ WORTH = 400_000
 
 
 @part
-def springs_of(model):  # type: ignore[no-untyped-def]
+def springs_of(model):
     """What `member_sums` needs of a model."""
     return Springs(model.block, model.member, model.chunk, model.threads, model.near)
 
 
 @kernel
-def threads_for(springs, poses):  # type: ignore[no-untyped-def]
+def threads_for(springs, poses):
     """How many threads share a pass at so many poses."""
     return springs.threads if springs.threads > 0 and springs.member.shape[1] * poses >= WORTH else 1
 
 
 @part
-def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
+def scale_members(model, alpha, strength):
     """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12).
 
     Rows 1 and 2 of design springs that have neither damping nor preload are left as they are: zero.
@@ -58,7 +58,7 @@ def scale_members(model, alpha, strength):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _scale_chunks(counter, chunk, block, power, member, alpha, strength):  # type: ignore[no-untyped-def]
+def _scale_chunks(counter, chunk, block, power, member, alpha, strength):
     i = taken(counter)
     while i < chunk.shape[0]:
         _scale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, member, alpha, strength)
@@ -66,7 +66,7 @@ def _scale_chunks(counter, chunk, block, power, member, alpha, strength):  # typ
 
 
 @kernel
-def _scale(k, start, stop, block, power, member, alpha, strength):  # type: ignore[no-untyped-def]
+def _scale(k, start, stop, block, power, member, alpha, strength):
     """The part start..stop of block k."""
     if block[k, 4] < 0:
         for i in range(start, stop):
@@ -100,7 +100,7 @@ def _scale(k, start, stop, block, power, member, alpha, strength):  # type: igno
 
 
 @part
-def _rows(block, k, start, stop):  # type: ignore[no-untyped-def]
+def _rows(block, k, start, stop):
     """The part start..stop of block k by rows: how many, the members of one, the first's variable, places of a row.
 
     Of a grid its rows, else one row. Behind the last row of a grid there may be eight places that are none of it:
@@ -116,7 +116,7 @@ def _rows(block, k, start, stop):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-untyped-def]
+def member_sums(springs, strength, rel, m, tangent, sums):
     """One pass over all members (`Springs`) at m relative poses.
 
     In: strength (3, M_padded), rel (m, n_pair, POSE), tangent (are K and C wanted). Out: sums (m, n_pair, SUMS).
@@ -143,7 +143,7 @@ def member_sums(springs, strength, rel, m, tangent, sums):  # type: ignore[no-un
 
 
 @kernel
-def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, part):  # type: ignore[no-untyped-def]
+def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, part):
     i = taken(counter)
     while i < chunk.shape[0]:
         out = part[i]
@@ -154,7 +154,7 @@ def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, 
 
 
 @kernel
-def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, column):  # type: ignore[no-untyped-def]
+def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, column):
     """Add the part start..stop of block k to sums (m, columns, SUMS)."""
     if block[k, 6] > 0:
         sum_grid(k, start, stop, block, near, member, strength[0], rel, m, tangent, sums, column)
@@ -220,7 +220,7 @@ def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, c
 
 
 @part
-def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # type: ignore[no-untyped-def]
+def design_gradient(model, stage, pose, z, used, point, weight, out, work):
     """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength) + sum_e weight_e V_i(q_e).
 
     One pass, no histories. In: stage (S, 3, n) with q, v; pose (any, n_pair, POSE): relative poses of the first of
@@ -264,7 +264,7 @@ def design_gradient(model, stage, pose, z, used, point, weight, out, work):  # t
 
 
 @part
-def energy_gradient(model, point, weight, out):  # type: ignore[no-untyped-def]
+def energy_gradient(model, point, weight, out):
     """out (M_padded,) += sum_e weight_e V_i(q_e) alone: the explicit part of the energy's design gradient."""
     n = model.q0.shape[0]
     pose = np.empty((0, model.pair.shape[0], POSE))
@@ -273,7 +273,7 @@ def energy_gradient(model, point, weight, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
     i = taken(counter)
     while i < chunk.shape[0]:
         _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, near[chunk[i, 0]], member, rel, u, weight, out)
@@ -281,7 +281,7 @@ def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):  #
 
 
 @kernel
-def _design(k, start, stop, block, near, member, rel, u, weight, out):  # type: ignore[no-untyped-def]
+def _design(k, start, stop, block, near, member, rel, u, weight, out):
     """The part start..stop of block k: works at the first poses of rel (any, n_pair, POSE), energies at the others.
 
     u (S, n_pair, 3): changes of the first poses.
@@ -316,7 +316,7 @@ def _design(k, start, stop, block, near, member, rel, u, weight, out):  # type: 
 
 
 @part
-def unscale_gradient(model, alpha, padded, out):  # type: ignore[no-untyped-def]
+def unscale_gradient(model, alpha, padded, out):
     """out (N,) = mu alpha^(mu - 1) times the padded gradient with respect to alpha^mu."""
     counter = np.zeros(1, np.int64)
     job = (counter, model.chunk, model.block, model.power, alpha, padded, out)
@@ -324,7 +324,7 @@ def unscale_gradient(model, alpha, padded, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
+def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):
     i = taken(counter)
     while i < chunk.shape[0]:
         _unscale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, alpha, padded, out)
@@ -332,7 +332,7 @@ def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):  # type: 
 
 
 @kernel
-def _unscale(k, start, stop, block, power, alpha, padded, out):  # type: ignore[no-untyped-def]
+def _unscale(k, start, stop, block, power, alpha, padded, out):
     """The part start..stop of block k."""
     if block[k, 4] < 0:
         return

@@ -25,7 +25,7 @@ from mdstopo.mechanics.passes import springs_of
 
 
 @kernel
-def may_be_rough(model):  # type: ignore[no-untyped-def]
+def may_be_rough(model):
     """Whether all members lie in grids, and there are few."""
     found = model.threads == 0
     for k in range(model.block.shape[0]):
@@ -34,7 +34,7 @@ def may_be_rough(model):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
+def _seen(ax, ay, room, j):
     """r and 1/L of the members of row j."""
     rx = ax + room[j, 0]
     ry = ay + room[j, 1]
@@ -42,7 +42,7 @@ def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
 
 
 @part
-def _tangent(qx, qy, k, kl, room, c, s):  # type: ignore[no-untyped-def]
+def _tangent(qx, qy, k, kl, room, c, s):
     """Q and K as in `spring_grid.grid_tangent`. q: of the columns; k, kl (rows, columns): k, k l0; room: e of the rows.
 
     With u = k l0/L they are w = k - u and g = u.
@@ -74,7 +74,7 @@ def _tangent(qx, qy, k, kl, room, c, s):  # type: ignore[no-untyped-def]
 
 
 @part
-def _add(own, seen, k, kl):  # type: ignore[no-untyped-def]
+def _add(own, seen, k, kl):
     """The sums of a column with a member more."""
     rx, ry, y = seen
     u = kl * y
@@ -82,7 +82,7 @@ def _add(own, seen, k, kl):  # type: ignore[no-untyped-def]
 
 
 @part
-def rough_sums(springs, strength, rel, m, sums):  # type: ignore[no-untyped-def]
+def rough_sums(springs, strength, rel, m, sums):
     """As `passes.member_sums` with tangents, of grids alone; without energies and their slopes."""
     block = springs.block
     sums[:m] = 0.0
@@ -95,7 +95,7 @@ def rough_sums(springs, strength, rel, m, sums):  # type: ignore[no-untyped-def]
 
 
 @part
-def _aligned_rows(count, width):  # type: ignore[no-untyped-def]
+def _aligned_rows(count, width):
     """Room for rows of whole vectors in single precision, each on a line of the cache."""
     some = 2 * WIDE
     width = (width + some - 1) // some * some
@@ -105,7 +105,7 @@ def _aligned_rows(count, width):  # type: ignore[no-untyped-def]
 
 
 @part
-def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):  # type: ignore[no-untyped-def]
+def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):
     """Add a block to sums, tile by tile. Room for a tile's k and then its k l0: own; for its q: q."""
     p = block[0]
     width = block[6]
@@ -133,14 +133,14 @@ def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):  #
 
 
 @part
-def _shorten(source, target):  # type: ignore[no-untyped-def]
+def _shorten(source, target):
     """target = source in single precision, zeros behind it."""
     for i in range(0, target.shape[0], lanes()):
         store(target, i, load(source, i) if i < source.shape[0] else zero())
 
 
 @part
-def _shorten_products(k, l0, own, product):  # type: ignore[no-untyped-def]
+def _shorten_products(k, l0, own, product):
     """own, product = k, k l0 in single precision, zeros behind them."""
     for i in range(0, own.shape[0], lanes()):
         stiffness = load(k, i) if i < k.shape[0] else zero()
@@ -149,7 +149,7 @@ def _shorten_products(k, l0, own, product):  # type: ignore[no-untyped-def]
 
 
 @part
-def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):  # type: ignore[no-untyped-def]
+def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):
     """As `assembly.forces` with tangents, where `may_be_rough`; whether the forces are numbers."""
     place_bodies(model.pair, model.home, q, v, m, rel)
     rough_sums(springs_of(model), strength, rel, m, sums)

@@ -10,7 +10,7 @@ from mdstopo.scene.packing import unpack
 
 
 @entry
-def start_tangents(ints, floats, strength, damped, k, turn):  # type: ignore[no-untyped-def]
+def start_tangents(ints, floats, strength, damped, k, turn):
     """k (1, n_pair, 6, 6) = -dF/dq of each pair and turn (1, n), the loads' derivative by the angles, at the start."""
     model = unpack(ints, floats)
     n = model.q0.shape[0]

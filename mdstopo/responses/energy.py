@@ -11,7 +11,7 @@ from mdstopo.mechanics.passes import member_sums
 
 
 @part
-def energy_at(pair, home, springs, strength, q, v, rel, sums):  # type: ignore[no-untyped-def]
+def energy_at(pair, home, springs, strength, q, v, rel, sums):
     """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
     relative_pose(pair, home, q, v, rel[0])
     member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
@@ -19,7 +19,7 @@ def energy_at(pair, home, springs, strength, q, v, rel, sums):  # type: ignore[n
 
 
 @kernel
-def energy_of(rel, sums):  # type: ignore[no-untyped-def]
+def energy_of(rel, sums):
     """g and dg/dt from the relative poses (n_pair, POSE) of a state and their sums (n_pair, SUMS)."""
     value = 0.0
     rate = 0.0
@@ -30,7 +30,7 @@ def energy_of(rel, sums):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def energy_slope(pair, rel, pull, weight, out):  # type: ignore[no-untyped-def]
+def energy_slope(pair, rel, pull, weight, out):
     """out (n,) += weight dg/dq from the relative poses and E_xi (n_pair, 3) of one state."""
     for p in range(pair.shape[0]):
         add_pair_force(pair, rel, p, weight * pull[p, 0], weight * pull[p, 1], weight * pull[p, 2], out)

@@ -20,7 +20,7 @@ DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
 
 
 @kernel
-def turned(home, angle):  # type: ignore[no-untyped-def]
+def turned(home, angle):
     """`geometry.turned_body` of a body with this row of `home`."""
     m, s = small_turn(angle)
     c = home[3] * m - home[4] * s
@@ -29,7 +29,7 @@ def turned(home, angle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
+def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
     """The response; slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r. The norm's slope is zero where the norm is.
 
     With ACROSS the norm comes back with the slopes of the component perpendicular to the vector, a quarter turn ahead.
@@ -138,7 +138,7 @@ def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, 
 
 
 @kernel
-def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):  # type: ignore[no-untyped-def]
+def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
     """psi_b - psi_r, unwrapped, or its first or second derivative; slope as in `point_response`."""
     for i in range(6):
         for j in range(3):

@@ -20,7 +20,7 @@ TIME, VALUE, STEP, FRACTION = range(4)
 
 
 @kernel
-def cubic_peak(da, db, slope):  # type: ignore[no-untyped-def]
+def cubic_peak(da, db, slope):
     """Where in (0, 1) the cubic with end rates da > 0 >= db and mean rate slope has its peak."""
     # its rate: da + 2 half s + square s^2
     half = 3.0 * slope - 2.0 * da - db
@@ -31,7 +31,7 @@ def cubic_peak(da, db, slope):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cubic_dip(da, db, slope):  # type: ignore[no-untyped-def]
+def cubic_dip(da, db, slope):
     """Where the cubic has an extremum although its rates at both ends have one sign; -1 where it has none."""
     half = 3.0 * slope - 2.0 * da - db
     square = 3.0 * (da + db - 2.0 * slope)
@@ -42,7 +42,7 @@ def cubic_dip(da, db, slope):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def keep_peak(peaks, found, time, value):  # type: ignore[no-untyped-def]
+def keep_peak(peaks, found, time, value):
     """Insert a peak, highest first and the earlier first where equal; return how many are kept."""
     rows = peaks.shape[0]
     place = found
@@ -59,7 +59,7 @@ def keep_peak(peaks, found, time, value):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-def]
+def brackets_of(t, g, d, closeness, bracket, peaks):
     """Sort samples t, g, d (S,) into brackets (S, 2): index of the left sample, and where between to look first.
 
     Peaks at the ends of time go to `peaks` at once. Brackets that cannot hold a peak within `closeness` of the
@@ -107,7 +107,7 @@ def brackets_of(t, g, d, closeness, bracket, peaks):  # type: ignore[no-untyped-
 
 
 @part
-def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, pull, work):  # type: ignore[no-untyped-def]
+def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, pull, work):
     """Fill peaks (rows, 4) with the highest peaks of sign g (VALUE holds g); return how many.
 
     Only peaks within `closeness` (relative) of the highest are refined and kept. Out: the first two of pull

@@ -66,7 +66,7 @@ def checked(case: Case, alpha: FloatArray) -> FloatArray:
 
 
 @vector_entry
-def weigh(design, n, rows, bounds, excess):  # type: ignore[no-untyped-def]
+def weigh(design, n, rows, bounds, excess):
     """excess (n_con,) = rows design - bounds; returns how many of the n first are negative or any not finite."""
     wrong = 0
     for i in range(n):

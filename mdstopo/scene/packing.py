@@ -110,7 +110,7 @@ def aligned(shape: tuple[int, ...]) -> FloatArray:
 
 
 @part
-def unpack(ints, floats):  # type: ignore[no-untyped-def]
+def unpack(ints, floats):
     """The `Model` whose arrays are views of the packed ones."""
     n = ints[0]
     n_pair = ints[1]

@@ -21,7 +21,7 @@ AT_START, AT_END, ELSEWHERE = range(3)
 
 
 @part
-def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, accuracy, work):  # type: ignore[no-untyped-def]
+def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, accuracy, work):
     """Pull the cotangent mu_q (n,) of the position at fraction c of step w (c < 0: its end) back to the start.
 
     stage_q_bar (S, n): explicit cotangents of the stage positions, or no rows. Out: z (S, n) and used (S,), 1 for the
@@ -53,7 +53,7 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
 
 
 @part
-def energy_rows(  # type: ignore[no-untyped-def]
+def energy_rows(
     model,
     motion,
     tables,

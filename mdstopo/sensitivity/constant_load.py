@@ -30,7 +30,7 @@ DROPPED = 1e-10
 
 
 @entry
-def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):  # type: ignore[no-untyped-def]
+def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):
     """Fill stiffness (P, n, n) = -dF/dq at rest and slope (P, n) = dg/dq at the poses states (P, 2, n)."""
     model = unpack(ints, floats)
     pair = model.pair
@@ -56,7 +56,7 @@ def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):  # type
 
 
 @entry
-def _gradient(ints, floats, alpha, weights, states, z, padded, out):  # type: ignore[no-untyped-def]
+def _gradient(ints, floats, alpha, weights, states, z, padded, out):
     """out (N,) = sum over the poses of weight (V_i - f_i b_i . T z)."""
     model = unpack(ints, floats)
     used = np.ones(z.shape[0], np.int64)

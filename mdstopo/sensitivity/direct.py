@@ -22,7 +22,7 @@ NOWHERE = -2
 
 
 @kernel
-def slope_at(model, strength, q, v, rel, sums, out):  # type: ignore[no-untyped-def]
+def slope_at(model, strength, q, v, rel, sums, out):
     """out (n,) = dg/dq at one state."""
     springs = springs_of(model)
     energy_at(model.pair, model.home, springs, strength, q, v, rel, sums)
@@ -35,9 +35,7 @@ def slope_at(model, strength, q, v, rel, sums, out):  # type: ignore[no-untyped-
 
 
 @kernel
-def look_at_row(  # type: ignore[no-untyped-def]
-    model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work
-):
+def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work):
     """Step and fraction (-1: its end) of a found row (4,), the state there, and the slope dg/dq into mu_q (n,)."""
     k = int(row[2])
     c = row[3]
@@ -58,7 +56,7 @@ def look_at_row(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def integral_weights(model, tables, steps, count, weight, bar):  # type: ignore[no-untyped-def]
+def integral_weights(model, tables, steps, count, weight, bar):
     """weight (S,) of the stages in the integral of g over time, and bar (S, n), that of their positions."""
     rel = np.empty((model.pair.shape[0], POSE))
     for w in range(count):
@@ -69,9 +67,7 @@ def integral_weights(model, tables, steps, count, weight, bar):  # type: ignore[
 
 
 @kernel
-def finish_rows(  # type: ignore[no-untyped-def]
-    model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients
-):
+def finish_rows(model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients):
     """Add the explicit parts and turn derivatives by alpha^mu into those by alpha: gradients (n_obj, R, N).
 
     In: states (n_obj, R, 3, n) of the rows, padded (n_obj, R, M_padded) their implicit parts, total (1, M_padded)
@@ -96,7 +92,7 @@ def finish_rows(  # type: ignore[no-untyped-def]
 
 
 @entry
-def direct(  # type: ignore[no-untyped-def]
+def direct(
     tag,
     ints,
     floats,

@@ -31,7 +31,7 @@ MOST_SWEEPS = 200
 
 
 @kernel
-def contraction(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning):  # type: ignore[no-untyped-def]
+def contraction(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning):
     """Estimate of the spectral radius of M^-1 (w_q K + w_v C), by power iteration.
 
     k, c: (1, n_pair, 6, 6). turn: (1, n).
@@ -66,7 +66,7 @@ def contraction(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning):  # type:
 
 
 @member_kernel
-def _accept(scale, force, guess):  # type: ignore[no-untyped-def]
+def _accept(scale, force, guess):
     """guess = scale force; returns the largest change and the largest value."""
     change = 0.0
     size = 0.0
@@ -79,7 +79,7 @@ def _accept(scale, force, guess):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _balance_rows(pair, k, c, turn, damped, turning, x, y, out, wide):  # type: ignore[no-untyped-def]
+def _balance_rows(pair, k, c, turn, damped, turning, x, y, out, wide):
     """out -= K x + C y - load tangent x for a strip of members: x, y, out (n, STRIP)."""
     for p in range(pair.shape[0]):
         for i in range(6):
@@ -100,7 +100,7 @@ def _balance_rows(pair, k, c, turn, damped, turning, x, y, out, wide):  # type: 
 
 
 @kernel
-def _member_forces(pair, block, member, k, lo, hi, rel, push, out):  # type: ignore[no-untyped-def]
+def _member_forces(pair, block, member, k, lo, hi, rel, push, out):
     """out (n, STRIP) = -T^T b f of the members lo..hi of block k at unit strength; push (STRIP,) is room."""
     wide = hi - lo
     p = block[k, 0]
@@ -133,7 +133,7 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):  # type: ign
 
 
 @kernel
-def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):  # type: ignore[no-untyped-def]
+def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):
     """out (M_padded,) += mu . (weight_q dq + weight_v dv) for the members lo..hi."""
     for d in range(mu.shape[0]):
         a = mu[d] * weight_q
@@ -143,7 +143,7 @@ def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):  # type: ignore[no-untyp
 
 
 @entry
-def iterative(  # type: ignore[no-untyped-def]
+def iterative(
     tag,
     ints,
     floats,

@@ -30,7 +30,7 @@ VISIBLE, ELONGATED = 1e-5, 100.0
 
 
 @entry
-def look(  # type: ignore[no-untyped-def]
+def look(
     tag,
     ints,
     floats,
@@ -80,7 +80,7 @@ def look(  # type: ignore[no-untyped-def]
 
 
 @part
-def find_meeting(model, strength, steps, count, pose, settings, meeting):  # type: ignore[no-untyped-def]
+def find_meeting(model, strength, steps, count, pose, settings, meeting):
     """meeting[:2]: padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
@@ -152,7 +152,7 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):  # typ
 
 
 @part
-def find_unresolved(model, strength, steps, count, pose, collocated, visible, meeting):  # type: ignore[no-untyped-def]
+def find_unresolved(model, strength, steps, count, pose, collocated, visible, meeting):
     """meeting[2]: the member by which rounding leaves the largest stored energy no digits to speak of, or -1.
 
     An elongation is known to u X where bodies have moved by X since the start, u = 2.2e-16; an energy k Delta^2/2 then
@@ -211,7 +211,7 @@ def find_unresolved(model, strength, steps, count, pose, collocated, visible, me
 
 
 @part
-def _sum(k):  # type: ignore[no-untyped-def]
+def _sum(k):
     """Sum of k, whose length is a multiple of four, in four parts that do not wait for one another."""
     a = 0.0
     b = 0.0
@@ -226,7 +226,7 @@ def _sum(k):  # type: ignore[no-untyped-def]
 
 
 @part
-def _shortest(m, lo, hi, width, r):  # type: ignore[no-untyped-def]
+def _shortest(m, lo, hi, width, r):
     """Smallest length of the members lo..hi, rows of a grid where there is a width, at relative pose r."""
     px = m[0, lo:hi]
     py = m[1, lo:hi]
@@ -239,7 +239,7 @@ def _shortest(m, lo, hi, width, r):  # type: ignore[no-untyped-def]
 
 
 @entry
-def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, strength, times, out, work):  # type: ignore[no-untyped-def]
+def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, strength, times, out, work):
     """out (3, T, n) = q, v, a at times (T,), a by the equations of motion (right-continuous at kinks)."""
     model = unpack(ints, floats)
     turning = model.load_body.shape[0] > 0

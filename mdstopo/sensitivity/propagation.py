@@ -22,7 +22,7 @@ STRIP = 128
 
 
 @kernel
-def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):  # type: ignore[no-untyped-def]
+def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):
     """Fill matrix (D + 1, D + 3 n_pair s) of step w, to its end (c < 0) or its fraction c.
 
     Columns: changes of the start; then for each stage and pair the three entries of b f of a member there. Rows:
@@ -75,14 +75,14 @@ def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, tu
 
 
 @member_kernel
-def add_three(a, b, c, x, y, z, out):  # type: ignore[no-untyped-def]
+def add_three(a, b, c, x, y, z, out):
     """out (m,) += a x + b y + c z, members along the rows."""
     for i in range(out.shape[0]):
         out[i] += a * x[i] + b * y[i] + c * z[i]
 
 
 @kernel
-def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, adding, S, target):  # type: ignore[no-untyped-def]
+def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, adding, S, target):
     """target (last - first, M_padded) = (adding: +=) rows first..last of matrix times the changes S and member forces.
 
     In: stage (s, 3, n) the states of the step's stages, S (D, M_padded). target may be S itself. Only design members.

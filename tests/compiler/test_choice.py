@@ -13,12 +13,12 @@ from mdstopo.compiler.jit import entry, inline
 
 
 @inline
-def twice(x):  # type: ignore[no-untyped-def]
+def twice(x):
     return 2.0 * x
 
 
 @inline
-def product(y, x):  # type: ignore[no-untyped-def]
+def product(y, x):
     return x * y + 100.0 * y
 
 
@@ -33,13 +33,13 @@ FEW = table(twice, product, None, True)
 
 
 @chosen(FEW, lambda each: each, inline)
-def few(code, x, y):  # type: ignore[no-untyped-def]
+def few(code, x, y):
     """What an unknown code gives."""
     return -1.0
 
 
 @entry
-def call_few(code, x, y):  # type: ignore[no-untyped-def]
+def call_few(code, x, y):
     return few(code, x, y)
 
 
@@ -51,12 +51,12 @@ GROWING = table(twice)
 
 
 @chosen(GROWING, lambda each: each, inline)
-def growing(code, x, y):  # type: ignore[no-untyped-def]
+def growing(code, x, y):
     return -1.0
 
 
 @entry
-def call_growing(code, x, y):  # type: ignore[no-untyped-def]
+def call_growing(code, x, y):
     return growing(code, x, y)
 
 
@@ -77,7 +77,7 @@ def test_what_was_compiled_before_the_list_grew_is_made_anew(tmp_path: Path, mon
 
 
 @chosen(table(product), lambda each: each, inline)
-def without(code, x):  # type: ignore[no-untyped-def]
+def without(code, x):
     return -1.0
 
 

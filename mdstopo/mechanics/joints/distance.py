@@ -16,7 +16,7 @@ from mdstopo.mechanics.laws.spring import elongation_of
 
 
 @kernel
-def _line(par, w, wd):  # type: ignore[no-untyped-def]
+def _line(par, w, wd):
     """Arms, unit vector, 1/length (0 at none), relative velocity, rate, and its turn f = e'."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
@@ -32,7 +32,7 @@ def _line(par, w, wd):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def distance_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
+def distance_rows(par, w, phi, jac):
     """Phi and its slopes."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
@@ -52,7 +52,7 @@ def distance_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def distance_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
+def distance_gamma(par, w, wd, gamma):
     """Centripetal part and the turning of the link."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     bx = wd[2] ** 2 * px - wd[5] ** 2 * cx
@@ -61,7 +61,7 @@ def distance_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def distance_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
+def distance_velocity_slope(par, w, wd, out):
     """d(Phi_q v)/dq = dPhi_q/dt."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     fx = inverse * (dx - rate * ex)
@@ -75,7 +75,7 @@ def distance_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+def distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
     """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     wa = wd[2]
@@ -110,7 +110,7 @@ def distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[n
 
 
 @kernel
-def distance_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
+def distance_stiffness(par, w, lam, k):
     """k += lam d2|d|/dq2 = lam (u^T u (I - e e^T)/|d| and the turning of the arms)."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
@@ -129,7 +129,7 @@ def distance_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _across(i, ex, ey, px, py, cx, cy):  # type: ignore[no-untyped-def]
+def _across(i, ex, ey, px, py, cx, cy):
     if i == 0:
         return ey
     if i == 1:

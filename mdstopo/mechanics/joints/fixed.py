@@ -16,7 +16,7 @@ from mdstopo.mechanics.joints.revolute import (
 
 
 @kernel
-def fixed_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
+def fixed_rows(par, w, phi, jac):
     """Phi (3) and its slopes; the angle's are constant, so all else is the revolute joint's."""
     revolute_rows(par, w, phi, jac)
     phi[2] = w[5] - w[2]
@@ -27,14 +27,14 @@ def fixed_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fixed_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
+def fixed_gamma(par, w, wd, gamma):
     """The points' centripetal parts; the angle has none."""
     revolute_gamma(par, w, wd, gamma)
     gamma[2] = 0.0
 
 
 @kernel
-def fixed_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
+def fixed_velocity_slope(par, w, wd, out):
     """d(Phi_q v)/dq; the angle's row is zero."""
     revolute_velocity_slope(par, w, wd, out)
     for i in range(6):
@@ -42,7 +42,7 @@ def fixed_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
     """d(Phi_q a + gamma)/dq and d(gamma)/dv; the angle's rows are zero."""
     revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
     for i in range(6):
@@ -51,7 +51,7 @@ def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-u
 
 
 @kernel
-def fixed_moment(lam, by_lam):  # type: ignore[no-untyped-def]
+def fixed_moment(lam, by_lam):
     """The multiplier of the angle's row."""
     by_lam[2] = 1.0
     return lam[2]

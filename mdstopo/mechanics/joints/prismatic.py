@@ -15,7 +15,7 @@ from mdstopo.mechanics.joints.revolute import apart_since, arms
 
 
 @kernel
-def _frame(par, w):  # type: ignore[no-untyped-def]
+def _frame(par, w):
     """n, E, c: normal, second point from the first centre of mass, its arm; global axes."""
     _, _, cx, cy = arms(par, w)
     ca = w[6]
@@ -26,7 +26,7 @@ def _frame(par, w):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prismatic_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
+def prismatic_rows(par, w, phi, jac):
     """Phi (2) and its slopes."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     # n . D less n_h . D_h at home, in what n and D have changed by
@@ -49,7 +49,7 @@ def prismatic_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prismatic_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
+def prismatic_gamma(par, w, wd, gamma):
     """What the second derivative has beside Phi_q a."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     dx = wd[3] - wd[0] - wd[5] * cy
@@ -59,7 +59,7 @@ def prismatic_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prismatic_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
+def prismatic_velocity_slope(par, w, wd, out):
     """d(Phi_q v)/dq."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     dx = wd[3] - wd[0] - wd[5] * cy
@@ -76,7 +76,7 @@ def prismatic_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+def prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
     """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     wa = wd[2]
@@ -108,7 +108,7 @@ def prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[
 
 
 @kernel
-def prismatic_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
+def prismatic_stiffness(par, w, lam, k):
     """k += d(Phi_q^T lam)/dq."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     f = lam[0]
@@ -128,7 +128,7 @@ def prismatic_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def prismatic_moment(par, w, lam, by_lam, by_q):  # type: ignore[no-untyped-def]
+def prismatic_moment(par, w, lam, by_lam, by_q):
     """The moment lam_2 - lam_1 m . D about the first body's joint point, and its slopes."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     px, py, _, _ = arms(par, w)

@@ -13,7 +13,7 @@ PLACES = 18
 
 
 @part
-def place_turned(home, a, b, q, turns_a, turns_b, w):  # type: ignore[no-untyped-def]
+def place_turned(home, a, b, q, turns_a, turns_b, w):
     """Fill w (PLACES,) of bodies a and b from q (n,) and what `turned_body` gives of them."""
     for side in range(2):
         body = a if side == 0 else b
@@ -30,13 +30,13 @@ def place_turned(home, a, b, q, turns_a, turns_b, w):  # type: ignore[no-untyped
 
 
 @part
-def place_joint(home, a, b, q, w):  # type: ignore[no-untyped-def]
+def place_joint(home, a, b, q, w):
     """Fill w (PLACES,) of bodies a and b from q (n,)."""
     place_turned(home, a, b, q, turned_body(home, a, q[3 * a + 2]), turned_body(home, b, q[3 * b + 2]), w)
 
 
 @part
-def apart_since(par, w):  # type: ignore[no-untyped-def]
+def apart_since(par, w):
     """What x_B + c - x_A - p has changed by since home."""
     return (
         w[12] - w[10] + (w[16] * par[2] - w[17] * par[3]) - (w[14] * par[0] - w[15] * par[1]),
@@ -45,7 +45,7 @@ def apart_since(par, w):  # type: ignore[no-untyped-def]
 
 
 @part
-def arms(par, w):  # type: ignore[no-untyped-def]
+def arms(par, w):
     """px, py, cx, cy: the points relative to their centres of mass, global axes."""
     ca = w[6]
     sa = w[7]
@@ -60,7 +60,7 @@ def arms(par, w):  # type: ignore[no-untyped-def]
 
 
 @part
-def revolute_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
+def revolute_rows(par, w, phi, jac):
     """Phi (2) and its slopes."""
     px, py, cx, cy = arms(par, w)
     x, y = apart_since(par, w)
@@ -78,7 +78,7 @@ def revolute_rows(par, w, phi, jac):  # type: ignore[no-untyped-def]
 
 
 @part
-def revolute_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
+def revolute_gamma(par, w, wd, gamma):
     """Centripetal parts of the second derivative."""
     px, py, cx, cy = arms(par, w)
     gamma[0] = wd[2] * wd[2] * px - wd[5] * wd[5] * cx
@@ -86,7 +86,7 @@ def revolute_gamma(par, w, wd, gamma):  # type: ignore[no-untyped-def]
 
 
 @part
-def revolute_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
+def revolute_velocity_slope(par, w, wd, out):
     """d(Phi_q v)/dq: only the arms turn."""
     px, py, cx, cy = arms(par, w)
     for r in range(2):
@@ -99,7 +99,7 @@ def revolute_velocity_slope(par, w, wd, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
     """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
     px, py, cx, cy = arms(par, w)
     for r in range(2):
@@ -119,7 +119,7 @@ def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):  # type: ignore[n
 
 
 @part
-def revolute_pull(par, w, wd, wdd, lam, y0, y1, z_first, z_second):  # type: ignore[no-untyped-def]
+def revolute_pull(par, w, wd, wdd, lam, y0, y1, z_first, z_second):
     """What `revolute_acceleration_slopes` and `revolute_stiffness` give with y (2) and a virtual displacement z.
 
     (d(Phi_q a + gamma)/dq)^T y + (d(Phi_q^T lam)/dq)^T z and (d(gamma)/dv)^T y, of which only those by the angles are
@@ -139,7 +139,7 @@ def revolute_pull(par, w, wd, wdd, lam, y0, y1, z_first, z_second):  # type: ign
 
 
 @part
-def revolute_stiffness(par, w, lam, k):  # type: ignore[no-untyped-def]
+def revolute_stiffness(par, w, lam, k):
     """k += d(Phi_q^T lam)/dq."""
     px, py, cx, cy = arms(par, w)
     k[2, 2] += lam[0] * px + lam[1] * py

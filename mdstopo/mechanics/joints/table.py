@@ -91,24 +91,24 @@ def describe(joint: Joint) -> str:
 
 
 @chosen(LISTED, lambda each: each.rows, part)
-def _row_count(code):  # type: ignore[no-untyped-def]
+def _row_count(code):
     return 0
 
 
 @chosen(LISTED, lambda each: each.phi, part)
-def joint_rows(code, par, w, phi, jac):  # type: ignore[no-untyped-def]
+def joint_rows(code, par, w, phi, jac):
     """phi (3,) and jac (3, 6) = Phi_q; rows that the joint has not are left as they are."""
 
 
 @chosen(LISTED, lambda each: each.gamma, part)
-def joint_gamma(code, par, w, wd, gamma):  # type: ignore[no-untyped-def]
+def joint_gamma(code, par, w, wd, gamma):
     """gamma (3,) of Phi_q a + gamma = 0."""
     for r in range(_row_count(code)):
         gamma[r] = 0.0
 
 
 @chosen(LISTED, lambda each: each.velocity_slope, part)
-def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
+def joint_velocity_slope(code, par, w, wd, out):
     """out (3, 6) = d(Phi_q v)/dq."""
     for r in range(_row_count(code)):
         for i in range(6):
@@ -116,7 +116,7 @@ def joint_velocity_slope(code, par, w, wd, out):  # type: ignore[no-untyped-def]
 
 
 @chosen(LISTED, lambda each: each.acceleration_slopes, part)
-def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignore[no-untyped-def]
+def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
     """by_q, by_v (3, 6): slopes of Phi_q a + gamma at fixed a."""
     for r in range(_row_count(code)):
         for i in range(6):
@@ -125,30 +125,30 @@ def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):  # type: ignor
 
 
 @chosen(LISTED, lambda each: each.stiffness, part)
-def joint_stiffness(code, par, w, lam, k):  # type: ignore[no-untyped-def]
+def joint_stiffness(code, par, w, lam, k):
     """k (6, 6) += d(Phi_q^T lam)/dq."""
 
 
 @chosen(LISTED, lambda each: each.is_point or None, part)
-def joint_is_point(code):  # type: ignore[no-untyped-def]
+def joint_is_point(code):
     """Whether a joint's rows are those of the revolute one, and linear ones behind them."""
     return False
 
 
 @chosen(LISTED, lambda each: each.force_rows or None, part)
-def joint_force_rows(code):  # type: ignore[no-untyped-def]
+def joint_force_rows(code):
     """Of how many of the first rows the multipliers are components of the force that is transmitted."""
     return 0
 
 
 @chosen(LISTED, lambda each: each.moment, part)
-def _moment(code, par, w, lam, by_lam, by_q):  # type: ignore[no-untyped-def]
+def _moment(code, par, w, lam, by_lam, by_q):
     """The moment that is transmitted, by_lam (3,), by_q (6,): its slopes, zero before."""
     return 0.0
 
 
 @kernel
-def joint_reaction(code, rows, par, w, lam, out):  # type: ignore[no-untyped-def]
+def joint_reaction(code, rows, par, w, lam, out):
     """out (3,) = Fx, Fy, M on the first body at its joint point, global axes: -Phi_q^T lam, moved there."""
     phi = np.zeros(3)
     jac = np.zeros((3, 6))
@@ -162,7 +162,7 @@ def joint_reaction(code, rows, par, w, lam, out):  # type: ignore[no-untyped-def
 
 
 @kernel
-def joint_transmitted(code, par, w, lam, which, by_lam, by_q):  # type: ignore[no-untyped-def]
+def joint_transmitted(code, par, w, lam, which, by_lam, by_q):
     """Norm of the force (which FORCE) or the moment (MOMENT) that a joint transmits, at the first body's joint point.
 
     Out: its slopes by_lam (3,), by_q (6,); zero where the norm is. ACROSS: the norm of the force, with the slopes of

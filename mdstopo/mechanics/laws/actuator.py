@@ -12,7 +12,7 @@ LINEAR, UPPER, LOWER = range(3)
 
 
 @inline
-def actuator_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_force(p, x, xd, mode):
     """f, f_x, f_xd, V, V_x."""
     if mode == UPPER:
         return p[3], 0.0, 0.0, 0.0, 0.0
@@ -22,7 +22,7 @@ def actuator_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_margin(p, x, xd, mode):
     """How far the mode is from its end, in parts of the limit; infinite where there is none."""
     if p[3] <= 0.0:
         return np.inf
@@ -35,7 +35,7 @@ def actuator_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_margin_slopes(p, x, xd, mode):
     """Slopes of the margin by x and xd."""
     if p[3] <= 0.0:
         return 0.0, 0.0
@@ -47,7 +47,7 @@ def actuator_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_slopes(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_slopes(p, place, x, xd, mode):
     """df/dp, dV/dp."""
     if mode != LINEAR:
         return ((1.0 if mode == UPPER else -1.0) if place == 3 else 0.0), 0.0
@@ -59,7 +59,7 @@ def actuator_slopes(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_margin_slope(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_margin_slope(p, place, x, xd, mode):
     """Slope of the margin by a parameter."""
     if p[3] <= 0.0:
         return 0.0
@@ -75,7 +75,7 @@ def actuator_margin_slope(p, place, x, xd, mode):  # type: ignore[no-untyped-def
 
 
 @inline
-def actuator_start(p, x, xd):  # type: ignore[no-untyped-def]
+def actuator_start(p, x, xd):
     """The mode by the force alone: it is continuous at both limits."""
     if p[3] <= 0.0:
         return LINEAR
@@ -88,7 +88,7 @@ def actuator_start(p, x, xd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_next(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def actuator_next(p, x, xd, mode):
     """The mode behind the end of this one."""
     if mode != LINEAR:
         return LINEAR
@@ -96,13 +96,13 @@ def actuator_next(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def actuator_switches(p):  # type: ignore[no-untyped-def]
+def actuator_switches(p):
     """Whether there is a limit."""
     return p[3] > 0.0
 
 
 @inline
-def actuator_unstretched(p):  # type: ignore[no-untyped-def]
+def actuator_unstretched(p):
     """What steers to the target from no elongation."""
     return abs(p[0] * p[2])
 

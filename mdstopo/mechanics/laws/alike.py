@@ -16,7 +16,7 @@ from mdstopo.mechanics.laws.sums import add_tangent, upper_triangle
 
 
 @kernel
-def _seen(member, width, i, r):  # type: ignore[no-untyped-def]
+def _seen(member, width, i, r):
     """R q, 1/L, b and Delta of the members from i on."""
     ax, ay, rx, ry, _, y, stretch = seen_members(member, width, i, r, np.bool_(True))
     bx = y * rx
@@ -25,7 +25,7 @@ def _seen(member, width, i, r):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def alike_sums(member, width, scale, start, stop, p, r, counted, o):  # type: ignore[no-untyped-def]
+def alike_sums(member, width, scale, start, stop, p, r, counted, o):
     """o (SUMS,) += Q, and where they are counted E and E_xi."""
     sum_x = zero()
     sum_y = zero()
@@ -57,7 +57,7 @@ def alike_sums(member, width, scale, start, stop, p, r, counted, o):  # type: ig
 
 
 @kernel
-def alike_tangent(member, width, scale, start, stop, p, r, o):  # type: ignore[no-untyped-def]
+def alike_tangent(member, width, scale, start, stop, p, r, o):
     """o (SUMS,) += the part of K without damping: sum s (k b b^T + f B2), which is symmetric.
 
     With w = f/L, f B2 = w (g^T g - b b^T) - f (e . R q) on theta, g = [I, J R q].
@@ -90,7 +90,7 @@ def alike_tangent(member, width, scale, start, stop, p, r, o):  # type: ignore[n
 
 
 @kernel
-def alike_damping(member, width, scale, start, stop, p, r, o):  # type: ignore[no-untyped-def]
+def alike_damping(member, width, scale, start, stop, p, r, o):
     """o (SUMS,) += what damping adds: sum s c b (B2 xi')^T to K, C = sum s c b b^T."""
     kxx = zero()
     kxy = zero()
@@ -156,7 +156,7 @@ def alike_damping(member, width, scale, start, stop, p, r, o):  # type: ignore[n
 
 
 @kernel
-def alike_design(member, width, start, stop, p, r, u, weight, out):  # type: ignore[no-untyped-def]
+def alike_design(member, width, start, stop, p, r, u, weight, out):
     """out (M or more,) += f (b . u) + weight V of each member at s = 1; u (3,): virtual change of the relative pose.
 
     Padding in `out` becomes something that nobody reads.
@@ -169,7 +169,7 @@ def alike_design(member, width, start, stop, p, r, u, weight, out):  # type: ign
 
 
 @kernel
-def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ignore[no-untyped-def]
+def elastic_designs(member, width, start, stop, k, rel, u, p, out):
     """`alike_design` without damping, preload and energy, of stiffness k, summed over the poses of pair p.
 
     rel (S, n_pair, POSE), u (S, n_pair, 3).
@@ -188,7 +188,7 @@ def elastic_designs(member, width, start, stop, k, rel, u, p, out):  # type: ign
 
 
 @kernel
-def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):  # type: ignore[no-untyped-def]
+def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):
     """`alike_design` without energy at S poses, of R rows: members are looked at once for all, and the sums are those
     of each row by itself.
 
@@ -216,7 +216,7 @@ def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):  # ty
 
 
 @kernel
-def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, out):  # type: ignore[no-untyped-def]
+def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, out):
     """`elastic_designs` of R rows; arguments as of `alike_designs`."""
     poses = rel.shape[0]
     flat = out.reshape(out.size)
@@ -245,7 +245,7 @@ def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, o
 
 
 @kernel
-def far(member, width, start, stop, before, after):  # type: ignore[no-untyped-def]
+def far(member, width, start, stop, before, after):
     """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move."""
     near = zero() - np.inf
     for i in range(start, stop, lanes()):

@@ -15,7 +15,7 @@ NEAR = 1e-12
 
 
 @inline
-def crush_force(p, x, mode):  # type: ignore[no-untyped-def]
+def crush_force(p, x, mode):
     """f, f_x, f_xd, V, V_x; V is what it gives back on the way back, f^2 / (2 k)."""
     if mode == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0
@@ -27,7 +27,7 @@ def crush_force(p, x, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def crush_margin(p, x, xd, mode):
     """How far the mode is from its end: y or what is left to the plateau in m, or the rate in m/s."""
     if mode == CRUSHING:
         return p[3] * xd
@@ -38,7 +38,7 @@ def crush_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def crush_margin_slopes(p, x, xd, mode):
     """Slopes of the margin by x and xd."""
     if mode == CRUSHING:
         return 0.0, p[3]
@@ -48,7 +48,7 @@ def crush_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_slopes(p, place, x, mode):  # type: ignore[no-untyped-def]
+def crush_slopes(p, place, x, mode):
     """df/dp, dV/dp at a fixed set."""
     if mode == OPEN:
         return 0.0, 0.0
@@ -63,7 +63,7 @@ def crush_slopes(p, place, x, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_margin_slope(p, place, x, mode):  # type: ignore[no-untyped-def]
+def crush_margin_slope(p, place, x, mode):
     """Slope of the margin by a parameter, at a fixed set."""
     if mode == CRUSHING:
         return 0.0
@@ -77,7 +77,7 @@ def crush_margin_slope(p, place, x, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_set_slope(p, place):  # type: ignore[no-untyped-def]
+def crush_set_slope(p, place):
     """Slope by a parameter of the set that `crush_set` or `crush_first_set` makes at a given elongation."""
     if place == 2:
         return -p[3]
@@ -85,7 +85,7 @@ def crush_set_slope(p, place):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_next(p, x, mode):  # type: ignore[no-untyped-def]
+def crush_next(p, x, mode):
     """The mode to go to where this one's margin is negative; the force is continuous, so there is no second look."""
     if mode != ELASTIC:
         return ELASTIC
@@ -93,7 +93,7 @@ def crush_next(p, x, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
+def crush_start(p, x, xd, xdd):
     """The mode at the start, by the elongation; at the gap or beyond the plateau its rate decides, then the second."""
     y = p[3] * x - p[2]
     near = NEAR * max(1.0, abs(p[2]))
@@ -106,31 +106,31 @@ def crush_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def crush_set(p, x, old, new):  # type: ignore[no-untyped-def]
+def crush_set(p, x, old, new):
     """By how much the permanent set grows where mode `old` gives way to `new`: when crushing ends, y becomes F / k."""
     return p[3] * (p[3] * x - p[2] - p[1] / p[0]) if old == CRUSHING and new == ELASTIC else 0.0
 
 
 @inline
-def crush_first_set(p, x, mode):  # type: ignore[no-untyped-def]
+def crush_first_set(p, x, mode):
     """The permanent set of a member that begins in `mode` beyond the plateau and moves back: it has been crushed."""
     return max(p[3] * x - p[2] - p[1] / p[0], 0.0) * p[3] if mode == ELASTIC else 0.0
 
 
 @inline
-def crush_grazes(p, x, mode):  # type: ignore[no-untyped-def]
+def crush_grazes(p, x, mode):
     """As `gap_grazes`: a plateau that is only just reached leaves a set on one side and none on the other (2)."""
     return 2 if mode == ELASTIC and p[3] * x - p[2] > 0.5 * p[1] / p[0] else 0
 
 
 @inline
-def crush_makes_set(old, new):  # type: ignore[no-untyped-def]
+def crush_makes_set(old, new):
     """Whether the set is written down: where crushing ends."""
     return old == CRUSHING and new == ELASTIC
 
 
 @inline
-def crush_divides(p, x, xd, mode, near):  # type: ignore[no-untyped-def]
+def crush_divides(p, x, xd, mode, near):
     """Whether a member begins at its plateau and moves back: had it begun beyond, it would have been crushed."""
     return mode == ELASTIC and p[3] * xd <= 0.0 and abs(p[3] * x - p[2] - p[1] / p[0]) <= near
 

@@ -5,7 +5,7 @@ from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
-def cubic_force(p, x):  # type: ignore[no-untyped-def]
+def cubic_force(p, x):
     """f, f_x, f_xd, V, V_x."""
     square = x * x
     f = x * (p[0] + p[1] * square)
@@ -13,7 +13,7 @@ def cubic_force(p, x):  # type: ignore[no-untyped-def]
 
 
 @inline
-def cubic_slopes(p, place, x):  # type: ignore[no-untyped-def]
+def cubic_slopes(p, place, x):
     """df/dp, dV/dp."""
     if place == 0:
         return x, 0.5 * x * x

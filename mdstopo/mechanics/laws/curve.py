@@ -22,7 +22,7 @@ OVERLAP = 1e-8
 
 
 @inline
-def curve_force(p, x, mode, curves):  # type: ignore[no-untyped-def]
+def curve_force(p, x, mode, curves):
     """f, f_x, f_xd, V, V_x."""
     at = int(p[0])
     n = int(p[1])
@@ -53,7 +53,7 @@ def curve_force(p, x, mode, curves):  # type: ignore[no-untyped-def]
 
 
 @inline
-def curve_piece(p, x, curves):  # type: ignore[no-untyped-def]
+def curve_piece(p, x, curves):
     """The mode of the piece that x is in: 1 below the first knot, n + 1 from the last one on."""
     at = int(p[0])
     n = int(p[1])
@@ -69,7 +69,7 @@ def curve_piece(p, x, curves):  # type: ignore[no-untyped-def]
 
 
 @inline
-def curve_start(p, x, xd, xdd, curves):  # type: ignore[no-untyped-def]
+def curve_start(p, x, xd, xdd, curves):
     """The mode at the start; on a knot, the piece that it moves into."""
     ahead = xd if xd != 0.0 else xdd
     if ahead == 0.0:
@@ -78,7 +78,7 @@ def curve_start(p, x, xd, xdd, curves):  # type: ignore[no-untyped-def]
 
 
 @inline
-def curve_margin(p, x, mode, curves):  # type: ignore[no-untyped-def]
+def curve_margin(p, x, mode, curves):
     """How far x is from the end of the piece, m."""
     at = int(p[0])
     n = int(p[1])
@@ -88,7 +88,7 @@ def curve_margin(p, x, mode, curves):  # type: ignore[no-untyped-def]
 
 
 @inline
-def curve_margin_slopes(p, x, mode, curves):  # type: ignore[no-untyped-def]
+def curve_margin_slopes(p, x, mode, curves):
     """Slopes of the margin by x and xd."""
     at = int(p[0])
     n = int(p[1])

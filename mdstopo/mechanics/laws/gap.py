@@ -14,7 +14,7 @@ NEAR = 1e-12
 
 
 @inline
-def gap_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_force(p, x, xd, mode):
     """f, f_x, f_xd, V, V_x."""
     if mode == OPEN:
         return 0.0, 0.0, 0.0, 0.0, 0.0
@@ -26,13 +26,13 @@ def gap_force(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _clips(p):  # type: ignore[no-untyped-def]
+def _clips(p):
     """Whether there is a force, and clip guards its sign."""
     return p[4] != 0.0 and p[0] + p[1] > 0.0
 
 
 @inline
-def gap_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_margin(p, x, xd, mode):
     """How far the mode is from its end: y in m, or the unclipped force by k + c, which may be all damping."""
     y = p[3] * x - p[2]
     if mode == OPEN:
@@ -44,7 +44,7 @@ def gap_margin(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_margin_slopes(p, x, xd, mode):
     """Slopes of the margin by x and xd."""
     if mode == OPEN:
         return -p[3], 0.0
@@ -64,7 +64,7 @@ def gap_margin_slopes(p, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_slopes(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_slopes(p, place, x, xd, mode):
     """df/dp, dV/dp."""
     if mode == OPEN:
         return 0.0, 0.0
@@ -78,7 +78,7 @@ def gap_slopes(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_margin_slope(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
+def gap_margin_slope(p, place, x, xd, mode):
     """Slope of the margin by a parameter."""
     y = p[3] * x - p[2]
     unclipped = (p[0] * y + p[1] * p[3] * xd) / (p[0] + p[1]) if _clips(p) else y
@@ -91,7 +91,7 @@ def gap_margin_slope(p, place, x, xd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def _closed(p, y, rate):  # type: ignore[no-untyped-def]
+def _closed(p, y, rate):
     """Closed, or clipped where damping would reverse the force."""
     if _clips(p) and p[0] * y + p[1] * rate < 0.0:
         return CLIPPED
@@ -99,7 +99,7 @@ def _closed(p, y, rate):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_next(p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
+def gap_next(p, x, xd, xdd, mode):
     """The mode to go to where this one's margin is negative.
 
     Away from the gap its side decides, for a law may begin to act on a member that has moved meanwhile; at the gap
@@ -122,7 +122,7 @@ def gap_next(p, x, xd, xdd, mode):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
+def gap_start(p, x, xd, xdd):
     """The mode at the start; what rests exactly at the gap has reached it."""
     y = p[3] * x - p[2]
     rate = p[3] * xd
@@ -136,7 +136,7 @@ def gap_start(p, x, xd, xdd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def gap_grazes(p, mode):  # type: ignore[no-untyped-def]
+def gap_grazes(p, mode):
     """What a touch that only just happens (or not) does: 0 nothing, 1 the force at it is no smooth function, 2 the
     motion is none.
 

@@ -7,7 +7,7 @@ from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
-def given_force(value):  # type: ignore[no-untyped-def]
+def given_force(value):
     """f, f_x, f_xd, V, V_x."""
     return value, 0.0, 0.0, 0.0, 0.0
 

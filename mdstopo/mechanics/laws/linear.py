@@ -5,14 +5,14 @@ from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
-def linear_force(p, x, xd):  # type: ignore[no-untyped-def]
+def linear_force(p, x, xd):
     """f, f_x, f_xd, V, V_x."""
     pull = p[0] * x
     return pull + p[1] * xd + p[2], p[0], p[1], 0.5 * pull * x, pull
 
 
 @inline
-def linear_slopes(p, place, x, xd):  # type: ignore[no-untyped-def]
+def linear_slopes(p, place, x, xd):
     """df/dp, dV/dp."""
     if place == 0:
         return x, 0.5 * x * x
@@ -22,7 +22,7 @@ def linear_slopes(p, place, x, xd):  # type: ignore[no-untyped-def]
 
 
 @inline
-def linear_unstretched(p):  # type: ignore[no-untyped-def]
+def linear_unstretched(p):
     """The preload."""
     return abs(p[2])
 

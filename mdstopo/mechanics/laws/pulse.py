@@ -8,14 +8,14 @@ from mdstopo.mechanics.laws.kernels import LawKernels
 
 
 @inline
-def pulse_force(p, t):  # type: ignore[no-untyped-def]
+def pulse_force(p, t):
     """f, f_x, f_xd, V, V_x."""
     s = t - p[2]
     return p[0] * math.exp(-min(p[1] * min(s * s, 1e300), 745.0)), 0.0, 0.0, 0.0, 0.0
 
 
 @inline
-def pulse_slopes(p, place, t):  # type: ignore[no-untyped-def]
+def pulse_slopes(p, place, t):
     """df/dp, dV/dp."""
     s = t - p[2]
     share = math.exp(-min(p[1] * min(s * s, 1e300), 745.0))
@@ -44,7 +44,7 @@ def pulse_landings(record: PulseLaw, fine: bool) -> list[float]:
 
 
 @inline
-def pulse_unstretched(p):  # type: ignore[no-untyped-def]
+def pulse_unstretched(p):
     """The peak."""
     return abs(p[0])
 

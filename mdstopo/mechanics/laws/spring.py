@@ -36,12 +36,12 @@ ZERO_LENGTH_SQUARED = 1e-30
 
 
 @inline
-def _inverse_length(r2):  # type: ignore[no-untyped-def]
+def _inverse_length(r2):
     return 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
 
 
 @inline
-def _elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-def]
+def _elongation(rx, ry, r2, y, ux, uy, free, excess):
     """`elongation` in numbers, without a branch."""
     x = r2 * y - free
     squares = excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))
@@ -50,7 +50,7 @@ def _elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped
 
 
 @part
-def hardly_moved(r, near):  # type: ignore[no-untyped-def]
+def hardly_moved(r, near):
     """Whether a pose r (POSE,) is so near home that members would lose digits in a difference of lengths.
 
     near (2,): a row of `scene.model.Model.near`. Beyond it, elongations from displacements are no better.
@@ -59,7 +59,7 @@ def hardly_moved(r, near):  # type: ignore[no-untyped-def]
 
 
 @part
-def elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-def]
+def elongation(rx, ry, r2, y, ux, uy, free, excess):
     """Delta = L - l0 of members with r, r^2, 1/L and u, what r has changed by since home; excess: L0^2 - l0^2.
 
     L^2 - l0^2 = excess + u . (2 r - u) has all digits of u, and one step of Newton's method for
@@ -73,7 +73,7 @@ def elongation(rx, ry, r2, y, ux, uy, free, excess):  # type: ignore[no-untyped-
 
 
 @inline
-def elongation_of(rx, ry, length, ux, uy, free, excess):  # type: ignore[no-untyped-def]
+def elongation_of(rx, ry, length, ux, uy, free, excess):
     """`elongation` of one member."""
     u2 = ux * ux + uy * uy
     if u2 < length * length:
@@ -82,7 +82,7 @@ def elongation_of(rx, ry, length, ux, uy, free, excess):  # type: ignore[no-unty
 
 
 @part
-def elastic_force(member, width, scale, start, stop, r, close):  # type: ignore[no-untyped-def]
+def elastic_force(member, width, scale, start, stop, r, close):
     """Return Q (3 numbers) and E of the undamped springs from start to stop at the relative pose r (POSE,).
 
     member (6 width or more,): the rows behind each other, width of each; scale (stop or more,): k; close: whether
@@ -104,7 +104,7 @@ def elastic_force(member, width, scale, start, stop, r, close):  # type: ignore[
 
 
 @part
-def seen_members(member, width, i, r, close):  # type: ignore[no-untyped-def]
+def seen_members(member, width, i, r, close):
     """R q, r, |r|^2, 1/L and Delta of the members from i on."""
     u = load(member, 2 * width + i)
     v = load(member, 3 * width + i)
@@ -125,7 +125,7 @@ def seen_members(member, width, i, r, close):  # type: ignore[no-untyped-def]
 
 
 @part
-def elastic_tangent(member, width, scale, start, stop, r, close):  # type: ignore[no-untyped-def]
+def elastic_tangent(member, width, scale, start, stop, r, close):
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K; arguments as of `elastic_force`.
 
     The lengths of the next members are found while these are summed: one chain of operations from coordinates to sums
@@ -179,7 +179,7 @@ def elastic_tangent(member, width, scale, start, stop, r, close):  # type: ignor
 
 
 @member_kernel
-def viscous_force(px, py, qx, qy, l0, excess, k, damping, preload, r):  # type: ignore[no-untyped-def]
+def viscous_force(px, py, qx, qy, l0, excess, k, damping, preload, r):
     """Return Q, E and E_xi of a tile of springs with damping or preload."""
     sum_x = 0.0
     sum_y = 0.0
@@ -214,7 +214,7 @@ def viscous_force(px, py, qx, qy, l0, excess, k, damping, preload, r):  # type: 
 
 
 @member_kernel
-def viscous_tangent(px, py, qx, qy, l0, excess, k, damping, preload, r):  # type: ignore[no-untyped-def]
+def viscous_tangent(px, py, qx, qy, l0, excess, k, damping, preload, r):
     """Return Q, E, E_xi, K (nine, by rows) and the upper triangle of C of a tile of general springs."""
     vx = r[4]
     vy = r[5]
@@ -318,7 +318,7 @@ def viscous_tangent(px, py, qx, qy, l0, excess, k, damping, preload, r):  # type
 
 
 @kernel
-def elastic_design(px, py, qx, qy, l0, excess, k, pose, u, out):  # type: ignore[no-untyped-def]
+def elastic_design(px, py, qx, qy, l0, excess, k, pose, u, out):
     """Add sum_j f_i (b_i . u_j) of each undamped spring at pose (m, POSE) j to out.
 
     u (m, 3): virtual changes of the relative pose.
@@ -337,14 +337,14 @@ def elastic_design(px, py, qx, qy, l0, excess, k, pose, u, out):  # type: ignore
 
 
 @kernel
-def elastic_work(x, y, v, w, free, excess, pose, u):  # type: ignore[no-untyped-def]
+def elastic_work(x, y, v, w, free, excess, pose, u):
     """Delta (b . u) of the members with P = (x, y), Q = (v, w) and these free lengths at one pose."""
     force, rx, ry, moment = elastic_parts(x, y, v, w, free, excess, pose)
     return force * (rx * u[0] + ry * u[1] + moment * u[2])
 
 
 @kernel
-def elastic_parts(x, y, v, w, free, excess, pose):  # type: ignore[no-untyped-def]
+def elastic_parts(x, y, v, w, free, excess, pose):
     """Of `elastic_work`: Delta / L, and L b, with which it is Delta / L (L b . u)."""
     c = pose[2]
     s = pose[3]
@@ -360,7 +360,7 @@ def elastic_parts(x, y, v, w, free, excess, pose):  # type: ignore[no-untyped-de
 
 
 @member_kernel
-def viscous_design(px, py, qx, qy, l0, excess, k, damping, preload, r, u, out):  # type: ignore[no-untyped-def]
+def viscous_design(px, py, qx, qy, l0, excess, k, damping, preload, r, u, out):
     """Add f_i (b_i . u) of each general spring to out; u is a virtual change of the relative pose."""
     dx = r[0]
     dy = r[1]
@@ -393,7 +393,7 @@ def viscous_design(px, py, qx, qy, l0, excess, k, damping, preload, r, u, out): 
 
 
 @member_kernel
-def stored_energy(px, py, qx, qy, l0, excess, k, r, weight, out):  # type: ignore[no-untyped-def]
+def stored_energy(px, py, qx, qy, l0, excess, k, r, weight, out):
     """Add weight V_i = weight k_i Delta_i^2 / 2 of each spring to out."""
     dx = r[0]
     dy = r[1]
@@ -415,7 +415,7 @@ def stored_energy(px, py, qx, qy, l0, excess, k, r, weight, out):  # type: ignor
 
 
 @kernel
-def shortest_in(px, py, qx, qy, dx, dy, c, s):  # type: ignore[no-untyped-def]
+def shortest_in(px, py, qx, qy, dx, dy, c, s):
     """Smallest length in the tile, m."""
     found = zero() - np.inf
     for i in range(0, px.shape[0], lanes()):
@@ -428,7 +428,7 @@ def shortest_in(px, py, qx, qy, dx, dy, c, s):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def meeting_in(px, py, qx, qy, l0, k, preload, before, after):  # type: ignore[no-untyped-def]
+def meeting_in(px, py, qx, qy, l0, k, preload, before, after):
     """First member that carries a force and whose ends meet between two relative poses; else -1."""
     for i in range(px.shape[0]):
         if k[i] * l0[i] == preload[i]:
@@ -448,7 +448,7 @@ def meeting_in(px, py, qx, qy, l0, k, preload, before, after):  # type: ignore[n
 
 
 @kernel
-def passing_in(px, py, qx, qy, l0, k, preload, before, after, least):  # type: ignore[no-untyped-def]
+def passing_in(px, py, qx, qy, l0, k, preload, before, after, least):
     """First member whose ends pass between two relative poses, much nearer than they move, under a force; else -1.
 
     least: of the force at no length, N for each metre that the ends move.

@@ -24,7 +24,7 @@ from mdstopo.mechanics.laws.sums import upper_triangle
 
 
 @kernel
-def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
+def _seen(ax, ay, room, j):
     """r, L^2 and 1/L of the members of row j."""
     rx = ax + room[j, 0]
     ry = ay + room[j, 1]
@@ -33,7 +33,7 @@ def _seen(ax, ay, room, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
+def begin_rows(px, py, width, dx, dy, room):
     """e of each row."""
     for j in range(room.shape[0]):
         room[j, 0] = dx - px[j * width]
@@ -41,7 +41,7 @@ def begin_rows(px, py, width, dx, dy, room):  # type: ignore[no-untyped-def]
 
 
 @part
-def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):  # type: ignore[no-untyped-def]
+def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):
     """Return Q (3 numbers) and E.
 
     As in `spring.elastic_tangent`, the lengths of the next row (after the last, of the next columns' first) are found
@@ -82,7 +82,7 @@ def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room
 
 
 @part
-def turned_columns(qx, qy, i, c, s):  # type: ignore[no-untyped-def]
+def turned_columns(qx, qy, i, c, s):
     """a of the columns from i on."""
     u = load(qx, i)
     v = load(qy, i)
@@ -90,7 +90,7 @@ def turned_columns(qx, qy, i, c, s):  # type: ignore[no-untyped-def]
 
 
 @part
-def moved_columns(qx, qy, i, r):  # type: ignore[no-untyped-def]
+def moved_columns(qx, qy, i, r):
     """2 u and u^2 of the columns from i on: what r has changed by since home, alike in all rows."""
     x, y = turned_columns(qx, qy, i, r[12], r[13])
     x += r[10]
@@ -99,7 +99,7 @@ def moved_columns(qx, qy, i, r):  # type: ignore[no-untyped-def]
 
 
 @part
-def _stretch(seen, moved, l0, excess, at, close):  # type: ignore[no-untyped-def]
+def _stretch(seen, moved, l0, excess, at, close):
     """Delta of the members at a place (`spring.elongation`); close: whether bodies have hardly moved, so that u < r."""
     rx, ry, r2, y = seen
     x = r2 * y - l0
@@ -111,7 +111,7 @@ def _stretch(seen, moved, l0, excess, at, close):  # type: ignore[no-untyped-def
 
 
 @part
-def _weight(energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-untyped-def]
+def _weight(energy, seen, moved, k, l0, excess, at, close):
     """w of a member, and twice the energy with it."""
     stretch = _stretch(seen, moved, l0, excess, at, close)
     w = k * stretch
@@ -119,13 +119,13 @@ def _weight(energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-u
 
 
 @part
-def no_members(nothing):  # type: ignore[no-untyped-def]
+def no_members(nothing):
     """Sums over the members of a column: w, w r, and of g n n^T xx, xy and the trace; of none."""
     return nothing, nothing, nothing, nothing, nothing, nothing
 
 
 @part
-def add_member(own, rx, ry, y, w, g):  # type: ignore[no-untyped-def]
+def add_member(own, rx, ry, y, w, g):
     """The sums with a member more; y = 1/L."""
     own_w, own_x, own_y, gxx, gxy, trace = own
     nx = rx * y
@@ -135,7 +135,7 @@ def add_member(own, rx, ry, y, w, g):  # type: ignore[no-untyped-def]
 
 
 @part
-def no_columns(nothing):  # type: ignore[no-untyped-def]
+def no_columns(nothing):
     """Sums over columns: -Q, w and w a, and xx, xy, yy, xt, yt, tt of what K has besides these; of none."""
     return (
         (nothing, nothing, nothing),
@@ -145,7 +145,7 @@ def no_columns(nothing):  # type: ignore[no-untyped-def]
 
 
 @part
-def add_column(sums, ax, ay, own):  # type: ignore[no-untyped-def]
+def add_column(sums, ax, ay, own):
     """The sums with a column more, whose members are summed in `own`."""
     (sum_x, sum_y, sum_t), (sum_w, sum_wx, sum_wy), (kxx, kxy, kyy, kxt, kyt, ktt) = sums
     w, x, y, gxx, gxy, trace = own
@@ -167,14 +167,14 @@ def add_column(sums, ax, ay, own):  # type: ignore[no-untyped-def]
 
 
 @part
-def force_and_tangent(sums):  # type: ignore[no-untyped-def]
+def force_and_tangent(sums):
     """Q and the upper triangle of K."""
     (sum_x, sum_y, sum_t), weights, tangent = sums
     return (-total(sum_x), -total(sum_y), -total(sum_t)), upper_triangle(*tangent, *weights)
 
 
 @part
-def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):  # type: ignore[no-untyped-def]
+def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):
     """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
 
     Ahead of its sums as in `grid_force`.
@@ -207,7 +207,7 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, ro
 
 
 @part
-def _add(own, energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no-untyped-def]
+def _add(own, energy, seen, moved, k, l0, excess, at, close):
     """The sums of a column, and the energy, with a member more."""
     rx, ry, r2, y = seen
     w, energy = _weight(energy, seen, moved, k, l0, excess, at, close)
@@ -216,7 +216,7 @@ def _add(own, energy, seen, moved, k, l0, excess, at, close):  # type: ignore[no
 
 
 @kernel
-def _seen_at(turned, room, j, m):  # type: ignore[no-untyped-def]
+def _seen_at(turned, room, j, m):
     """r, L^2 and 1/L of the members of row j at pose m."""
     rx = load(turned[m, 0], 0) + room[j, m, 0]
     ry = load(turned[m, 1], 0) + room[j, m, 1]
@@ -225,19 +225,19 @@ def _seen_at(turned, room, j, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _moved_at(turned, m):  # type: ignore[no-untyped-def]
+def _moved_at(turned, m):
     """What `moved_columns` gave at pose m."""
     return load(turned[m, 2], 0), load(turned[m, 3], 0), load(turned[m, 4], 0)
 
 
 @part
-def _work(seen, moved, along, l0, excess, at, close):  # type: ignore[no-untyped-def]
+def _work(seen, moved, along, l0, excess, at, close):
     """f/k b . u = Delta/L r . (u + e x u_theta), of which the last are `along` (2,); of no length, r is nothing."""
     return _stretch(seen, moved, l0, excess, at, close) * seen[3] * (seen[0] * along[2] + seen[1] * along[3])
 
 
 @part
-def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, u, weight, room, turned, out):  # type: ignore[no-untyped-def]
+def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, u, weight, room, turned, out):
     """Add sum_j f_i (b_i . u_j) and sum_e weight_e V_i of each spring to out: f, b at the first poses, V at the others.
 
     pose (poses, POSE), close (poses,) of `spring.hardly_moved`, u (m, 3), weight (poses - m,). Room: room (rows,
@@ -288,7 +288,7 @@ def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, 
 
 
 @kernel
-def grid_shortest(px, py, qx, qy, width, dx, dy, c, s):  # type: ignore[no-untyped-def]
+def grid_shortest(px, py, qx, qy, width, dx, dy, c, s):
     """Smallest length in whole rows, m."""
     found = zero() - np.inf
     for i in range(0, width, lanes()):

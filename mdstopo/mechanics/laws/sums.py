@@ -5,7 +5,7 @@ from mdstopo.compiler.vector import total
 
 
 @part
-def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):  # type: ignore[no-untyped-def]
+def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):
     """xx, xy, yy, xt, yt, tt of K from vectors: their own sums, and those of w and w a, alike for all laws."""
     whole = total(w)
     return (
@@ -19,7 +19,7 @@ def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):  # type: ignore[no-untype
 
 
 @part
-def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
+def add_forces(found, counted, out):
     """Add Q and E of undamped springs to out (SUMS,); counted: whether theirs is energy that is looked at."""
     for i in range(3):
         out[i] += found[i]
@@ -30,7 +30,7 @@ def add_forces(found, counted, out):  # type: ignore[no-untyped-def]
 
 
 @part
-def add_tangent(found, out):  # type: ignore[no-untyped-def]
+def add_tangent(found, out):
     """Add the upper triangle xx, xy, yy, xt, yt, tt of K to out (SUMS,)."""
     kxx, kxy, kyy, kxt, kyt, ktt = found
     out[7] += kxx

@@ -63,18 +63,18 @@ for _law in LAWS.values():
 
 
 @chosen(LISTED, lambda each: each.force, inline)
-def law(code, p, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
+def law(code, p, x, xd, mode, t, value, curves):
     """f, f_x, f_xd, V, V_x."""
     return np.nan, np.nan, np.nan, np.nan, np.nan  # inertial laws have no place here
 
 
 @chosen(LISTED, lambda each: each.slopes, inline)
-def _own_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
+def _own_slopes(code, p, place, x, xd, mode, t, value, curves):
     return np.nan, np.nan
 
 
 @inline
-def law_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[no-untyped-def]
+def law_slopes(code, p, place, x, xd, mode, t, value, curves):
     """df/dp, dV/dp by the parameter at a place of the law's row, or by the free length; not of inertial laws."""
     if place == FREE_LENGTH:
         _, f_x, _, _, pull = law(code, p, x, xd, mode, t, value, curves)
@@ -83,13 +83,13 @@ def law_slopes(code, p, place, x, xd, mode, t, value, curves):  # type: ignore[n
 
 
 @chosen(LISTED, lambda each: each.unstretched, inline)
-def law_unstretched(code, p):  # type: ignore[no-untyped-def]
+def law_unstretched(code, p):
     """The largest force by the law's parameters that does not come from elongation, N."""
     return 0.0
 
 
 @chosen(LISTED, lambda each: True if each.signal else None, inline)
-def law_is_given(code):  # type: ignore[no-untyped-def]
+def law_is_given(code):
     """Whether the force is given over time."""
     return False
 
@@ -98,36 +98,36 @@ def law_is_given(code):  # type: ignore[no-untyped-def]
 
 
 @chosen(LISTED, lambda each: None if each.modes is None else each.modes.switches or True, inline)
-def law_switches(code, p):  # type: ignore[no-untyped-def]
+def law_switches(code, p):
     """Whether the law has more than one mode."""
     return False
 
 
 @chosen(LISTED, lambda each: (each.modes is not None and each.modes.pieces) or None, inline)
-def law_has_pieces(code):  # type: ignore[no-untyped-def]
+def law_has_pieces(code):
     """Whether modes are pieces of one smooth function: steps need not end where a mode does."""
     return False
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin, inline)
-def law_margin(code, p, x, xd, mode, curves):  # type: ignore[no-untyped-def]
+def law_margin(code, p, x, xd, mode, curves):
     """How far the mode is from its end; infinite where a law has one mode only."""
     return np.inf
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin_slopes, inline)
-def law_margin_slopes(code, p, x, xd, mode, curves):  # type: ignore[no-untyped-def]
+def law_margin_slopes(code, p, x, xd, mode, curves):
     """Slopes of the margin by x and xd."""
     return 0.0, 0.0
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin_slope, inline)
-def _own_margin_slope(code, p, place, x, xd, mode, curves):  # type: ignore[no-untyped-def]
+def _own_margin_slope(code, p, place, x, xd, mode, curves):
     return 0.0
 
 
 @inline
-def law_margin_slope(code, p, place, x, xd, mode, curves):  # type: ignore[no-untyped-def]
+def law_margin_slope(code, p, place, x, xd, mode, curves):
     """Slope of the margin by the parameter at a place of the law's row, or by the free length."""
     if place == FREE_LENGTH:
         by_x, _ = law_margin_slopes(code, p, x, xd, mode, curves)
@@ -136,19 +136,19 @@ def law_margin_slope(code, p, place, x, xd, mode, curves):  # type: ignore[no-un
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.next_mode, inline)
-def law_next(code, p, x, xd, xdd, mode, curves):  # type: ignore[no-untyped-def]
+def law_next(code, p, x, xd, xdd, mode, curves):
     """The mode to go to where the margin is used up."""
     return mode
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.first_mode, inline)
-def law_start(code, p, x, xd, xdd, curves):  # type: ignore[no-untyped-def]
+def law_start(code, p, x, xd, xdd, curves):
     """The mode at the start of the motion."""
     return 0
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.grazes, inline)
-def law_grazes(code, p, x, mode):  # type: ignore[no-untyped-def]
+def law_grazes(code, p, x, mode):
     """What a margin that is only just used up (or not) at x does to derivatives: nothing 0, force 1, motion 2."""
     return 0
 
@@ -157,36 +157,36 @@ def law_grazes(code, p, x, mode):  # type: ignore[no-untyped-def]
 
 
 @chosen(LISTED, lambda each: True if each.permanent_set else None, inline)
-def law_remembers(code):  # type: ignore[no-untyped-def]
+def law_remembers(code):
     """Whether members have a permanent set."""
     return False
 
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.growth, inline)
-def law_set(code, p, x, old, new):  # type: ignore[no-untyped-def]
+def law_set(code, p, x, old, new):
     """By how much the permanent set of a member grows where one mode gives way to another."""
     return 0.0
 
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.first, inline)
-def law_first_set(code, p, x, mode):  # type: ignore[no-untyped-def]
+def law_first_set(code, p, x, mode):
     """The permanent set of a member that begins in a mode."""
     return 0.0
 
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.is_made, inline)
-def law_makes_set(code, old, new):  # type: ignore[no-untyped-def]
+def law_makes_set(code, old, new):
     """Whether a permanent set is written down where one mode gives way to another."""
     return False
 
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.slope, inline)
-def _own_set_slope(code, p, place):  # type: ignore[no-untyped-def]
+def _own_set_slope(code, p, place):
     return 0.0
 
 
 @inline
-def law_set_slope(code, p, place):  # type: ignore[no-untyped-def]
+def law_set_slope(code, p, place):
     """Slope of a permanent set, where it is made, by the parameter at a place of the law's row, or by the free length.
 
     At fixed places of the member's ends.
@@ -197,7 +197,7 @@ def law_set_slope(code, p, place):  # type: ignore[no-untyped-def]
 
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.divides, inline)
-def law_divides(code, p, x, xd, mode, near):  # type: ignore[no-untyped-def]
+def law_divides(code, p, x, xd, mode, near):
     """Whether a member begins, within `near` m, with a permanent set that depends on parameters on one side only."""
     return False
 
