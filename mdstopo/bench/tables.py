@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from statistics import median
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,5 @@ def significant(value: float, digits: int = 3) -> str:
 
 def spread(values: Sequence[float], digits: int = 3) -> str:
     """Median (smallest - largest)."""
-    from statistics import median
-
     low, high = significant(min(values), digits), significant(max(values), digits)
     return f"{significant(median(values), digits)} ({low} - {high})"

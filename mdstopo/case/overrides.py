@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -116,8 +117,6 @@ def as_yaml(value: Any) -> str:
         return "{" + ", ".join(f"{as_yaml(str(k))}: {as_yaml(v)}" for k, v in value.items()) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(as_yaml(part) for part in value) + "]"
-    import json
-
     return json.dumps(str(value))
 
 

@@ -16,6 +16,7 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case
 from mdstopo.case.words import number_text, shown
 from mdstopo.engine import Evaluator
+from mdstopo.general.settle import settle
 from mdstopo.general.start import size_of
 
 if TYPE_CHECKING:
@@ -92,8 +93,6 @@ def _followed(
     driver: GeneralDriver, case: Case, begin: FloatArray, end: FloatArray, q: FloatArray
 ) -> FloatArray | None:
     """The equilibrium (n,) of the design `end`, followed from that of `begin`, q; None where it jumps or ends."""
-    from mdstopo.general.settle import settle
-
     size, share, step = size_of(case), 0.0, FIRST
     while share < 1.0:
         step = min(step, 1.0 - share)

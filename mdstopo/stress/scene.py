@@ -1,5 +1,6 @@
 """What a scene of the stress test is: a case, what is compared with what, and how it has to end."""
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -47,8 +48,6 @@ class Scene:
     @property
     def text(self) -> str:
         """The case as a file; JSON is YAML."""
-        import json
-
         return json.dumps({"format": 1, "title": self.checks, **self.data}, indent=2) + "\n"
 
 

@@ -1,5 +1,6 @@
 """Very many periods: what is kept of the energy, and how late the motion is."""
 
+import json
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -30,8 +31,6 @@ def swing(periods: int, x: float = 1.0, v: float = AMPLITUDE, **solver: Any) -> 
 
 def _drift(periods: int, solver: dict[str, Any], case: "Case") -> tuple[float, str]:
     """Drift of the energy over pieces that each start where the one before ended; the phase at the end in words."""
-    import json
-
     x, v, done, worst = 1.0, AMPLITUDE, 0, 0.0
     while done < periods:
         count = min(PIECE, periods - done)
