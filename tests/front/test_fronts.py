@@ -111,14 +111,16 @@ def test_a_front_that_is_killed_goes_on_from_its_file():
     whole = subprocess.run([*command, "--out", "whole.h5", "--workers", "1"], check=False)
     assert whole.returncode == 0
     process = subprocess.Popen([*command, "--out", "parts.h5", "--workers", "1"])
+
+    def solved():
+        return len(contents("parts.h5").get("pareto/tasks/key", ())) if Path("parts.h5").exists() else 0
+
     end = time.monotonic() + 60
-    while not Path("parts.h5").exists() and process.poll() is None and time.monotonic() < end:
+    while not solved() and process.poll() is None and time.monotonic() < end:
         time.sleep(0.01)
     process.kill()
     process.wait()
-    if "pareto/tasks/key" not in contents("parts.h5"):
-        pytest.fail("nothing was written before the kill")
-    before = len(contents("parts.h5")["pareto/tasks/key"])
+    before = solved()
     again = subprocess.run([*command, "--out", "parts.h5", "--resume", "--workers", "2"], check=False)
     assert again.returncode == 0
     assert len(contents("parts.h5")["pareto/tasks/key"]) > before > 0
