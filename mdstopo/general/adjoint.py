@@ -147,8 +147,7 @@ def sweep(
 
 @kernel
 def row_cotangents(tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work):
-    """The cotangents of the state at which a row of `extremes` is read, and its derivatives by the design at that
-    state.
+    """Cotangents of the state at which a row of `extremes` is read, and its derivatives by the design at that state.
 
     Constant:
       tag, tables: the integrator (`duties`) and its coefficients.
