@@ -22,7 +22,7 @@ FOLLOWED = 12
 #: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
 #: pass, with those alone that come near the largest
 AT_ONCE = 2**21
-#: by how much, relative, the samples of a force may lie beside it
+#: error of the samples of a force, relative: they lie on the steps' quintic
 BESIDE = 0.02
 
 

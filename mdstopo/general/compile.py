@@ -272,7 +272,10 @@ def _reach(
     pairs: dict[tuple[int, int], int],
     members: dict[str, Any],
 ) -> FloatArray:
-    """Largest distance of an attachment point of the second body of each pair from its centre of mass, m."""
+    """(n_pair,): the largest distance of an attachment point from its centre of mass, m; 1 where it would be zero.
+
+    Of members those on the second body of the pair count, of joints and bushings those on both.
+    """
     reach = np.zeros(len(pairs))
     member = members["member"]
     for pair, start, stop, *_ in members["block"].tolist():

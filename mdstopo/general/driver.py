@@ -202,7 +202,7 @@ class GeneralDriver:
         return self.visit(j, places, exact, count, rates=rates)[2]
 
     def _grazing(self) -> int:
-        """A member (padded) that grazes where something is looked at, or -1."""
+        """A member (padded) that grazes (`events`), so that the motion or a row found has no derivative; or -1."""
         if self.where[2] >= 0:
             return int(self.where[2])
         if self.events == 0:

@@ -359,7 +359,7 @@ def switch_any(model, segment, strength, rel, q, v, a, who, slopes):
 def switch_of(model, segment, strength, q, v, a, i, k, slopes):
     """The mode that a member goes to, s'^2 / (2 |s''|), and -s_x / s'.
 
-    The second, how far its margin s goes beyond zero (m), is told of margins of Delta alone; it is infinite for others.
+    The second, how far its margin s goes beyond zero (m), is given for margins of Delta alone; infinite for others.
     The third is s_p / s' by the permanent set p, which shortens Delta.
 
     Constant:
