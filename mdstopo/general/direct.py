@@ -341,13 +341,14 @@ def push(
       tag, tables: the integrator (`duties`) and its coefficients.
       ints, floats: the packed scene (`model.pack_general`).
       alpha (N,): the design.
-      limits, room, room_ints: the history of steps, as of `track.carve_track`.
+      limits: steps allowed, and the sizes of the history's arrays (`track.carve_track`).
       count, j: how many steps there are; the response.
       integral: 0: the row is meant; 1: the integral of g_j; 2: that of its square.
       sweeps: above 0, by the iterative method, with so many sweeps at most.
       row (COLUMNS,), across: as of `adjoint.row_cotangents`; not read for integrals.
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
+      room, room_ints: the history of steps; a partial step may come behind the others.
       strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       out (N + P,): the derivative by alpha, then by parameters. padded (M_padded + P,): scratch.
