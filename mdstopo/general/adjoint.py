@@ -1,9 +1,9 @@
 """The exact gradient of a discretised objective of a general scene: one reverse sweep over steps, joints and events.
 
-A row of `extremes` (or an integral over all stages) pulls on states, accelerations and multipliers. What pulls on
-accelerations and multipliers goes through the transposed balance and leaves a virtual displacement z; so does every
-stage of every step on the way back. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum f_i (b_i . T z). An event on
-the way changes the cotangents by saltation (`events`); a peak at an event is not stationary and adds
+A row of `extremes` (or an integral over all stages) has slopes by states, accelerations and multipliers: the first
+cotangents. Those of accelerations and multipliers go through the transposed balance and leave a virtual displacement z;
+so does every stage of every step on the way back. Then dG/dalpha_i = dg/dalpha_i - mu alpha_i^(mu-1) sum f_i (b_i .
+T z). An event on the way changes the cotangents by saltation (`events`); a peak at an event is not stationary and adds
 (dg/dt) dt_e/dalpha; an integral of what jumps there adds (g- - g+) dt_e/dalpha.
 """
 
@@ -31,25 +31,33 @@ from mdstopo.general.responses import (
 from mdstopo.general.track import copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
 
-#: share of the value inside a step below which an integrand has no direction of its own, or may have turned round; and
-#: by which two forces may differ where the largest changes hands
+#: an integrand that is a norm has no direction at a stage where it is below ASIDE of its value inside the step; below
+#: VANISHING, any that has kinks may have turned round; and two forces may differ by VANISHING, relative, where one
+#: takes over from the other as the largest
 ASIDE, VANISHING = 1e-6, 0.02
 
 
 @kernel
 def free_only(model, x):
-    """What is driven does not answer: its entries of x (n,) become zero."""
+    """Set the entries of driven coordinates in x (n,) to zero: no design changes where these are."""
     for i in range(model.driven.shape[0]):
         x[model.driven[i]] = 0.0
 
 
 @kernel
 def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, out):
-    """Pull cotangents behind the events of a state back to before them (saltation), in place.
+    """Pull cotangents behind the events of a state back to before them (saltation transposed), in place.
 
-    bar_set (slots,): those of the sets (`permanent_sets`). drops (E,): by how much an integrand falls at each event
-    (`event_drops`), or no rows. out (M_padded + P,): what parameters do to the events' times and to the sets made there
-    is added to it, behind the members.
+    Constant:
+      model: the compiled scene.
+      track, state: the history of steps, and the number of the state.
+      drops (E,): by how much an integrand falls at each event (`event_drops`); no rows where no integral is meant.
+    In and out:
+      lam_q, lam_v (n,): cotangents of the state's coordinates and velocities.
+      bar_set (slots,): those of the permanent sets (`permanent_sets`).
+      strength (3, columns): state of the members; modes are not what they were before the call.
+    Out:
+      out (M_padded + P,): what parameters do to the events' times and to the sets made there, added behind the members.
     """
     last = track.index[state, 3]
     first = track.index[state - 1, 3] if state > 0 else last
@@ -81,10 +89,26 @@ def sweep(
     tag, model, tables, strength, track, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops, looked,
     square, desk, out, work,
 ):  # fmt: skip
-    """Pull cotangents of fraction c of step w's motion back to the start; every stage adds to out (M_padded,).
+    """Pull cotangents of fraction c of step w's motion back to the start, and gather the gradient at every stage.
 
-    bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots): explicit cotangents of all stages (no rows: none);
-    bar_set, drops as of `through_events`; looked, square: j and square of `parameters.add_times`.
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, count: the history of steps, and how many steps it has.
+      w, c: the step to begin with, and the fraction of it at which the cotangents are given.
+      bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of q, v, a and of the multipliers of all stages; no rows
+        where there are none.
+      sets_bar (S, slots): explicit cotangents of the permanent sets at all stages.
+      drops (E,): as `event_drops` returns them; no rows where no integral is meant.
+      looked, square: the response whose integral (or that of its square) is meant, -1 for none.
+    In and out:
+      lam_q, lam_v (n,): cotangents of coordinates and velocities; at the end those of the start.
+      bar_set (slots,): cotangents of the permanent sets.
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out:
+      out (M_padded + P,): the derivative by alpha^mu and, behind the members, by parameters, added to.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
     """
     n = lam_q.shape[0]
     z = np.empty((1, 17, n))
@@ -123,11 +147,26 @@ def sweep(
 
 @kernel
 def row_cotangents(tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work):
-    """What a row pulls on the state where it is read: bars (3, n), q and v (a is used up); and on the members there.
+    """Cotangents of the state at which a row of `extremes` is read, and its derivatives by the design at that state.
 
-    across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector pulls,
-    the direction held. Returns the step (-1: the start) and its fraction to which the cotangents belong; out
-    (M_padded,) and bar_set (slots,) are set.
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      count, j: how many steps there are; the response.
+      row (COLUMNS,): the row.
+      across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector is
+        differentiated, the direction held.
+    In and out:
+      track: the history of steps; a partial step is kept behind the others where the integrator needs one.
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out:
+      bars (3, n): cotangents of q and v; its last row is overwritten.
+      bar_set (slots,): cotangents of the permanent sets.
+      out (M_padded + P,): derivative by alpha^mu and, behind the members, by parameters, at that state.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+
+    Returns the step (-1: the start) and its fraction to which the cotangents belong.
     """
     n = model.mass.shape[0]
     n_row = model.size[0]
@@ -153,7 +192,7 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, across, d
     restore_modes(track, track.index[k, 3], strength)
     rate = row[4]
     if across:
-        at_end = c <= 0.0 or c >= 1.0  # elsewhere nobody asks
+        at_end = c <= 0.0 or c >= 1.0  # a row inside a step needs no rate
         rate = across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam) if at_end else 0.0
     balance(model, strength, segment, t, q, v, np.bool_(True), desk, a, lam)
     work[FORCES] += 1
@@ -214,9 +253,23 @@ def _first_event(track, state):
 
 @kernel
 def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):
-    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu into out.
+    """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu.
 
-    start (n,), or no length: the cotangent of the start's positions comes out.
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, count: the history of steps, and how many steps it has.
+      j, square: the response; whether its square is integrated.
+      gradient: whether the derivative is asked for.
+    In and out:
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out:
+      out (M_padded + P,): the derivative, behind the members by parameters.
+      start (n,), or no length: cotangents of the start's positions.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+
+    Returns the integral ([g] s, or [g]^2 s).
     """
     n = model.mass.shape[0]
     stages = track.index[count, 0] if gradient else 0
@@ -243,7 +296,16 @@ def integral_gradient(tag, model, tables, strength, track, count, j, square, gra
 
 @kernel
 def event_drops(model, strength, track, count, j, square, desk):
-    """(E,): g_j (or its square) before each event, less that after it; the integral feels when the event is."""
+    """(E,): g_j (or its square) before each event, less that after it: the slope of an integral by the event's time.
+
+    Constant:
+      model: the compiled scene.
+      track, count: the history of steps, and how many steps it has.
+      j, square: the response; whether its square is meant.
+    In and out:
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      desk: workspace of a balance, overwritten.
+    """
     events = track.index[count, 3]
     drops = np.zeros(events)
     values = np.empty(2)
@@ -264,7 +326,20 @@ def event_drops(model, strength, track, count, j, square, desk):
 
 @kernel
 def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows):
-    """g_j at a stage, its slopes into own (3, n) and own_rows (n_row,), and whose force it is; who < 0: the largest."""
+    """g_j at a stage, and its slopes.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment: segment of `model.times` in which the stage lies.
+      track, at: the history of steps, and the number of the stage.
+      j, who: the response; the member whose force is meant, where it is one of members, below 0 the largest.
+    Out:
+      own (3, n), own_rows (n_row,): slopes by q, v, a and by the multipliers.
+      desk: workspace of a balance, overwritten.
+
+    Returns g_j, and the member.
+    """
     stage = track.stage[at]
     t = track.when[at]
     if model.response[j, 0] == ENERGY:
@@ -285,8 +360,21 @@ def one_sided(
 
     An absolute value or a norm that all but vanishes at the stage may have turned round there, and the largest force
     may be another's, by what the stage is off by; then the integrand is followed as the smooth function that it is
-    inside. In: who, value at the stage; mine, size, slopes (3, n), rows (n_row,) at the stage `inside`. In place: own
-    (3, n), own_rows (n_row,). Returns the value, whose force it is, and whether it has turned round.
+    inside.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment: segment of `model.times` in which the step lies.
+      track, at, inside: the history of steps, the number of the stage, and of one inside the step.
+      j, who, value: the response; at the stage its member and its value.
+      mine, size, slopes (3, n), rows (n_row,): of the stage inside its member, its value, and its slopes by q, v, a and
+        by the multipliers.
+    In and out:
+      own (3, n), own_rows (n_row,): the slopes at the stage.
+      desk: workspace of a balance, overwritten.
+
+    Returns the value, whose force it is, and whether it has turned round.
     """
     same = np.bool_(False)
     n = model.mass.shape[0]
@@ -334,6 +422,7 @@ def one_sided(
 
 @kernel
 def _turn(slopes, rows):
+    """Change the sign of slopes (3, n) and rows (n_row,), in place."""
     for i in range(slopes.shape[0]):
         for d in range(slopes.shape[1]):
             slopes[i, d] = -slopes[i, d]
@@ -345,10 +434,23 @@ def _turn(slopes, rows):
 def integral_cotangents(
     tag, model, tables, strength, track, count, j, square, bars, rows_bar, sets_bar, desk, out, work
 ):
-    """The integral over time of g_j (or of its square), by the weights of the stages.
+    """The integral over time of g_j (or of its square) by the weights of the stages, and its cotangents of all stages.
 
-    Out, unless bars has no rows: bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots), its cotangents of the
-    stages' states, accelerations, multipliers and sets; out (M_padded,), its explicit derivative by alpha^mu.
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, count: the history of steps, and how many steps it has.
+      j, square: the response; whether its square is integrated.
+    In and out:
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out; no derivative is formed where bars has no rows:
+      bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots): cotangents of the stages' q, v, a, of their multipliers
+        and of the permanent sets; zeros before the call.
+      out (M_padded + P,): the explicit derivative by alpha^mu and by parameters.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+
+    Returns the integral ([g] s, or [g]^2 s).
     """
     n = model.mass.shape[0]
     n_row = model.size[0]

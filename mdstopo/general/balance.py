@@ -53,7 +53,7 @@ DESK = (
 
 
 class Desk:
-    """Made in kernels only, by `make_desk`."""
+    """The workspace of a balance, whose arrays DESK names; made in kernels only, by `make_desk`."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
@@ -63,7 +63,7 @@ bundle(Desk, DESK)
 
 @kernel
 def make_desk(model):
-    """Room for one balance."""
+    """A workspace for one balance."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
@@ -139,7 +139,15 @@ def joint_state(model, q, v, desk):
 
 @kernel
 def joint_slopes(model, q, v, a, lam, desk):
-    """G_q and G_v of all joints, and their stiffness added to K."""
+    """G_q and G_v of all joints, and their stiffness added to K.
+
+    Constant:
+      model: the compiled scene.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      lam (n_row,): multipliers (N, N m).
+    In and out:
+      desk: the workspace, with the bodies turned (`forces.turn_bodies`); by_q, by_v are set, k is added to.
+    """
     w = desk.own[0]
     wd = desk.own[1]
     wdd = desk.own[2]
@@ -157,10 +165,19 @@ def joint_slopes(model, q, v, a, lam, desk):
 
 @kernel
 def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
-    """Factorise W(w_q, w_v), or its transpose, for `solve_unknowns`; k, c, mass (n_pair, 6, 6), turn (n,).
+    """Factorise W(w_q, w_v), or its transpose, for `solve_unknowns`.
 
-    The joints' Phi_q, G_q and G_v are those on the desk. Returns the place of the unknown at which it is singular, or
-    -1.
+    Constant:
+      model: the compiled scene.
+      k, c (n_pair, 6, 6): stiffness and damping of the balance; read where a weight is not zero, as turn is.
+      turn (n,): slopes of the turning loads by the angles of their bodies.
+      mass (n_pair, 6, 6): mass of the inerters (kg, kg m, kg m^2).
+      w_q, w_v: weights of K with G_q (s^2), and of C with G_v (s).
+      transposed: whether the transpose is meant.
+    In and out:
+      desk: the workspace, with the joints' Phi_q, G_q and G_v; the factors come onto it.
+
+    Returns the place of the unknown at which the matrix is singular, or -1.
     """
     tangent = w_q != 0.0 or w_v != 0.0
     alone = not tangent and desk.switches[DIAGONAL] != 0
@@ -230,7 +247,12 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
 
 @kernel
 def put(band, half, scale, row, column, value, transposed):
-    """band[row, column] += value in scaled unknowns, or the mirrored entry."""
+    """Add a value to an entry of the matrix, or to the mirrored one.
+
+    band (places, 3 half + 1): the banded matrix, added to; half: half width of the band.
+    scale (places,): of the unknowns. row, column: places of the entry.
+    value: in unscaled unknowns. transposed: whether the mirrored entry is meant.
+    """
     value *= scale[row] * scale[column]
     if transposed:
         band[column, row - column + half] += value
@@ -274,10 +296,22 @@ def solve_unknowns(model, desk, a, lam):
 
 @kernel
 def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):
-    """Accelerations a (n,) and multipliers lam (n_row,) at one state, whose driven part is put in place first.
+    """Accelerations and multipliers at one state.
 
-    With `tangent`, desk.k, .c, .turn, .by_q, .by_v hold the tangents of the whole balance (with the switch APART those
-    of members and loads alone). Returns the place of the unknown at which the joints are singular, or -1.
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment, t: segment of `model.times`, and time in it (s).
+      tangent: whether desk.k, .c, .turn, .by_q, .by_v are to hold the tangents of the whole balance (with the switch
+        APART those of members and loads alone).
+    In and out:
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s); their driven part is put in place first.
+      desk: the workspace; forces, poses, the joints' rows and the factors stay on it.
+    Out:
+      a (n,): accelerations (m/s^2, rad/s^2).
+      lam (n_row,): multipliers (N, N m).
+
+    Returns the place of the unknown at which the joints are singular, or -1.
     """
     n = q.shape[0]
     drive_state(model, segment, t, q, v)
@@ -324,7 +358,19 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):
 
 @kernel
 def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):
-    """bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y; z (n,): driven parts 0."""
+    """Cotangents of a state from those of its balance, which z and y hold.
+
+    bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y.
+
+    Constant:
+      model: the compiled scene.
+      desk: the workspace, with G_q and G_v.
+      k, c (n_pair, 6, 6): stiffness and damping of the balance. turn (n,): slopes of the turning loads.
+      z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
+        the joints' rows.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+    """
     pair = model.pair
     joint = model.joint
     pull_matrices(pair, k, z, bar_q)
@@ -356,6 +402,7 @@ def pull_matrices(pair, k, z, bar):
 
 @part
 def _pull_matrix(pair, p, m, z, bar):
+    """bar (n,) -= m^T z of pair p, m (6, 6)."""
     one = 3 * pair[p, 0]
     two = 3 * pair[p, 1]
     z0 = z[one]
@@ -378,7 +425,17 @@ def pull_turns(turn, z, bar):
 
 @kernel
 def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):
-    """`pull_back` without the joints: k and c (n_pair, 6, 6) of pairs that carry more than these."""
+    """`pull_back` without the joints, over the pairs between which members, bushings or contacts act.
+
+    Constant:
+      model: the compiled scene.
+      desk: the workspace (`carries`, `switches`).
+      k, c (n_pair, 6, 6): stiffness and damping of these pairs, without the joints'. turn (n,): slopes of the turning
+        loads.
+      z (n,): virtual displacements; driven parts are 0.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+    """
     damped = desk.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
         if desk.carries[p] != 0:
@@ -390,7 +447,20 @@ def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):
 
 @kernel
 def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):
-    """`pull_back` of the joints alone, at a state with a (n,), lam (n_row,) of bodies that are turned on the desk."""
+    """`pull_back` of the joints alone.
+
+    Constant:
+      model: the compiled scene.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      lam (n_row,): multipliers (N, N m).
+      z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
+        the joints' rows.
+    In and out:
+      desk: the workspace, with the bodies turned (`forces.turn_bodies`); k of the joints' pairs and by_q, by_v are
+        overwritten.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+    """
     w = desk.own[0]
     wd = desk.own[1]
     wdd = desk.own[2]
@@ -432,7 +502,18 @@ def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):
 
 @kernel
 def push_forward(model, desk, k, c, turn, dq, dv, force, row):
-    """force (n,) -= K dq + C dv (turning loads with their sign), row (n_row,) -= G_q dq + G_v dv."""
+    """What changes of a state do to the right side of the balance.
+
+    force -= K dq + C dv (turning loads with their sign), row -= G_q dq + G_v dv.
+
+    Constant:
+      model: the compiled scene.
+      desk: the workspace, with G_q and G_v.
+      k, c (n_pair, 6, 6): stiffness and damping of the balance. turn (n,): slopes of the turning loads.
+      dq, dv (n,): changes of coordinates and velocities.
+    Out:
+      force (n,), row (n_row,): changes of the right side, added to.
+    """
     damped = desk.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
         for i in range(6):

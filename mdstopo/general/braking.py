@@ -21,8 +21,8 @@ ROUNDING = 1e-15
 #: twentieth of what is braked. An error may stay below every tolerance where it grows, as long as rounding holds it at
 #: nothing; derivatives grow all the same
 BRAKED = 5.0
-#: steps in a row that are held short by that, after which a motion is given up that would need more than HOPELESS times
-#: the steps that it may take
+#: after HELD steps in a row that are held short by that, a motion is given up if at this length it needs more than
+#: HOPELESS times the steps that it may take
 HELD, HOPELESS = 1000, 10.0
 
 
@@ -33,8 +33,18 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken
     What counts is the error of T / (mu N) = tanh(slide / slip), of which 1 / (slip (1 + (slide / slip)^2)) is the slope
     and more, taken where the step is slowest.
 
-    vectors, s, a (s, n): of the method and the step of length h; start, ends (2, n): its states; noise (n_pair,): of
-    relative positions, m; shaken: of the members' forces, N; tolerance: of a step. NaN where one appears.
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      vectors: the plane VECTORS of the method's table (`integrators.runge_kutta_tables`).
+      s, h: number of stages; length of the step (s).
+      start, ends (2, n): q, v at both ends of the step.
+      a (s or more, n): accelerations of its stages.
+      noise (n_pair,): what rounding leaves of relative positions (m).
+      shaken: what it leaves of the members' forces (N).
+      tolerance: error that a step may have, relative.
+
+    Returns the error, 0 where no contact drags, NaN where one appears.
     """
     first = model.member.shape[1]
     rows = np.empty((2, 6))
@@ -82,11 +92,21 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken
 
 @kernel
 def brake_rate(model, strength, q, v, enough, desk):
-    """The fastest rate, 1/s, at which closed contacts brake velocities at a state, at most; and which brakes most.
+    """The fastest rate at which closed contacts brake velocities at a state, at most; and which of them brakes most.
 
     Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, damping c; with rows B and the mobility
     G = B M^-1 B^T, in which joints hold what they hold, the rates are the eigenvalues of G D. Their sum is the trace;
-    where that is more than `enough`, it is the largest row of |G| D, with the joints as factorised on the desk.
+    where that is more than `enough`, it is the largest row of |G| D.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      enough: rate up to which the trace will do (1/s).
+    In and out:
+      desk: the workspace, with the joints as factorised at the state.
+
+    Returns the rate (1/s), and the column of `strength` of the contact that brakes most, or -1.
     """
     n = q.shape[0]
     first = model.member.shape[1]

@@ -22,21 +22,25 @@ FOLLOWED = 12
 #: members times places that are looked at in one pass over the motion, for the memory they take; more need a second
 #: pass, with those alone that come near the largest
 AT_ONCE = 2**21
-#: by how much, relative, the samples of a force may lie beside it
+#: error of the samples of a force, relative: they lie on the steps' quintic
 BESIDE = 0.02
 
 
 def compete(kind: int, reduction: str) -> bool:
-    """Whether the members behind a response of this kind compete, reduced so."""
+    """Whether the members behind a response of this kind compete for its extreme, with this reduction."""
     return kind == MEMBER_FORCE and reduction in ("max", "max_abs", "final")
 
 
 def members_peaks(
     driver: "GeneralDriver", j: int, t: FloatArray, final: bool, window: float, most: int
 ) -> list[FloatArray]:
-    """The peaks of the members' forces that response j looks at, as rows of `extremes`; t (m + 1,): the steps' times.
+    """The peaks of the members' forces that response j looks at, as rows of `extremes`.
 
-    final: their values at the end instead. window, most: as of `evaluation.Rows`.
+    driver: with a finished run. j: the response.
+    t (m + 1,): the steps' times (s).
+    final: whether the values at the end are meant instead of peaks.
+    window: how far below the highest a peak may be, relative to it.
+    most: how many peaks are wanted at most; it decides which members are followed, the rows may be more.
     """
     count = len(t) - 1
     if final:
@@ -87,9 +91,14 @@ def _least(top: FloatArray, window: float, most: int) -> float:
 def compare(
     driver: "GeneralDriver", j: int, places: FloatArray, who: IndexArray, count: int, exact: bool = False
 ) -> tuple[FloatArray, FloatArray]:
-    """The largest |f*| of every member (count of members,), and f* with rate of some (C, K, 2), at places (K, 2).
+    """The largest |f*| of every member (N), and f* with its rate of some (N, N/s).
 
-    exact: as of `GeneralDriver.visit`.
+    driver: with a finished run. j: the response, which names the group. count: how many steps the run has.
+    places (K, 2): steps and fractions of them.
+    who (C,): the members whose force and rate are asked for; none costs least.
+    exact: whether states inside steps are the integrator's own, not those of the quintic through both ends.
+
+    Returns (members of the group,) and (C, K, 2).
     """
     top, seen = np.zeros(members_of(driver, j)), np.zeros((len(who), len(places), 2))
     driver.entry.compare(

@@ -162,7 +162,7 @@ def _refuse_redundant(case: Case, load_case: LoadCase, redundant: tuple[str, ...
 
 
 def _stands_otherwise(case: Case, load_case: LoadCase) -> bool:
-    """Whether a motion makes the bodies of a load case start elsewhere than members were measured."""
+    """Whether a load case has its bodies elsewhere at the start than where the members' lengths were measured."""
     places = ([(*body.position, body.angle) for body in bodies] for bodies in (case.bodies, load_case.bodies))
     return next(places) != next(places)
 
@@ -237,6 +237,7 @@ def _members(
 def _bushings(
     case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], home: FloatArray
 ) -> tuple[IndexArray, FloatArray]:
+    """The pair (n_bushing,) and the parameters (n_bushing, 12) of each bushing (`GeneralModel.bushing`)."""
     where, rows = [], []
     for bushing in case.bushings:
         a, b = (index[name] for name in bushing.bodies)
@@ -251,6 +252,7 @@ def _bushings(
 def _joints(
     case: Case, index: dict[str, int], pairs: dict[tuple[int, int], int], home: FloatArray
 ) -> tuple[IndexArray, FloatArray]:
+    """Codes, bodies, pair and rows (n_joint, 5), and parameters (n_joint, 12), of each joint (`GeneralModel.joint`)."""
     codes, rows = [], []
     for joint in case.joints:
         a, b = (index[name] for name in joint.bodies)
@@ -270,7 +272,10 @@ def _reach(
     pairs: dict[tuple[int, int], int],
     members: dict[str, Any],
 ) -> FloatArray:
-    """Largest distance of an attachment point of the second body of each pair from its centre of mass, m."""
+    """(n_pair,): the largest distance of an attachment point from its centre of mass, m; 1 where it would be zero.
+
+    Of members those on the second body of the pair count, of joints and bushings those on both.
+    """
     reach = np.zeros(len(pairs))
     member = members["member"]
     for pair, start, stop, *_ in members["block"].tolist():
@@ -311,6 +316,7 @@ def _loads(
 
 
 def _responses(case: Case, responses: tuple[Response, ...], index: dict[str, int]) -> tuple[IndexArray, FloatArray]:
+    """The columns (n_resp, 6) and numbers (n_resp, 4) of each response (`GeneralModel.response`)."""
     codes, rows = [], []
     groups = [group.name for group in case.members]
     named = [joint.name for joint in case.joints]
@@ -345,6 +351,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
 
 
 def _skipped(case: Case, load_case: LoadCase, damped: bool) -> tuple[str, ...]:
+    """What is left out of the computation because nothing needs it, and why, in words."""
     notes = []
     if not damped:
         notes.append("velocity terms: nothing depends on velocity")

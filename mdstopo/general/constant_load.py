@@ -39,9 +39,22 @@ def hold(
     out,
     work,
 ):
-    """With z of no length: matrix (n + n_row, n + n_row) and right (n + n_row,) = (g_q, g_lam) at a row of `extremes`.
+    """The linear system of constant dynamic loading at a row of `extremes`; or, once it is solved, the gradient.
 
-    Else out (N,) = the gradient with that z (n,). Room: padded (M_padded,).
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      ints, floats: the packed scene (`model.pack_general`).
+      alpha (N,): the design.
+      limits, room, room_ints: the history of steps, as of `track.carve_track`.
+      count, j: how many steps there are; the response.
+      row (COLUMNS,): the row, as of `extremes`.
+      z (n,): the virtual displacement that solves the transposed system; no length: the system is asked for.
+    In and out:
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out:
+      matrix (n + n_row, n + n_row), right (n + n_row,): the system, and (g_q, g_lam); where z has no length.
+      out (N,): the gradient by alpha; where z has a length. padded (M_padded,): scratch for it.
+      work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)

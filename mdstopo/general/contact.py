@@ -23,7 +23,18 @@ from mdstopo.mechanics.geometry import turned_body
 
 @kernel
 def contact_rows(model, j, q, v, rows, rates):
-    """along, height of contact j; rows (2, 6) = their slopes by the coordinates of both bodies, rates (2, 6) = d/dt."""
+    """Where the point of a contact is as seen from the edge, with slopes.
+
+    Constant:
+      model: the compiled scene.
+      j: the contact.
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      rows (2, 6): slopes of along and of height by the coordinates of both bodies.
+      rates (2, 6): their derivatives by time.
+
+    Returns along, height (m).
+    """
     p = model.contact_pair[j]
     c = model.contact[j]
     a = 3 * model.pair[p, 0]
@@ -65,7 +76,17 @@ def contact_rows(model, j, q, v, rows, rates):
 
 @kernel
 def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):
-    """f (n,) += the forces of all closed contacts; on demand k_out, c_out (n_pair, 6, 6) -= dF/dq, dF/dv."""
+    """The forces of all closed contacts, and on demand their tangents.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      tangent: whether tangents are asked for.
+    Out, all added to:
+      f (n,): forces and moments on the coordinates (N, N m).
+      k_out, c_out (n_pair, 6, 6): stiffness -dF/dq and damping -dF/dv of the pairs.
+    """
     rows = np.empty((2, 6))
     rates = np.empty((2, 6))
     first = model.member.shape[1]
@@ -120,7 +141,18 @@ def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):
 
 @kernel
 def contact_switch(model, strength, q, v, a, j, slopes):
-    """As `events.switch_of`, of contact j: the next mode, how far it goes beyond; slopes (2, n)."""
+    """As `events.switch_of`, of a contact: its next mode, and how far its margin goes beyond zero.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      j: the contact.
+    Out:
+      slopes (2, n): s_q / s', s_v / s' of its margin s.
+
+    Returns the mode and the distance (m; infinite where the margin depends on the rate of the height).
+    """
     n = q.shape[0]
     p = model.contact_pair[j]
     c = model.contact[j]

@@ -23,10 +23,23 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 @kernel
 def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out):
-    """out (4 n + s n, 4 n + 1): what unit changes of q, v, the carried rows, and each stage's force, do at the end.
+    """What unit changes of the state at the start of step w, and of the force at each of its stages, do at its end.
 
-    The last column is what they do to an integral with cotangents bars (s, 3, n), rows_bar (s, n_row) of the stages (no
-    rows: none).
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, w: the history of steps, and the step.
+      c: fraction of the step at which it is taken to end.
+      sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
+      bars (s, 3, n), rows_bar (s, n_row): cotangents of an integral by q, v, a and the multipliers of the stages; no
+        rows where there is none.
+    Out:
+      out (4 n + s n or more, 4 n + 1): a row for each unit change of q, of v, of the two vectors that the integrator
+        carries from step to step, and of each stage's force; its columns are what becomes of q, v and the carried
+        vectors, and of the integral.
+      desk: workspace of a balance, overwritten.
+
+    Returns whether all sweeps settled.
     """
     n = model.mass.shape[0]
     s = track.index[w + 1, 0] - track.index[w, 0]
@@ -73,7 +86,17 @@ def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out)
 
 @kernel
 def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):
-    """f_i at unit strength of member i of block k, and B_i over its bodies into row (6,)."""
+    """The force f_i of a member at unit strength (N), and its row B_i.
+
+    Constant:
+      model: the compiled scene.
+      k, i: the block, and the member (padded).
+      segment, t: segment of `model.times`, and time in it (s).
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+    Out:
+      row (6,): B_i over the coordinates of both bodies. row_rate (6,): its derivative by time; not set for an inerter.
+    """
     if model.block[k, 3] == INERTER:
         return inerter_force(model, k, i, q, v, a, row)
     x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
@@ -87,10 +110,24 @@ def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):
 def through_step(
     tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, sets_bar, desk, column, sets, matrix, spare
 ):
-    """Carry column (M_padded, 4 n + 1), derivatives by every alpha^mu, through step w to its fraction c.
+    """Carry the derivatives of the state by every alpha^mu, and by parameters, through step w to its fraction c.
 
-    The last column sums up the derivative of an integral (`step_map`). sets (slots, M_padded): those of the sets
-    (`permanent_sets`), whose part in the integral's stages is sets_bar (s, slots).
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, w, c: the history of steps, the step, and the fraction of it.
+      sweeps, bars (s, 3, n), rows_bar (s, n_row): as of `step_map`.
+      sets (slots, M_padded + P): derivatives of the permanent sets (`permanent_sets`).
+      sets_bar (s, slots): cotangents of an integral by the sets at the stages; no rows where there is none.
+    In and out:
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      column (M_padded + P, 4 n + 1): derivatives of q, v and the two carried vectors; the last column sums up that of
+        the integral.
+    Out:
+      matrix (4 n + s n or more, 4 n + 1): of `step_map`. spare (4 n + 1,): scratch.
+      desk: workspace of a balance, overwritten.
+
+    Returns whether all sweeps settled.
     """
     n = model.mass.shape[0]
     o = track.index[w, 0]
@@ -142,9 +179,19 @@ def through_step(
 
 @kernel
 def _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare):
-    """The rows of `column` behind the members, derivatives by parameters, through the map of step w.
+    """Carry the derivatives by parameters, the rows of `column` behind the members, through step w.
 
-    sets as of `through_step`, by_set (slots, 4 n + 1): what they do at the end.
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      track, w: the history of steps, and the step.
+      sets (slots, M_padded + P): derivatives of the permanent sets. by_set (slots, 4 n + 1): what unit sets do at the
+        end.
+      matrix (4 n + s n or more, 4 n + 1): of `step_map`.
+    In and out:
+      column (M_padded + P, 4 n + 1): as of `through_step`.
+    Out:
+      spare (4 n + 1,): scratch.
     """
     n = model.mass.shape[0]
     o = track.index[w, 0]
@@ -187,7 +234,17 @@ def _parameters_through_step(model, strength, track, w, column, sets, by_set, ma
 
 @kernel
 def shift_times(model, track, strength, count, state, j, square, column):
-    """What shifting the times of laws that begin or end at a state does to the derivatives by them (`parameters`)."""
+    """What shifting the times of laws that begin or end at a state does to the derivatives by them (`parameters`).
+
+    Constant:
+      model: the compiled scene.
+      track, count: the history of steps, and how many steps it has.
+      state: number of the state.
+      j, square: the response whose integral (or that of its square) is meant, -1 for none.
+    In and out:
+      strength (3, columns): state of the members; modes are not what they were before the call.
+      column (M_padded + P, 4 n + 1): as of `through_step`; velocities and the integral change.
+    """
     n = model.mass.shape[0]
     dv = np.empty(n)
     for e in range(model.varied.shape[0]):
@@ -203,10 +260,17 @@ def shift_times(model, track, strength, count, state, j, square, column):
 
 @kernel
 def jump(model, track, strength, count, state, column, sets, drops, j, square):
-    """Saltation of the derivatives at the events of a state; a step that follows makes its own carried rows.
+    """Saltation of the derivatives at the events of a state; a step that follows makes its own carried vectors.
 
-    sets as of `through_step`; drops as of `adjoint.through_events`: the last column, an integral's derivative, takes
-    them in. j, square: as of `parameters.time_jump`.
+    Constant:
+      model: the compiled scene.
+      track, count: the history of steps, and how many steps it has.
+      state: number of the state.
+      drops (E,): of `adjoint.event_drops`, which the derivative of the integral takes in; no rows where there is none.
+      j, square: the response whose integral (or that of its square) is meant, -1 for none.
+    In and out:
+      strength (3, columns): state of the members; modes are not what they were before the call.
+      column (M_padded + P, 4 n + 1), sets (slots, M_padded + P): as of `through_step`.
     """
     n = model.mass.shape[0]
     if state == 0:
@@ -271,11 +335,26 @@ def push(
     first,
     work,
 ):
-    """out (N,) = the derivative of one row of `extremes`, or of an integral, by alpha (N,), carried forward.
+    """The derivative of one row of `extremes`, or of an integral, by the design, carried forward with the motion.
 
-    Arguments as those of `look.pull`; first (M_padded, n), or no rows: derivatives of the start's positions.
-    sweeps > 0: by the iterative method, with so many sweeps at most; returns the step in which they did not settle,
-    or -1.
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      ints, floats: the packed scene (`model.pack_general`).
+      alpha (N,): the design.
+      limits: steps allowed, and the sizes of the history's arrays (`track.carve_track`).
+      count, j: how many steps there are; the response.
+      integral: 0: the row is meant; 1: the integral of g_j; 2: that of its square.
+      sweeps: above 0, by the iterative method, with so many sweeps at most.
+      row (COLUMNS,), across: as of `adjoint.row_cotangents`; not read for integrals.
+      first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
+    In and out:
+      room, room_ints: the history of steps; a partial step may come behind the others.
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out:
+      out (N + P,): the derivative by alpha, then by parameters. padded (M_padded + P,): scratch.
+      work (WORK,): counts of work, added to.
+
+    Returns the step in which the sweeps did not settle, or -1.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -346,9 +425,21 @@ def push(
 def follow(
     tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, first, work
 ):
-    """out (count + 1, N) = dg_j/dalpha at the start and at the end of every step, the time held fixed.
+    """dg_j/dalpha at the start and at the end of every step, the time held fixed; at events the values before them.
 
-    Arguments as those of `push`; who (count + 1,): the member looked at. At an event the values before it.
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      ints, floats: the packed scene (`model.pack_general`).
+      alpha (N,): the design.
+      limits, room, room_ints: the history of steps, as of `track.carve_track`.
+      count, j: how many steps there are; the response.
+      who (count + 1,): the member whose force is meant at each of these times.
+      first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
+    In and out:
+      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+    Out:
+      out (count + 1, N + P): the derivatives by alpha, then by parameters. padded (M_padded + P,): scratch.
+      work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)

@@ -44,7 +44,7 @@ from mdstopo.status import Status
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
-#: of what a reduction takes the peaks: of g, or of -g too; minima are looked for apart (`minima`)
+#: signs with which a reduction takes the peaks of g: those of g, or of -g too; minima are found in `minima`
 SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
 
 
@@ -61,7 +61,7 @@ class GeneralDriver:
         self.scene = scene
         self.method = method
         model = scene.model
-        #: the start that was assembled, where it was
+        #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
         self._packed = self.ints, self.floats = pack_general(model)
@@ -77,11 +77,11 @@ class GeneralDriver:
         self.strength = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
         self.found = np.zeros(count, dtype=np.int64)
-        #: of every response (`evaluation.Peak`)
+        #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
         self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
         self.where = np.full(3, -1, dtype=np.int64)
         n = len(model.mass)
-        #: what `visit` is given for one place, and `pull`
+        #: arrays for the results of `see_one`, and of `_pull`
         self._one = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
         self._pulled = np.zeros(n_design + varied)
         self._row_gradients = RowGradients(self)
@@ -116,16 +116,16 @@ class GeneralDriver:
         return self._entry
 
     def _make_room(self, steps: int, stages: int, events: int) -> None:
-        # factors are of use again where stages are no implicit ones and the mass is diagonal
+        # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
         factors = self.method.kind.explicit and not self._inertial
         self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, factors], dtype=np.int64)
         floats, ints = track_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
-        self.ready = Ready()  # what was prepared with the room as it was would keep it
+        self.ready = Ready()  # prepared calls hold the arrays of before
 
     def _make_rows(self, most: int) -> None:
-        """Arrays for so many peaks of each response; those of cones when they are first asked for."""
+        """Arrays for at most so many peaks of each response; that of `Peak.across` comes when it is first asked for."""
         count, length = len(self.scene.responses), len(self._pulled)
         self.rows = np.zeros((count, most, COLUMNS))
         self.gradients = np.zeros((count, most, length))
@@ -202,7 +202,7 @@ class GeneralDriver:
         return self.visit(j, places, exact, count, rates=rates)[2]
 
     def _grazing(self) -> int:
-        """A member (padded) that grazes where something is looked at, or -1."""
+        """A member (padded) that grazes (`events`), so that the motion or a row found has no derivative; or -1."""
         if self.where[2] >= 0:
             return int(self.where[2])
         if self.events == 0:
@@ -257,9 +257,17 @@ class GeneralDriver:
         who: int = -1,
         rates: bool = True,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """q, v, a (3, K, n), multipliers (K, n_row + n_driven) and (K, 3) value, rate, member at places (K, 2).
+        """States and a response anywhere on the motion.
 
+        j: the response; -1: states alone.
+        places (K, 2): steps and fractions of them.
+        exact: whether states inside steps are the integrator's own, not those of the quintic through both ends.
+        count: how many steps the run has.
+        steps: kept steps to look at instead of those of the last run.
         who: the member whose force is looked at; -1: at each place the one with the largest.
+        rates: whether rates are wanted; without, they may be meaningless.
+
+        Returns q, v, a (3, K, n), multipliers (K, n_row + n_driven), and (K, 3) value, rate, member.
         """
         model = self.scene.model
         packed, limits, room, room_ints, strength = (

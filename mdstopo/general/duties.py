@@ -1,20 +1,12 @@
 """What a method of integration does for those who look at its steps, chosen by its tag when a kernel is compiled.
 
-The tag is a tuple of zeros whose length says which method is meant.
+The tag is a tuple of zeros whose length says which method is meant. A method has six functions:
 
-1. `point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work) -> w`: the state at fraction c of
-   step k, inside it; with `keep` as an end from which the reverse sweep can start: of step w.
-2. `step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work)`: R cotangents
-   lam_q, lam_v (R, n) of the end of step w (each of its fraction c (R,) where that is below 1) pulled back to its
-   start, in place, with explicit ones of the stages, which are the same for all; z (R, s, n) are the virtual
-   displacements of the stages' balances. lam_x (R, 2, n): what a method carries from step to step beside the state.
-   What a stage needs is formed once for all R.
-3. `step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk)`: changes pushed
-   through step w, by fixed-point sweeps where sweeps > 0 (returns whether they settled), with forces (s, n) on its
-   stages; changes (s, 3, n) and rows (s, n_row) of the stages come out.
-4. `beside(tag, track, k, c, e, q, v, a, q_out, v_out)`: the motion a little later (e < 0: earlier) than at fraction c
-   of step k, where it is q, v, a; `derivatives(tag)`: how many derivatives of the motion are those of the balance.
-5. `weights_of(tag, model, tables, track, w, out)`: weights (s,) of the stages in the integral over step w.
+1. `point_of`: the state inside a step;
+2. `step_back`: a step of the reverse sweep;
+3. `step_forward`: changes pushed through a step;
+4. `beside`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
+5. `weights_of`: weights of a step's stages in an integral.
 """
 
 from collections.abc import Callable
@@ -33,32 +25,99 @@ DUTIES: dict[str, dict[int, Any]] = {
 
 
 def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
-    """Duty 1."""
+    """The state inside a step.
+
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      count: how many steps the run has.
+      k, c: the step, and a fraction of it above 0 and below 1.
+      keep: whether the state is to be an end from which the reverse sweep can start.
+    In and out:
+      track: the history of steps; with `keep` a partial step may come behind the others.
+      strength (3, columns): state of the members; where forces are summed, modes and sets are put to those of the step.
+    Out:
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+
+    Returns the step at whose end (or at whose fraction c, if it is k) the reverse sweep starts; k without `keep`.
+    """
     raise NotImplementedError
 
 
 def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
-    """Duty 2."""
+    """Pull R cotangents of the end of a step back to its start, in place; what a stage needs is formed once for all R.
+
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, w: the history of steps, and the step.
+      c (R,): the fraction of the step to which each cotangent belongs; 1: its end.
+      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, the same for all
+        R; no rows where there are none.
+    In and out:
+      lam_q, lam_v (R, n): cotangents of coordinates and velocities.
+      lam_x (R, 2, n): those of what the method carries from step to step beside the state.
+    Out:
+      z (R, s or more, n): the virtual displacements of the stages' balances.
+      y (n_row,): scratch.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+    """
     raise NotImplementedError
 
 
 def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
-    """Duty 3."""
+    """Push changes through a step.
+
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
+      sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
+      force (s, n): changes of the force at each stage.
+    In and out:
+      dq, dv (n,): changes of coordinates and velocities, of the start and then of the end.
+      dx (2, n): those of what the method carries from step to step beside the state.
+    Out:
+      changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
+      desk: workspace of a balance, overwritten.
+
+    Returns whether all sweeps settled.
+    """
     raise NotImplementedError
 
 
 def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
-    """Duty 4."""
+    """The motion a little later than at fraction c of step k.
+
+    Constant:
+      tag: the integrator.
+      track, k, c: the history of steps, the step, and a fraction of it.
+      e: how much later (s); below 0: earlier.
+      q, v, a (n,): coordinates, velocities, accelerations at c (m, rad; per s; per s^2).
+    Out:
+      q_out, v_out (n,): coordinates and velocities then.
+    """
     raise NotImplementedError
 
 
 def derivatives(tag):
-    """Duty 4."""
+    """How many derivatives of the method's motion are those of the balance: 1, velocities; 2, accelerations too."""
     raise NotImplementedError
 
 
 def weights_of(tag, model, tables, track, w, out):
-    """Duty 5."""
+    """Weights of the stages in the integral over a step.
+
+    Constant:
+      tag, tables: the integrator (`duties`) and its coefficients.
+      model: the compiled scene.
+      track, w: the history of steps, and the step.
+    Out:
+      out (s or more,): the weights (s).
+    """
     raise NotImplementedError
 
 
@@ -74,21 +133,37 @@ def _of(name: str, tag: Any) -> Any:
 
 @by_type(point_of)
 def _point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
+    """The integrator's own `point_of`, chosen by the type of tag when a kernel is compiled.
+
+    Types that make no difference: model, tables, strength, track, count, k, c, keep, desk, q, v, work.
+    """
     return _of("point_of", tag)
 
 
 @by_type(step_back)
 def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
+    """The integrator's own `step_back`, chosen by the type of tag when a kernel is compiled.
+
+    Types that make no difference: model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work.
+    """
     return _of("step_back", tag)
 
 
 @by_type(step_forward)
 def _step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
+    """The integrator's own `step_forward`, chosen by the type of tag when a kernel is compiled.
+
+    Types that make no difference: model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk.
+    """
     return _of("step_forward", tag)
 
 
 @by_type(beside)
 def _beside(tag, track, k, c, e, q, v, a, q_out, v_out):
+    """The integrator's own `beside`, chosen by the type of tag when a kernel is compiled.
+
+    Types that make no difference: track, k, c, e, q, v, a, q_out, v_out.
+    """
     return _of("beside", tag)
 
 
@@ -99,4 +174,8 @@ def _derivatives(tag):
 
 @by_type(weights_of)
 def _weights_of(tag, model, tables, track, w, out):
+    """The integrator's own `weights_of`, chosen by the type of tag when a kernel is compiled.
+
+    Types that make no difference: model, tables, track, w, out.
+    """
     return _of("weights_of", tag)

@@ -81,11 +81,20 @@ def smallest_margin(model, segment, strength, rel):
 
 @kernel
 def first_dip(model, segment, strength, rel0, rel1, h, parts):
-    """The earliest fraction of a step at which the cubic through a margin's values and rates at both ends has a
-    minimum below zero although both ends are not; 2 where there is none. For members that come and go within a step.
+    """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
 
-    Also the fraction of the lowest minimum that may be below zero in truth, and its value: parts (a number): of how
-    many parts of a step this is one, whose cubic the poses were taken from.
+    Looked for on the cubic through a margin's values and rates at both poses.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      rel0, rel1 (n_pair, POSE): relative poses at both ends.
+      h: time between them (s).
+      parts: of how many parts of a step this is one, whose cubic the poses were taken from.
+
+    Returns the earliest fraction at which a minimum is below zero, 2 where none is; the fraction of the lowest minimum
+    that may be below zero in truth, 2 where there is none; its value, infinite where there is none.
     """
     best = 2.0
     near = 2.0
@@ -188,10 +197,21 @@ def probes_needed(model, segment, rel0, rel1):
 
 @kernel
 def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):
-    """The earliest fraction of a step at which a member seems to leave its mode and come back before the end, or 2.
+    """Where in a step a member seems to leave its mode and come back before the end.
 
-    Looked for on the cubic through the states at both ends (n,), in as many parts as the motion asks for, and in each
-    part by `first_dip`. Also the fraction of the lowest margin that may be below zero in truth, or 2.
+    Looked for on the cubic through the states at both ends, in as many parts as the motion asks for, and in each part
+    by `first_dip`.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q0, v0, q1, v1 (n,): coordinates and velocities at both ends (m, rad; m/s, rad/s).
+      rel0, rel1 (n_pair, POSE): relative poses at both ends.
+      h: length of the step (s).
+      noise: how far below zero a margin is by rounding alone (m).
+
+    Returns the earliest fraction, or 2; and the fraction of the lowest margin that may be below zero in truth, or 2.
     """
     n = q0.shape[0]
     parts = probes_needed(model, segment, rel0, rel1)
@@ -228,9 +248,16 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):
 
 @inline
 def member_between(model, i, one, two, q, turn_one, turn_two):
-    """The arms p and q of member i of two bodies in global axes, its vector, its length and Delta.
+    """Where a member lies between two bodies.
 
-    turn_one, turn_two: of `turned_body`.
+    Constant:
+      model: the compiled scene.
+      i: the member (padded).
+      one, two: its bodies.
+      q (n,): coordinates (m, rad).
+      turn_one, turn_two: of `turned_body`, for each body.
+
+    Returns its arms p and q (px, py, qx, qy) and its vector (x, y) in global axes, its length, and Delta (m).
     """
     m = model.member
     ca, sa, ca_since, sa_since = turn_one
@@ -253,7 +280,15 @@ def member_between(model, i, one, two, q, turn_one, turn_two):
 
 @kernel
 def member_rows(model, p, i, q, v, row, row_rate):
-    """Delta, dDelta/dt, B (6,) and dB/dt (6,) of member i over the coordinates of its pair p."""
+    """Delta and dDelta/dt of a member (m, m/s), and its row of the compatibility matrix.
+
+    Constant:
+      model: the compiled scene.
+      p, i: the pair, and the member (padded).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      row, row_rate (6,): B and dB/dt over the coordinates of both bodies.
+    """
     one = model.pair[p, 0]
     two = model.pair[p, 1]
     a = 3 * one
@@ -288,9 +323,20 @@ def member_rows(model, p, i, q, v, row, row_rate):
 
 @kernel
 def switch_any(model, segment, strength, rel, q, v, a, who, slopes):
-    """Of member or contact `who`, whose margin is used up at poses rel: the mode it goes to, how far it goes beyond,
-    what a touch that only just happens does (`law_grazes`), -s_x / s' and by how much its permanent set grows; slopes
-    (2, n) as of `switch_of`.
+    """What becomes of a member or contact whose margin is used up.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      rel (n_pair, POSE): relative poses.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      who: the member or contact, as a column of `strength`.
+    Out:
+      slopes (2, n): s_q / s', s_v / s'; zero at a knot of a curve, whose time makes no difference.
+
+    Returns the mode it goes to, how far its margin goes beyond zero, what a touch that only just happens does
+    (`law_grazes`), -s_x / s' (`switch_of`), and by how much its permanent set grows (m).
     """
     old = int(strength[1, who])
     if who >= model.member.shape[1]:
@@ -311,9 +357,19 @@ def switch_any(model, segment, strength, rel, q, v, a, who, slopes):
 
 @kernel
 def switch_of(model, segment, strength, q, v, a, i, k, slopes):
-    """The mode that member i of block k goes to, s'^2 / (2 |s''|), and -s_x / s'; slopes (2, n) = s_q / s', s_v / s'.
+    """The mode that a member goes to, s'^2 / (2 |s''|), and -s_x / s'.
 
-    How far it goes is told of margins of Delta alone (infinite for others). A permanent set shortens Delta.
+    The second, how far its margin s goes beyond zero (m), is given for margins of Delta alone; infinite for others.
+    The third is s_p / s' by the permanent set p, which shortens Delta.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      i, k: the member (padded), and its block.
+    Out:
+      slopes (2, n): s_q / s', s_v / s'.
     """
     n = q.shape[0]
     p = model.block[k, 0]

@@ -17,16 +17,16 @@ from mdstopo.scene.model import FloatArray
 #: two members change hands there (`minima`), the other one and its share of the derivative
 TIME, VALUE, STEP, FRACTION, RATE, SIGN, WHO, OTHER, SHARE = range(9)
 COLUMNS = 9
-#: what stands for another member: there is none; there is none, and the value is a zero that stays one
+#: in column OTHER in place of a member: there is none; the value is a zero, and stays one for designs nearby
 NOBODY, ZERO = -1.0, -2.0
 #: samples of every step
 FRACTIONS = (0.0, 0.25, 0.5, 0.75, 1.0)
 LAST = len(FRACTIONS) - 1
 #: values or rates that differ by less than this, relative to the largest, differ by rounding
 ROUNDING = 1e-13
-#: rate, relative to the largest, that is none beside a step whose rate is one: a plateau's, which only rounding tilts
+#: a rate below this, relative to the largest, is that of a plateau, which only rounding tilts
 FLAT = 1e-9
-#: peaks nearer than this in time (relative to what was simulated) and value are one
+#: peaks nearer to each other than this in time (relative to what was simulated) and value are one
 RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 
 #: places (K, 2), exact -> (K, 3) value, rate, member
@@ -89,17 +89,28 @@ def ranked(rows: list[FloatArray], closeness: float, most: int, span: float) -> 
 
 
 def _row(samples: Samples, w: int, c: float, value: float, rate: float, sign: float, who: float) -> FloatArray:
+    """A row (COLUMNS,) at a place of the samples.
+
+    samples: of the response. w, c: step, and fraction of it. value, rate: of g there.
+    sign: 1 for a peak of g, -1 for one of -g. who: the member, or -1.
+    """
     time = samples.t[w + 1] if c >= 1.0 else samples.t[w] + c * (samples.t[w + 1] - samples.t[w])
     return row_of(float(time), value, w, c, rate, sign, who)
 
 
 def row_of(time: float, value: float, step: float, fraction: float, rate: float, sign: float, who: float) -> FloatArray:
-    """A row (COLUMNS,) of one member, or of a response that has none."""
+    """A row (COLUMNS,) of one member, or of a response that has none.
+
+    time (s), value, rate (per s): of the response.
+    step, fraction: where on the motion.
+    sign: 1 for a peak of g, -1 for one of -g.
+    who: the member, or -1.
+    """
     return np.array([time, value, step, fraction, rate, sign, who, NOBODY, 0.0])
 
 
 def parts(row: FloatArray) -> list[tuple[float, FloatArray]]:
-    """What a row's derivative is put together from: shares, and rows of one member each."""
+    """What a row's derivative is put together from: shares, and rows of one member each; nothing where it is zero."""
     if row[OTHER] == ZERO:
         return []
     if row[OTHER] == NOBODY:
@@ -110,7 +121,12 @@ def parts(row: FloatArray) -> list[tuple[float, FloatArray]]:
 
 
 def _inside(samples: Samples, g: FloatArray, d: FloatArray, limit: float, see: See, sign: float) -> list[FloatArray]:
-    """Peaks within steps: roots of the rate between two samples where it falls through zero."""
+    """Peaks within steps, as rows: roots of the rate between two samples where it falls through zero.
+
+    samples: of the response. g, d (m, 5): sign times its values and rates.
+    limit: value of g below which no peak is wanted.
+    see: looks at the motion. sign: 1, or -1 for peaks of -g.
+    """
     width = (np.diff(samples.t) / LAST)[:, None]
     da, db = d[:, :-1], d[:, 1:]
     bound = np.maximum(g[:, :-1] + np.maximum(da, 0.0) * width, g[:, 1:] + np.maximum(-db, 0.0) * width)
@@ -143,7 +159,12 @@ def _inside(samples: Samples, g: FloatArray, d: FloatArray, limit: float, see: S
 def _refine(
     w: int, low: float, high: float, rise: float, fall: float, see: See, sign: float
 ) -> tuple[float, float, float, float]:
-    """Fraction, value, rate and member where the rate vanishes: Illinois' rule on the method's own motion."""
+    """Fraction, value, rate and member where the rate vanishes, by Illinois' rule on the method's own motion.
+
+    w: the step. low, high: fractions between which the rate falls through zero.
+    rise, fall: sign times the rate at them, above and below zero.
+    see: looks at the motion. sign: 1, or -1 for peaks of -g.
+    """
     size, side = max(rise, -fall), 0
     c = last = np.nan
     seen = np.full(3, np.nan)

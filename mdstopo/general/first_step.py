@@ -47,9 +47,20 @@ def unstretched_force(model, k):
 
 @kernel
 def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):
-    """noise (n_pair,) of `rounding_of_pairs`; of pairs with a body that is driven, what is of the size of the pair.
+    """What rounding leaves uncertain of how far each pair has moved.
 
-    Joints hand forces on, and springs that hold against them may be elsewhere.
+    That of the worst pair by `rounding_of_pairs` holds for all, since joints hand forces on and springs that hold
+    against them may be elsewhere; but it is no more than rounding of the pair's size, and just that where a body is
+    driven.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      rel (n_pair, POSE): relative poses at the start. v (n,): velocities (m/s, rad/s).
+      stiffness (n_pair,): of a pair's members (N/m).
+      strain (n_pair,): how far a pair is strained at the start (m).
+    Out:
+      noise (n_pair,): what is uncertain (m).
     """
     n = v.shape[0]
     inverse = np.empty(n)
@@ -80,10 +91,16 @@ def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):
 
 @kernel
 def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):
-    """scale (n_pair,): what the errors of a pair's motion are measured against, m; q (n,), rel (n_pair, POSE): where it
-    is.
+    """What the errors of each pair's motion are measured against.
 
-    motion (n_pair,): how far it has moved so far; noise: what rounding leaves; tolerance: of a step.
+    Constant:
+      pair (n_pair, 2), reach (n_pair,): of the compiled scene.
+      q (n,): coordinates (m, rad). rel, rel0 (n_pair, POSE): relative poses now, and at the start.
+      motion (n_pair,): how far each pair has moved so far (m).
+      noise (n_pair,): what rounding leaves of that (m).
+      tolerance: error that a step may have, relative.
+    Out:
+      scale (n_pair,): the lengths that errors are measured against (m).
     """
     widest = 0.0
     for p in range(pair.shape[0]):
@@ -96,9 +113,20 @@ def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):
 
 @kernel
 def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q, v, a, work):
-    """Length of a first step from the state q0, v0 (n,) at the start, whose accelerations are a0, towards time `end`.
+    """Length of the first step (s).
 
-    rel0, motion, noise, tolerance as of `motion_scale`. Scratch: lam (n_row,); q, v, a (n,).
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      end: time beyond which it does not lead (s).
+      q0, v0, a0 (n,): coordinates, velocities, accelerations at the start (m, rad; per s; per s^2).
+      rel0 (n_pair, POSE): relative poses at the start.
+      motion, noise (n_pair,): how far each pair is strained at the start, and what rounding leaves of that (m).
+      tolerance, order: error that a step may have, relative; order of the method.
+    Out:
+      lam (n_row,), q, v, a (n,): scratch.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
     """
     n = q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -116,7 +144,7 @@ def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance,
         finite = True
         for d in range(n):
             finite = finite and np.isfinite(a[d])
-            if model.free[d] != 0:  # with a slope of the accelerations: the size of a motion that begins with nothing
+            if model.free[d] != 0:  # with the accelerations' slope: a motion that begins with none has a size, too
                 q[d] += h * h / 6.0 * (a[d] - a0[d])
         if singular >= 0 or not finite:
             h *= 0.1
@@ -133,4 +161,4 @@ def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance,
             allowed = tau * (tolerance / FIRST[1 if model.size[2] != 0 else 0]) ** (1.0 / order)
             return min(allowed, TURN / max(turned, 1e-300))
         h *= max(np.sqrt(AIM / theta), 0.1) if theta < HOPELESS else 0.1
-    return end - t  # the motion looks the same at every scale
+    return end - t  # no length was short enough to tell tau

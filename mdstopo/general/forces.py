@@ -29,7 +29,16 @@ def turn_bodies(q, turned):
 
 @part
 def turned_pose(model, p, turned, q, v, rel):
-    """`mechanics.geometry.relative_pose` of pair p, of bodies that are turned by `turn_bodies`."""
+    """`mechanics.geometry.relative_pose` of one pair, of bodies that are turned by `turn_bodies`.
+
+    Constant:
+      model: the compiled scene.
+      p: the pair.
+      turned (n_body, 2): of `turn_bodies`.
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      rel (n_pair, POSE): relative poses, of which row p is set.
+    """
     one = model.pair[p, 0]
     two = model.pair[p, 1]
     fill_pose(model.pair, p, model.home, q, v, turned[one, 0], turned[one, 1], turned[two, 0], turned[two, 1], rel)
@@ -113,9 +122,20 @@ def pose_acceleration(pair, rel, p, a, out):
 
 @kernel
 def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):
-    """B of member i as a row over its two bodies (6,): dDelta/dt = row . v; and d(row)/dt . v; returns the length.
+    """B of a member as a row over its two bodies: dDelta/dt = row . v; and d(row)/dt . v.
 
     In global axes: u = x_B + R_B q - x_A - R_A p, L' = e . u', L'' = e . u'' + (|u'|^2 - L'^2)/L.
+
+    Constant:
+      model: the compiled scene.
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      i: the member (padded).
+      a_body, b_body: the first coordinate of each of its bodies.
+    Out:
+      row (6,): B; zero where the member has no length.
+      row_rate (1,): d(row)/dt . v (m/s^2).
+
+    Returns the length (m).
     """
     m = model.member
     ca, sa, _, _ = turned_body(model.home, a_body // 3, q[a_body + 2])
@@ -155,7 +175,17 @@ def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):
 
 @kernel
 def add_inerters(model, segment, strength, q, v, mass, f):
-    """mass (n_pair, 6, 6) = sum s b B^T B of the inerters; f (n,) -= sum s b B^T (B' v)."""
+    """Mass of the inerters, sum s b B^T B, and the part of their forces that accelerations do not change.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      mass (n_pair, 6, 6): the mass (kg, kg m, kg m^2), set.
+      f (n,): forces and moments on the coordinates (N, N m), to which -sum s b B^T (B' v) is added.
+    """
     mass[:] = 0.0
     row = np.empty(6)
     bias = np.empty(1)
@@ -178,7 +208,15 @@ def add_inerters(model, segment, strength, q, v, mass, f):
 
 @kernel
 def inerter_force(model, k, i, q, v, a, row):
-    """Force b d2Delta/dt2 of inerter i of block k at unit strength, and its row (6,)."""
+    """Force b d2Delta/dt2 of an inerter at unit strength (N), and its row.
+
+    Constant:
+      model: the compiled scene.
+      k, i: the block, and the member (padded).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+    Out:
+      row (6,): B over the coordinates of both bodies.
+    """
     p = model.block[k, 0]
     a_body = 3 * model.pair[p, 0]
     b_body = 3 * model.pair[p, 1]
@@ -193,10 +231,18 @@ def inerter_force(model, k, i, q, v, a, row):
 
 @kernel
 def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
-    """k_out, c_out (n_pair, 6, 6) += d/dq, d/dv of sum s b B^T d2Delta/dt2 at fixed a (the reverse of `inerter_row`).
+    """Slopes by coordinates and velocities of sum s b B^T d2Delta/dt2 at fixed a (the reverse of `inerter_row`).
 
     With g = dL''/du, h = dL''/du' = 2 (u' - L' e)/L: g = (u'' - e (e . u''))/L - 2 L' (u' - L' e)/L^2
     - e (|u'|^2 - L'^2)/L^2; the arms turn u, u' and u''.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+    Out:
+      k_out, c_out (n_pair, 6, 6): stiffness and damping of the pairs, to which d/dq and d/dv are added.
     """
     for k in range(model.block.shape[0]):
         if model.block[k, 3] != INERTER or model.active[segment, k] == 0:
@@ -291,8 +337,16 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
 
 @kernel
 def general_forces(model, strength, segment, t, q, v, tangent, desk):
-    """F (n,) without inerters at one state, and on demand tangents: f, k, c and turn of the desk; with turned; rel
-    and sums of the pairs that carry more than joints.
+    """All forces of members, bushings, loads and contacts at one state, without inerters; on demand with tangents.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment, t: segment of `model.times`, and time in it (s).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      tangent: whether desk.k, .c and .turn are asked for.
+    In and out:
+      desk: the workspace. Set are f (N, N m), turned, and, of the pairs that carry more than joints, rel and sums.
     """
     pair = model.pair
     rel = desk.rel

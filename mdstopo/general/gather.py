@@ -1,4 +1,4 @@
-"""What the derivatives by the design gather at one state: from every member's force, and from what is looked at."""
+"""What the derivatives by the design gather at one state: from every member's force, and from the response itself."""
 
 import numpy as np
 
@@ -19,9 +19,20 @@ from mdstopo.mechanics.laws.table import SPRING, law
 
 @kernel
 def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):
-    """out (M_padded,) -= f_i (b_i . T z) at unit strength, += weight V_i, of all design members at one state.
+    """What all design members do to the gradient at one state: out -= f_i (b_i . T z) at unit strength, += weight V_i.
 
     Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
+
+    Constant:
+      model: the compiled scene.
+      segment, t: segment of `model.times`, and time in it (s).
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      z (n,): virtual displacements.
+      weight: of the stored energy.
+    Out:
+      out (M_padded + P,): the derivative by alpha^mu and by parameters, added to.
+      work (WORK,): counts of work, added to.
     """
     n = model.mass.shape[0]
     work[DESIGN] += 1
@@ -39,7 +50,18 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):
 
 @kernel
 def add_designs(model, segment, track, o, strength, z, out, work):
-    """`add_design` of the stages from o on, as many as z (S, n) has, without energy: springs are read once."""
+    """`add_design` at many stages, without energy: springs are read once for all.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`.
+      track, o: the history of steps, and the number of the first stage.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      z (S, n): virtual displacements of the S stages from o on.
+    Out:
+      out (M_padded + P,): the derivative by alpha^mu and by parameters, added to.
+      work (WORK,): counts of work, added to.
+    """
     end = o + z.shape[0]
     work[DESIGN] += z.shape[0]
     if has_factors(track):
@@ -53,7 +75,18 @@ def add_designs(model, segment, track, o, strength, z, out, work):
 
 @kernel
 def _add(model, segment, when, strength, stage, turned, z, weight, out):
-    """`add_design` at the times when (S,), of stage (S, 3, n) with the bodies turned (S, n_body, 2)."""
+    """`add_design` at S states of one segment.
+
+    Constant:
+      model: the compiled scene.
+      segment: segment of `model.times`. when (S,): times (s).
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      stage (S, 3, n): coordinates, velocities, accelerations. turned (S, n_body, 2): of `forces.turn_bodies`.
+      z (S, n): virtual displacements.
+      weight: of the stored energy.
+    Out:
+      out (M_padded + P,): the derivative by alpha^mu and by parameters, added to.
+    """
     count = z.shape[0]
     n_pair = model.pair.shape[0]
     rel = np.empty((count, n_pair, POSE))
@@ -91,7 +124,7 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):
 
 @kernel
 def _virtual(pair, rel, p, z, out):
-    """out (3,) = -T z."""
+    """out (3,) = -T z of pair p: the virtual change of its relative pose, with the sign turned."""
     pair_displacement(pair, rel, p, z, out)
     for i in range(3):
         out[i] = -out[i]
@@ -99,9 +132,19 @@ def _virtual(pair, rel, p, z, out):
 
 @kernel
 def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):
-    """out (M_padded,) += scale df*/d(alpha^mu) at fixed motion, where g_j is the force f* of member `who`.
+    """What the design does to g_j at fixed motion, where g_j is the force f* of a member.
 
     f* has a sign; its absolute value is what is looked at (`force_sign`).
+
+    Constant:
+      model: the compiled scene.
+      j, who: the response, and the number of the member in its group.
+      segment, t: segment of `model.times`, and time in it (s).
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      scale: factor of df*.
+    Out:
+      out (M_padded + P,): scale times the derivative of f* by alpha^mu and by parameters, added to.
     """
     if model.response[j, 0] != MEMBER_FORCE:
         return
@@ -112,10 +155,17 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):
 
 @kernel
 def force_sign(model, segment, j, who, t, strength, q, v, a):
-    """The sign of f* where g_j is the force of member `who`; else 1.
+    """The sign of f* where g_j is the force of a member; else 1.
 
     It is that of the very number that `response` takes the absolute value of: near zero another formula for the same
     force may have the other sign.
+
+    Constant:
+      model: the compiled scene.
+      j, who: the response, and the number of the member in its group.
+      segment, t: segment of `model.times`, and time in it (s).
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
     """
     if model.response[j, 0] != MEMBER_FORCE:
         return 1.0
@@ -127,7 +177,18 @@ def force_sign(model, segment, j, who, t, strength, q, v, a):
 
 @kernel
 def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):
-    """out (M_padded,) += scale times the force of each law of a member at unit strength."""
+    """The forces of all laws of a member at unit strength, each to its own place.
+
+    Constant:
+      model: the compiled scene.
+      j, who: the response, which names the group, and the number of the member in it.
+      segment, t: segment of `model.times`, and time in it (s).
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      scale: factor of the forces.
+    Out:
+      out (M_padded,): added to.
+    """
     row = np.empty(6)
     rel = np.empty((model.pair.shape[0], POSE))
     relative_pose(model.pair, model.home, q, v, rel)
@@ -146,6 +207,15 @@ def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):
 
 @kernel
 def _unit_force(model, k, i, segment, t, r, strength):
+    """The force of a member at unit strength (N), in tension positive; no inerter.
+
+    Constant:
+      model: the compiled scene.
+      k, i: the block, and the member (padded).
+      segment, t: segment of `model.times`, and time in it (s).
+      r (POSE,): relative pose of its pair.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+    """
     c = r[2]
     s = r[3]
     ax = c * model.member[2, i] - s * model.member[3, i]

@@ -44,10 +44,25 @@ TAG = (0, 0)
 
 @entry
 def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):
-    """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
+    """Integrate a design over `model.times` in fixed steps.
 
-    As `general.runge_kutta.simulate`; tables (1,): the spectral radius; settings[2]: the step, or, where negative, so
-    many radians of the fastest vibration at the start. Tangents are always kept.
+    Constant:
+      ints, floats: the packed scene (`model.pack_general`).
+      tables (1,): the spectral radius.
+      alpha (N,): the design.
+      tangent: not read; tangents are always kept.
+      settings: tolerance of the case, relative (it tells which touches count as doubtful); Newton tolerance, relative
+        to the motion; the step (s), or, where negative, so many radians of the fastest vibration at the start.
+      limits: steps allowed, and the sizes of the arrays (`track.carve_track`).
+    Out:
+      room, room_ints: the history of steps, as of `track.carve_track`.
+      strength (3, columns): state of the members; scales are set from alpha, modes and sets are those at the end.
+      work (WORK,): counts of work, added to.
+      where (3,): each -1 where there is none: the member or the unknown that is to blame for an early end; a member
+        whose ends have met; one that grazes so that the motion has no derivative.
+
+    Returns code (`integrators.steps`; NEEDS_ROOM: the arrays are too small), number of steps, number of events, time
+    reached (s).
     """
     model = unpack_general(ints, floats)
     newton_tolerance = settings[1]

@@ -18,14 +18,31 @@ from mdstopo.integrators.steps import REVERSE
 
 @kernel
 def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
-    """The cubic between the ends of step k, and its derivative."""
+    """The cubic between the ends of step k, and its derivative; returns k.
+
+    Constant:
+      track, k, c: the history of steps, the step, and a fraction of it.
+    Out:
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+
+    Not needed here: tag, model, tables, strength, count, keep, desk, work.
+    """
     cubic(track.state[k], track.state[k + 1], track.t[k + 1] - track.t[k], c, q, v)
     return k
 
 
 @kernel
 def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
-    """Further along the cubic."""
+    """The cubic of step k, a little later than at fraction c.
+
+    Constant:
+      track, k, c: the history of steps, the step, and a fraction of it.
+      e: how much later (s); below 0: earlier.
+    Out:
+      q_out, v_out (n,): coordinates and velocities then (m, rad; m/s, rad/s).
+
+    Not needed here: tag; q, v, a, which are those at c.
+    """
     h = track.t[k + 1] - track.t[k]
     cubic(track.state[k], track.state[k + 1], h, c + e / h, q_out, v_out)
 
@@ -38,7 +55,15 @@ def derivatives(tag):
 
 @kernel
 def weights_of(tag, model, tables, track, w, out):
-    """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion."""
+    """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion.
+
+    Constant:
+      track, w: the history of steps, and the step.
+    Out:
+      out (3 or more,): weights of the step's stages (s); zero behind them.
+
+    Not needed here: tag, model, tables.
+    """
     h = track.t[w + 1] - track.t[w]
     out[:] = 0.0
     last = track.index[w + 1, 0] - track.index[w, 0] - 1
@@ -52,7 +77,24 @@ def weights_of(tag, model, tables, track, w, out):
 
 @kernel
 def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
-    """Duty 2."""
+    """Pull R cotangents of step w back to its start, in place (`duties`).
+
+    Constant:
+      tag, tables (1,): the integrator; the spectral radius.
+      model: the compiled scene.
+      track, w: the history of steps, and the step.
+      c (R,): the fraction of the step to which each cotangent belongs; 1: its end.
+      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows where
+        there are none.
+    In and out:
+      lam_q, lam_v (R, n): cotangents of coordinates and velocities.
+      lam_x (R, 2, n): those of the acceleration and of the auxiliary one.
+    Out:
+      z (R, s or more, n): the virtual displacements of the stages' balances.
+      y (n_row,): scratch.
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+    """
     count, n = lam_q.shape
     o = track.index[w, 0]
     last = track.index[w + 1, 0] - 1 - o
@@ -99,8 +141,25 @@ def _stage_row_back(
     model, track, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q, start_v,
     desk,
 ):  # fmt: skip
-    """Stage j of `step_back`, which is prepared, for one row: x (n,) = its virtual displacement; the bars (n,) are of
-    what is being pulled back, start_q, start_v of the start of the step."""
+    """Stage j of `step_back`, which is prepared, for one row of cotangents.
+
+    Constant:
+      model: the compiled scene.
+      track, o, j, last: the history of steps, the first stage of the step, the number of this stage in it, and of its
+        last.
+      h: length of the step (s).
+      weights: of the method (`integrators.generalized_alpha.weights_of`).
+      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, or no rows.
+      lam_x (2, n): cotangents of the acceleration and the auxiliary one at the end of the step.
+    In and out:
+      bar_q, bar_v, bar_a, bar_x (n,): cotangents of the stage's coordinates and velocities, and of the acceleration and
+        the auxiliary one with which the step begins.
+      start_q, start_v (n,): cotangents of the start of the step, added to.
+      desk: the workspace, with the stage prepared (`step_linear.prepare_stage_back`).
+    Out:
+      x (n,): the virtual displacement of the stage's balance.
+      y (n_row,): adjoint variables of the joints' rows.
+    """
     n = x.shape[0]
     e1, e2, e3, beta, gamma, lag = weights
     y[:] = 0.0
@@ -147,7 +206,23 @@ def _stage_row_back(
 
 @kernel
 def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
-    """Duty 3."""
+    """Push changes through step w (`duties`).
+
+    Constant:
+      tag, tables (1,): the integrator; the spectral radius.
+      model: the compiled scene.
+      track, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
+      sweeps: above 0, the end is solved by so many fixed-point sweeps at most (`iterative`).
+      force (s, n): changes of the force at each stage.
+    In and out:
+      dq, dv (n,): changes of coordinates and velocities, of the start and then of the end.
+      dx (2, n): those of the acceleration and of the auxiliary one.
+    Out:
+      changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
+      desk: workspace of a balance, overwritten.
+
+    Returns whether all sweeps settled.
+    """
     n = dq.shape[0]
     o = track.index[w, 0]
     last = track.index[w + 1, 0] - 1 - o

@@ -64,12 +64,30 @@ def advance(
     rel0,
     work,
 ):
-    """One step of length h from state (4, n) = q, v, a, x to ends (4, n) of the same; q, v of the end on the joints.
+    """One step of the method, by Newton's iteration.
 
-    starting: whether a and x are to be made here. guess (3, n): x of the three steps before, for the first iterate.
-    extent (2, n_pair): how far each pair has moved so far from its pose rel0 at the start, and its noise, m. push
-    (2, n_row). With o >= 0 the stages are kept
-    from there on. Returns (code, stages, place of a singular unknown).
+    Constant:
+      model: the compiled scene.
+      radius: the spectral radius.
+      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      segment, t, h: segment of `model.times`, time at the start (s), length of the step (s).
+      starting: whether a and x are to be made here.
+      guess (3, n): x of the three steps before, for the first iterate.
+      newton_tolerance: correction at which Newton's iteration ends, relative to the motion.
+      size: of the scene (m).
+      o: number of the first stage to be kept; below 0 none is.
+      extent (2, n_pair): how far each pair has moved so far from its pose at the start, and its noise (m).
+      rel0 (n_pair, POSE): relative poses at the start.
+    In and out:
+      state (4, n): q, v, a, x at the start of the step; the last two are set where `starting`.
+    Out:
+      track: the history of steps, to which the stages are written.
+      ends (4, n): the same at the end; q, v on the joints.
+      push (2, n_row): the multipliers that put them there (`projection`).
+      desk: workspace of a balance, overwritten.
+      work (WORK,): counts of work, added to.
+
+    Returns a code (`integrators.steps`), the number of stages, and the place of a singular unknown, or -1.
     """
     n = state.shape[1]
     n_row = model.size[0]
