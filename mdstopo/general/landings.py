@@ -88,10 +88,14 @@ def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
 def halves(
     t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolerance: float, nothing: float = 0.0
 ) -> list[float]:
-    """Times that halve the intervals between `ends` (k + 1,), and their halves, until the rule is good on each.
+    """Times that halve the intervals between `ends`, and their halves, until a rule of integration is good on each.
 
-    t (m + 1,): ends of steps, all of them among `ends`; rule (2, s): nodes and weights on (0, 1). Good is what differs
-    from the Gauss-Legendre sum by the tolerance times the whole integral at most; an integral below `nothing` is zero.
+    t (m + 1,): ends of the steps (s), all of them among `ends`.
+    ends (k + 1,): times at which steps end or will have to end (s).
+    look: values of the integrand (K,) at places (K, 2), steps and fractions of them.
+    rule (2, s): nodes and weights of the rule on (0, 1).
+    tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
+    nothing: up to this the integral counts as zero, and no interval is halved.
     """
     places = np.concatenate([rule[0], 0.5 * (NODES + 1.0)])
     low, width = ends[:-1], np.diff(ends)

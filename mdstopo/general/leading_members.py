@@ -83,7 +83,17 @@ def is_led(driver: "GeneralDriver", j: int) -> bool:
 def _forces(
     driver: "GeneralDriver", j: int, count: int, steps: IndexArray, fractions: FloatArray, who: IndexArray
 ) -> tuple[FloatArray, FloatArray]:
-    """f* and its rate (C, steps, fractions) of members who (C,), on the quintics through the steps' ends."""
+    """Forces f* of some members and their rates, at the same fractions of several steps.
+
+    driver: of the load case; its last motion is looked at, on the quintics through the steps' ends.
+    j: the response, whose group the members belong to.
+    count: number of steps.
+    steps (W,): which steps.
+    fractions (K,): at which parts of each step, 0 to 1.
+    who (C,): numbers of the members within the group.
+
+    Returns f* (N) and its rate (N/s), both (C, W, K).
+    """
     places = np.stack(np.broadcast_arrays(steps[:, None], fractions[None, :]), axis=-1).astype(np.float64)
     _, seen = compare(driver, j, places.reshape(-1, 2), who, count)
     shaped = seen.reshape(len(who), len(steps), len(fractions), 2)
@@ -113,7 +123,14 @@ def _different(force: FloatArray) -> IndexArray:
 
 
 def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who: IndexArray) -> list[Lead]:
-    """The leads within step w of length h, in which members who (C,) may lead."""
+    """Who leads when within one step, in order of time.
+
+    driver: of the load case, with its last motion.
+    j: the response, whose group the members belong to.
+    count: number of steps.
+    w, h: number of the step, its length (s).
+    who (C,): numbers within the group of the members that may lead.
+    """
     force, rate = (x[:, 0] for x in _forces(driver, j, count, np.array([w]), FINE, who))
     rate *= h / (len(FINE) - 1)
 
@@ -163,7 +180,15 @@ def _roots(
     sign: float,
     exact: Callable[[FloatArray, IndexArray], FloatArray],
 ) -> Iterator[float]:
-    """Fractions of the step at which f_a - sign f_b vanishes between the samples k and k + 1."""
+    """Fractions of the step at which f_a - sign f_b vanishes between the samples k and k + 1.
+
+    force (C, K): forces at the samples FINE (N).
+    rate (C, K): their rates, per interval between two samples (N).
+    k: the first of the two samples.
+    a, b: the two members, as rows of force and rate.
+    sign: 1, or -1 where the forces are equal and opposite.
+    exact: forces (members, fractions) on the motion itself (N), by fractions of the step and rows of force.
+    """
     d, slope = force[a] - sign * force[b], rate[a] - sign * rate[b]
     largest = float(max(np.abs(force[a]).max(), np.abs(force[b]).max()))
     if float(np.abs(d).max()) <= TIE * largest:
