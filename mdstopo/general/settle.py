@@ -139,6 +139,7 @@ def _stepped(
 
 
 def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> str:
+    """Why there is no equilibrium: the body that has moved most by a shift (n,), with angles times arms (n,)."""
     body = driver.scene.bodies[int(np.abs(shift * arms).reshape(-1, 3).max(axis=1).argmax())]
     return f"body {body} finds no static equilibrium near its stated place"
 
@@ -169,11 +170,11 @@ class _AtRest:
         self.jac = self._rows[:, self.free] / root
 
     def rate(self) -> float:
-        """Of the fastest motion, 1/s^2."""
+        """Largest stiffness by mass: square of the angular frequency of the fastest motion (1/s^2)."""
         return float(np.linalg.norm(self.stiffness, 2)) if len(self.free) else 0.0
 
     def land(self, q: FloatArray) -> FloatArray:
-        """Look at the place on the joints next to q (n,), which is returned."""
+        """Look at the nearest place on the joints to q (n,), which is returned."""
         self.at(q)
         for _ in range(3):
             if np.abs(self._phi).max(initial=0.0) <= ARRIVED * self._size:
@@ -264,6 +265,7 @@ class _AtRest:
         return null
 
     def _wide(self, u: Any) -> FloatArray:
+        """(n,): a step from its free part in scaled coordinates."""
         wide = np.zeros(len(self.force))
         wide[self.free] = u / self._root
         return wide
