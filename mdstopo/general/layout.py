@@ -68,7 +68,7 @@ def arrange(
                 np.add.at(dense, coordinates, jac[j, r])
                 dense *= np.where(free == 1, 1.0 / np.sqrt(mass), 0.0)
                 size = float(np.linalg.norm(dense))
-                for _ in range(2):  # twice is enough
+                for _ in range(2):  # the second time against rounding
                     for other in kept:
                         dense -= (other @ dense) * other
                 own = float(np.linalg.norm(dense))

@@ -150,7 +150,7 @@ def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who:
                 cuts += _roots(force, rate, k, a, b, sign, exact)
     ends = np.array([*_apart(sorted(cuts)), 1.0])
     middles = 0.5 * (ends[:-1] + ends[1:])
-    # what exact looks tell in the middle of all pieces: mostly there are none to look at but the whole step
+    # the exact forces in the middle of each piece say who leads there; mostly the whole step is one piece
     size = np.abs(exact(middles, np.arange(len(who))))
     first = (size >= (1.0 - TIE) * size.max(axis=0)).argmax(axis=0)
     found: list[Lead] = []
@@ -206,7 +206,7 @@ def _roots(
         return
     if not (d0 * s0 < 0.0 < d1 * s1):
         return
-    # it comes nearer to zero and goes away again: the cubic says where, and whether that is worth a look
+    # it comes nearer to zero and goes away again: the cubic says where, and whether it may pass zero there
     square, cube = 3.0 * (d1 - d0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (d1 - d0)
     c = -s0 / (square + np.copysign(np.sqrt(max(square * square - 3.0 * cube * s0, 0.0)), d0))
     dip = d0 + c * (s0 + c * (square + c * cube))

@@ -121,7 +121,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):
     lo = model.block[k, 1]
     for i in range(lo, lo + model.block[k, 5]):
         length, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
-        if length == 0.0:  # not where y is: that is so infinitely far away, too
+        if length == 0.0:  # not y == 0.0: that is so infinitely far away, too
             continue
         rate = bx * vx + by * vy + bt * vt
         scale = strength[0, i]
@@ -252,7 +252,7 @@ def set_modes(model, strength, rel, rel_rate, knots):
             whole = law_has_pieces(code) and (not knots or model.block[k, 5] > KNOTTED)
             strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
-            if law_remembers(code) and model.active[0, k] == 0:  # whatever it is like now, nothing has been done to it
+            if law_remembers(code) and model.active[0, k] == 0:  # it has not acted yet
                 strength[1, i] = 0.0
                 strength[2, i] = 0.0
     for j in range(model.contact_pair.shape[0]):

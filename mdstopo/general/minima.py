@@ -106,7 +106,7 @@ def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> list[FloatArray]:
     bent = bool(has_kinks(driver.scene.model, j))
     for row in rows:
         k, c = int(row[STEP]), float(row[FRACTION])
-        between = k if c <= 0.0 else k + 1  # which boundary, where it is one
+        between = k if c <= 0.0 else k + 1  # the number of the boundary, if the place is one
         pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
         if c <= 0.0 or c >= 1.0:
             if 0 < between < len(pieces.leads):

@@ -135,7 +135,7 @@ def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale,
     own = np.empty((2, 6))
     group = model.response[j, 5]
     _, pair = member_force(model, strength, segment, t, group, who, q, v, a, slopes, own)
-    along = 0.0  # the force may be none here: its sign is that of its slopes
+    along = 0.0  # the force may be zero here; then its slopes tell its sign
     for c in range(6):
         along += slopes[0, c] * bars[0, 3 * model.pair[pair, c // 3] + c % 3]
     sign = 1.0 if along >= 0.0 else -1.0
