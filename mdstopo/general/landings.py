@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 #: reductions that are integrals over time: of g (1), of its square (2)
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
-#: of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
+#: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 #: how often an evaluation looks for landings
 ROUNDS = 3
@@ -34,7 +34,8 @@ ROUNDS = 3
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
 SHARE = 1e-3
-#: halvings of one step at most; from which of them on one is in vain that leaves more than so much of the difference
+#: halvings of one step at most; after PATIENCE of them a step is given up where one more leaves a larger share of the
+#: difference than VAIN: what is left is rounding
 HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
 #: places and angles below this share of the scene's size, or of a radian, are rounding
 NOUGHT = 1e-12

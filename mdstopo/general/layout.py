@@ -15,7 +15,7 @@ from mdstopo.case.model import Case
 from mdstopo.mechanics.joints.table import LISTED
 from mdstopo.scene.model import FloatArray, IndexArray
 
-#: part of a row that must be its own, relative to the row, or others imply it
+#: a row of which no larger share than this is independent of the others is implied by them
 INDEPENDENT = 1e-9
 #: unknowns up to which their natural order is good enough
 FEW = 30

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FINE = np.linspace(0.0, 1.0, 17)
 #: forces looked at in one go, of all members at all samples
 BATCH = 4_000_000
-#: by what share of the largest force a member may stay below it by its cubic, and yet lead in truth
+#: a member whose cubic stays below the largest force by less than this share of it may lead in truth
 CLOSE = 1e-3
 #: members that are compared between two samples at most, those with the largest forces
 MOST = 12

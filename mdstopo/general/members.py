@@ -23,7 +23,8 @@ from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, el
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
-#: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that remembers
+#: rows of `strength` (3, M_padded + n_contact + 1): alpha^mu, the mode of a law that switches or of a contact, the
+#: permanent set of a law that remembers. The last column has the number of events that the modes include (`track`)
 SCALE, MODE, SET = range(3)
 
 #: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps

@@ -27,8 +27,7 @@ from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 MISFIT = 1e-7
 #: corrections of the position at most; each squares the misfit
 MOST = 12
-#: sweeps at most until what the multipliers do to the reverse has settled, and the change of the last one by which it
-#: has, relative, as the root of mass times square
+#: sweeps of `swept` at most, and the change of a sweep, relative and weighed by mass, at which they have settled
 SWEEPS, SETTLED = 8, 1e-16
 
 

@@ -26,7 +26,7 @@ from mdstopo.mechanics.laws.table import law
 from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
 from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
 
-#: the kernels of responses by their code, column KIND of `GeneralModel.response`; `enter` fills it, at the end
+#: the kernels of responses by their code, column KIND of `GeneralModel.response`; `code_of` fills it
 LISTED: Listed[ResponseKernels] = Listed()
 #: codes of the two responses that depend on the design at fixed motion: stored energy, forces of members
 ENERGY, MEMBER_FORCE = 0, 3

@@ -26,9 +26,11 @@ if TYPE_CHECKING:
 MOST, FAR = 400, 0.1
 #: the farthest that an equilibrium is looked for: by how many sizes of the scene a body may move, and how far turn, rad
 SIZES, TURN = 2.0, 2.0 * np.pi
-#: steps grow so much, where the force along them at their end is what was foreseen, to a share of that at their start
+#: steps grow by this factor where the force along them at their end is off from what was foreseen by at most this share
+#: of that at their start
 GROWTH, AGREES = 4.0, 0.25
-#: share of the force along a step that may point back at its end, and looks for a better end at most
+#: how large a force that points back at the end of a step may be, relative to that at its start; and how often at most
+#: a better end is looked for
 BACK, LOOKS = 0.1, 30
 #: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
 NEAR, ARRIVED = 1e-6, 1e-13
