@@ -31,7 +31,7 @@ def index(i):
 
 @kernel
 def inverse_masses(model):
-    """(n,): 1 over the mass of each coordinate; 0 for what is driven, which does not answer."""
+    """(n,): 1 over the mass (kg) or inertia (kg m^2) of each coordinate; 0 where it is driven: no force moves it."""
     inverse = np.zeros(model.mass.shape[0])
     for d in range(inverse.shape[0]):
         if model.free[d] != 0:
@@ -41,7 +41,7 @@ def inverse_masses(model):
 
 @kernel
 def spread_masses(model):
-    """(n_joint, 3, 6): `inverse_masses` of the coordinates that slopes of the joints are by."""
+    """(n_joint, 3, 6): `inverse_masses` of the coordinate that each slope of the joints is a derivative by."""
     inverse = inverse_masses(model)
     spread = np.empty((model.joint.shape[0], 3, 6))
     for j in range(spread.shape[0]):
@@ -53,11 +53,21 @@ def spread_masses(model):
 
 @kernel
 def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
-    """Factors of the joints' matrix at slopes jac (n_joint, 3, 6); spread: as of `spread_masses`.
+    """Factorise the joints' matrix Phi_q M^-1 Phi_q^T for given slopes Phi_q.
 
-    Out: pull (n_joint, 3, 6) = Phi_q M^-1; gram (size[3],), L by rows from their first entries on, the diagonal unused;
-    diagonal (2, n_row), that of the matrix and the inverse of D. thorough: whether `weakest` is asked, too. x: scratch
-    (n_row,). Returns the place (`GeneralModel.place`) of a row at which the matrix is singular, or -1.
+    Constant:
+      model: the compiled scene.
+      spread (n_joint, 3, 6): inverse mass of the coordinate of each slope (`spread_masses`).
+    In:
+      jac (n_joint, 3, 6): slopes Phi_q of the joints' rows by the coordinates of their two bodies.
+      thorough: whether the factors are searched for a small eigenvalue, too (`weakest`).
+    Out:
+      pull (n_joint, 3, 6): Phi_q M^-1.
+      gram (size[3],): L by rows, each from its first entry on; what stands on the diagonal is not used.
+      diagonal (2, n_row): the diagonal of the matrix, and the inverse of D.
+      x (n_row,): scratch.
+
+    Returns the place (`GeneralModel.place`) of a row at which the matrix is singular, or -1.
     """
     line = model.line
     product = model.product
@@ -84,7 +94,10 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
 
 @kernel
 def decompose(envelope, gram, diagonal):
-    """Factor a matrix in place, as `factor_joints` describes; -1, or a singular row."""
+    """Factorise a matrix into L D L^T in place; arguments of these names are described at `factor_joints`.
+
+    Returns the place of a row at which the matrix is singular, or -1.
+    """
     i = 0
     while i < envelope.shape[0]:
         together = in_pairs(envelope, i)
@@ -97,14 +110,16 @@ def decompose(envelope, gram, diagonal):
 
 @part
 def in_pairs(envelope, i):
-    """Whether row i and the next one begin at the same place, as those of a joint do: then both are taken at once, and
-    one waits less for the other.
+    """Whether row i and the next one begin at the same place, as the rows of one joint do.
+
+    Then both are factorised at once, which is faster: the products of one do not wait for those of the other.
     """
     return i + 1 < envelope.shape[0] and envelope[i + 1, 0] == envelope[i, 0]
 
 
 @part
 def _decompose_one(envelope, gram, diagonal, i):
+    """Row i of `decompose`. Returns i where the matrix is singular there, else -1."""
     inverse = diagonal[1]
     first = envelope[i, 0]
     own = envelope[i, 1]
@@ -129,7 +144,7 @@ def _decompose_one(envelope, gram, diagonal, i):
 
 @part
 def _decompose_two(envelope, gram, diagonal, i):
-    """`_decompose_one` of rows i and i + 1."""
+    """Rows i and i + 1 of `decompose`. Returns the one at which the matrix is singular, or -1."""
     inverse = diagonal[1]
     first = envelope[i, 0]
     own = envelope[i, 1]
@@ -173,8 +188,9 @@ def _decompose_two(envelope, gram, diagonal, i):
 
 @kernel
 def growth(envelope, gram, diagonal, x):
-    """What the smallest eigenvalue shows itself by in factors of `decompose`: a sum of squares, and the row that has
-    most of it.
+    """A sum of squares that is large where the smallest eigenvalue is small, and the row that has most of it.
+
+    envelope, gram and diagonal are the factors by `decompose`; x (n_row,) is scratch.
 
     C = R L D^1/2 are Cholesky's factors with rows scaled by R to a diagonal of ones. With signs e that make y = C^-1 e
     grow, y . y / n is at most the inverse of the eigenvalue, and hardly less than a few times that (the idea of
@@ -200,14 +216,28 @@ def growth(envelope, gram, diagonal, x):
 
 @kernel
 def weakest(envelope, gram, diagonal, x):
-    """The row, after those before it, at which an eigenvalue below SINGULAR shows in factors of `decompose`, or -1."""
+    """The row with the largest part in an eigenvalue below SINGULAR, or -1 where the factors show none.
+
+    envelope, gram and diagonal are the factors by `decompose`; x (n_row,) is scratch.
+    """
     size, worst = growth(envelope, gram, diagonal, x)
     return worst if size * SINGULAR > envelope.shape[0] else -1
 
 
 @kernel
 def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
-    """Solve with the factors for the right side a (n,), lam (n_row,), in place; driven parts become 0. x: (n_row,)."""
+    """Solve M a + Phi_q^T lam = f, Phi_q a = g with the factors of the joints' matrix.
+
+    Constant:
+      model: the compiled scene.
+      inverse (n,): inverse masses, 0 of driven coordinates (`inverse_masses`).
+    In:
+      pull (n_joint, 3, 6), gram (size[3],), diagonal (2, n_row): the factors, as `factor_joints` leaves them.
+    In place:
+      a (n,): f (N, N m), then the accelerations; 0 where they are driven.
+      lam (n_row,): g, then the multipliers.
+      x (n_row,): scratch.
+    """
     line = model.line
     envelope = model.envelope
     weighed = pull.reshape(pull.size)

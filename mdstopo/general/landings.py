@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 #: reductions that are integrals over time: of g (1), of its square (2)
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
-#: of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
+#: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 #: how often an evaluation looks for landings
 ROUNDS = 3
@@ -34,7 +34,8 @@ ROUNDS = 3
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
 #: tolerances). It costs little, because one halving more lowers the difference by hundreds
 SHARE = 1e-3
-#: halvings of one step at most; from which of them on one is in vain that leaves more than so much of the difference
+#: halvings of one step at most; after PATIENCE of them a step is given up where one more leaves a larger share of the
+#: difference than VAIN: what is left is rounding
 HALVINGS, PATIENCE, VAIN = 24, 3, 0.7
 #: places and angles below this share of the scene's size, or of a radian, are rounding
 NOUGHT = 1e-12
@@ -88,10 +89,14 @@ def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
 def halves(
     t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolerance: float, nothing: float = 0.0
 ) -> list[float]:
-    """Times that halve the intervals between `ends` (k + 1,), and their halves, until the rule is good on each.
+    """Times that halve the intervals between `ends`, and their halves, until a rule of integration is good on each.
 
-    t (m + 1,): ends of steps, all of them among `ends`; rule (2, s): nodes and weights on (0, 1). Good is what differs
-    from the Gauss-Legendre sum by the tolerance times the whole integral at most; an integral below `nothing` is zero.
+    t (m + 1,): ends of the steps (s), all of them among `ends`.
+    ends (k + 1,): times at which steps end or will have to end (s).
+    look: values of the integrand (K,) at places (K, 2), steps and fractions of them.
+    rule (2, s): nodes and weights of the rule on (0, 1).
+    tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
+    nothing: up to this the integral counts as zero, and no interval is halved.
     """
     places = np.concatenate([rule[0], 0.5 * (NODES + 1.0)])
     low, width = ends[:-1], np.diff(ends)

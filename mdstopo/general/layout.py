@@ -15,7 +15,7 @@ from mdstopo.case.model import Case
 from mdstopo.mechanics.joints.table import LISTED
 from mdstopo.scene.model import FloatArray, IndexArray
 
-#: part of a row that must be its own, relative to the row, or others imply it
+#: a row of which no larger share than this is independent of the others is implied by them
 INDEPENDENT = 1e-9
 #: unknowns up to which their natural order is good enough
 FEW = 30
@@ -46,7 +46,15 @@ def arrange(
     home: FloatArray,
     pair: IndexArray,
 ) -> Layout:
-    """Which rows are solved, and every order."""
+    """Choose the rows of the joints that are solved, and order the unknowns and these rows.
+
+    case: for the joints' names.
+    joint (n_joint, 5), joint_par (n_joint, 12): the joints, as in `GeneralModel`.
+    free (n,): 1 for coordinates that are unknowns, 0 for driven ones.
+    mass (n,): m, m, J of each body (kg, kg m^2).
+    home (n / 3, 5): where the bodies stand by the case, as in `GeneralModel`; rows are compared there.
+    pair (n_pair, 2): the two bodies of each pair.
+    """
     row = np.full((len(joint), 3), -1, dtype=np.int64)
     redundant: list[str] = []
     columns: list[list[int]] = []
@@ -60,7 +68,7 @@ def arrange(
                 np.add.at(dense, coordinates, jac[j, r])
                 dense *= np.where(free == 1, 1.0 / np.sqrt(mass), 0.0)
                 size = float(np.linalg.norm(dense))
-                for _ in range(2):  # twice is enough
+                for _ in range(2):  # the second time against rounding
                     for other in kept:
                         dense -= (other @ dense) * other
                 own = float(np.linalg.norm(dense))
@@ -95,6 +103,7 @@ def arrange(
 
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray) -> FloatArray:
+    """(n_joint, 3, 6): Phi_q of the joints at home."""
     from mdstopo.general.start_entry import slopes_of
 
     jac = np.zeros((len(joint), 3, 6))
@@ -103,7 +112,7 @@ def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray) -> Float
 
 
 def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]]) -> tuple[IndexArray, int]:
-    """Place of each coordinate and row, and the distance from the diagonal to the farthest entry."""
+    """Place of each coordinate and row in the banded matrix, and how far from the diagonal its farthest entry is."""
     total = n + len(columns)
     links: set[tuple[int, int]] = set()
     for a, b in pair.tolist():
@@ -119,7 +128,10 @@ def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]])
 
 
 def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
-    """(n_meet, 4): a joint, its side, another joint or itself, its side, where both are on one body that can move."""
+    """(n_meet, 4): a joint, its side, another joint or itself, its side, where both are on one body that can move.
+
+    Sides are 0 for a joint's first body and 1 for its second.
+    """
     on: dict[int, list[tuple[int, int]]] = {}
     for j, (_, a, b, *_) in enumerate(joint.tolist()):
         on.setdefault(a, []).append((j, 0))
@@ -137,8 +149,10 @@ def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
 def _products(
     row: IndexArray, meet: IndexArray, order: IndexArray, envelope: IndexArray
 ) -> Iterator[tuple[int, int, int, int]]:
-    """An entry of the joints' own matrix, where the slopes of two rows by the coordinates of one body begin, and which
-    of the coordinates is meant, of every product that belongs there.
+    """The products that the joints' own matrix is made of, one after the other.
+
+    Of each: the entry that it is added to; where the slopes of two rows by the coordinates of one body begin among
+    those of all joints; and which of the three coordinates is meant.
     """
     for j, side, k, other in meet.tolist():
         for r, s in product(range(3), range(3)):
@@ -150,8 +164,9 @@ def _products(
 
 
 def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, IndexArray, int]:
-    """Place of each row among the rows, `GeneralModel.envelope` and the number of entries: of the order that is cheaper
-    to factor.
+    """Place of each row among the rows, `GeneralModel.envelope`, and the number of entries.
+
+    Where there are many unknowns two orders are compared, and the one that is cheaper to factorise is taken.
     """
     links = {
         (r, s) for j, _, k, _ in meet.tolist() for r in row[j].tolist() for s in row[k].tolist() if r >= 0 and s >= 0
@@ -167,7 +182,7 @@ def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tu
 
 
 def _first(links: set[tuple[int, int]], line: IndexArray) -> IndexArray:
-    """Of each place the first one that its row reaches."""
+    """The first place that each row reaches, by the places of the rows."""
     first = np.arange(len(line), dtype=np.int64)
     for r, s in links:
         low, high = sorted((int(line[r]), int(line[s])))
@@ -176,7 +191,7 @@ def _first(links: set[tuple[int, int]], line: IndexArray) -> IndexArray:
 
 
 def _cost(first: IndexArray) -> int:
-    """Products in the factors of rows that begin there."""
+    """How many products the factors of rows take that begin at these places."""
     places = np.arange(len(first))
     return sum(int((places[f:i] - np.maximum(first[f:i], f) + 2).sum()) for i, f in enumerate(first.tolist()))
 
@@ -194,4 +209,5 @@ def _reordered(links: set[tuple[int, int]], total: int) -> IndexArray:
 
 
 def _width(links: set[tuple[int, int]], place: IndexArray) -> int:
+    """How far from the diagonal the farthest entry is when the unknowns stand at these places."""
     return max((abs(int(place[i] - place[j])) for i, j in links), default=0)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 FINE = np.linspace(0.0, 1.0, 17)
 #: forces looked at in one go, of all members at all samples
 BATCH = 4_000_000
-#: by what share of the largest force a member may stay below it by its cubic, and yet lead in truth
+#: a member whose cubic stays below the largest force by less than this share of it may lead in truth
 CLOSE = 1e-3
 #: members that are compared between two samples at most, those with the largest forces
 MOST = 12
@@ -83,7 +83,17 @@ def is_led(driver: "GeneralDriver", j: int) -> bool:
 def _forces(
     driver: "GeneralDriver", j: int, count: int, steps: IndexArray, fractions: FloatArray, who: IndexArray
 ) -> tuple[FloatArray, FloatArray]:
-    """f* and its rate (C, steps, fractions) of members who (C,), on the quintics through the steps' ends."""
+    """Forces f* of some members and their rates, at the same fractions of several steps.
+
+    driver: of the load case; its last motion is looked at, on the quintics through the steps' ends.
+    j: the response, whose group the members belong to.
+    count: number of steps.
+    steps (W,): which steps.
+    fractions (K,): at which parts of each step, 0 to 1.
+    who (C,): numbers of the members within the group.
+
+    Returns f* (N) and its rate (N/s), both (C, W, K).
+    """
     places = np.stack(np.broadcast_arrays(steps[:, None], fractions[None, :]), axis=-1).astype(np.float64)
     _, seen = compare(driver, j, places.reshape(-1, 2), who, count)
     shaped = seen.reshape(len(who), len(steps), len(fractions), 2)
@@ -113,7 +123,14 @@ def _different(force: FloatArray) -> IndexArray:
 
 
 def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who: IndexArray) -> list[Lead]:
-    """The leads within step w of length h, in which members who (C,) may lead."""
+    """Who leads when within one step, in order of time.
+
+    driver: of the load case, with its last motion.
+    j: the response, whose group the members belong to.
+    count: number of steps.
+    w, h: number of the step, its length (s).
+    who (C,): numbers within the group of the members that may lead.
+    """
     force, rate = (x[:, 0] for x in _forces(driver, j, count, np.array([w]), FINE, who))
     rate *= h / (len(FINE) - 1)
 
@@ -133,7 +150,7 @@ def _in_step(driver: "GeneralDriver", j: int, count: int, w: int, h: float, who:
                 cuts += _roots(force, rate, k, a, b, sign, exact)
     ends = np.array([*_apart(sorted(cuts)), 1.0])
     middles = 0.5 * (ends[:-1] + ends[1:])
-    # what exact looks tell in the middle of all pieces: mostly there are none to look at but the whole step
+    # the exact forces in the middle of each piece say who leads there; mostly the whole step is one piece
     size = np.abs(exact(middles, np.arange(len(who))))
     first = (size >= (1.0 - TIE) * size.max(axis=0)).argmax(axis=0)
     found: list[Lead] = []
@@ -163,7 +180,15 @@ def _roots(
     sign: float,
     exact: Callable[[FloatArray, IndexArray], FloatArray],
 ) -> Iterator[float]:
-    """Fractions of the step at which f_a - sign f_b vanishes between the samples k and k + 1."""
+    """Fractions of the step at which f_a - sign f_b vanishes between the samples k and k + 1.
+
+    force (C, K): forces at the samples FINE (N).
+    rate (C, K): their rates, per interval between two samples (N).
+    k: the first of the two samples.
+    a, b: the two members, as rows of force and rate.
+    sign: 1, or -1 where the forces are equal and opposite.
+    exact: forces (members, fractions) on the motion itself (N), by fractions of the step and rows of force.
+    """
     d, slope = force[a] - sign * force[b], rate[a] - sign * rate[b]
     largest = float(max(np.abs(force[a]).max(), np.abs(force[b]).max()))
     if float(np.abs(d).max()) <= TIE * largest:
@@ -181,7 +206,7 @@ def _roots(
         return
     if not (d0 * s0 < 0.0 < d1 * s1):
         return
-    # it comes nearer to zero and goes away again: the cubic says where, and whether that is worth a look
+    # it comes nearer to zero and goes away again: the cubic says where, and whether it may pass zero there
     square, cube = 3.0 * (d1 - d0) - 2.0 * s0 - s1, s0 + s1 - 2.0 * (d1 - d0)
     c = -s0 / (square + np.copysign(np.sqrt(max(square * square - 3.0 * cube * s0, 0.0)), d0))
     dip = d0 + c * (s0 + c * (square + c * cube))

@@ -21,9 +21,16 @@ NEAR, AIM = 50.0, 5.0
 
 @kernel
 def next_look(low, high, at_low, at_high, rounding, resolution, look):
-    """A length of the step between low and high, where the margins are at_low and at_high < 0; -1: high will do.
+    """Where within a step to look next for the moment at which a margin vanishes; -1 where `high` is near enough.
 
-    The secant through both, aimed behind the switch by more than rounding; after many looks every other is a bisection.
+    It is the secant through both ends, aimed behind the switch by more than rounding; after many looks every other one
+    is a bisection.
+
+    low, high: lengths of the step between which it happens (s).
+    at_low, at_high: the smallest margins there; at_high is negative.
+    rounding: what rounding leaves of a margin.
+    resolution: lengths that differ by no more than this are the same (s).
+    look: how many looks there have been.
     """
     if high - low <= resolution or at_high >= -NEAR * rounding:
         return -1.0
@@ -38,7 +45,14 @@ def next_look(low, high, at_low, at_high, rounding, resolution, look):
 
 @kernel
 def narrowed(low, high, at_low, at_high, middle, value, rounding, side):
-    """low, high, at_low, at_high, side after the margin at `middle` has been seen: Illinois' rule."""
+    """The bracket after another look: low, high, at_low, at_high, side, by Illinois' rule.
+
+    low, high: lengths of the step between which the margin vanishes (s).
+    at_low, at_high: the smallest margins there; the one that stays a second time running is halved.
+    middle, value: where the look was (s), and the margin there.
+    rounding: what rounding leaves of a margin.
+    side: which end the last look has moved: 1 `high`, -1 `low`, 0 none yet.
+    """
     if value < -rounding:
         return low, middle, (0.5 * at_low if side == 1 else at_low), value, 1
     return middle, high, max(value, rounding), (0.5 * at_high if side == -1 else at_high), -1
@@ -46,7 +60,10 @@ def narrowed(low, high, at_low, at_high, middle, value, rounding, side):
 
 @kernel
 def cut_at(dip, near, low, high):
-    """Where to cut the piece of a step between low and high, from what `first_sign` says of it; -1: nowhere."""
+    """Where to cut the piece of a step between low and high (s), or -1: nowhere.
+
+    dip, near: the fractions of the piece that `events.first_sign` has found.
+    """
     c = dip if dip < 1.0 else near
     if not (c > EDGE and c < 1.0 - EDGE):
         return -1.0
@@ -55,11 +72,10 @@ def cut_at(dip, near, low, high):
 
 @kernel
 def matters(model, strength, rel, i):
-    """Whether it makes a difference to derivatives that member or contact i only just does not leave its mode.
+    """Whether derivatives depend on it that member or contact i only just does not leave its mode.
 
-    rel (n_pair, POSE): where.
-
-    What has a permanent set comes back to just where the set was made if nothing is lost: that is no touch to be told.
+    rel (n_pair, POSE): relative poses at that moment. Members with a permanent set are left out: where no energy is
+    lost they come back to the very place at which the set was made, which is no touch to warn of.
     """
     if i >= model.member.shape[1]:
         return contact_grazes(model.contact[i - model.member.shape[1]], int(strength[1, i])) == 2

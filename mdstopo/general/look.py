@@ -28,9 +28,29 @@ def pull(
     start,
     work,
 ):
-    """The integral over time of response j, or where integral is 2 of its square; on demand its derivative by alpha.
+    """Integrate response j over time and, on demand, differentiate the integral by the design (adjoint).
 
-    out (N + P,); padded (M_padded + P,): room. start: as of `adjoint.integral_gradient`.
+    Constant:
+      tag: the method of integration (`duties`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_track`).
+    In:
+      alpha (N,): the design.
+      count: number of steps.
+      j: the response.
+      integral: 1 for the integral of the response, 2 for that of its square.
+      gradient: whether the derivatives are wanted.
+      room, room_ints: flat arrays of the history of steps (`carve_track`).
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out:
+      out (N + P,): derivatives by alpha, then by the values of the laws' variables; untouched without `gradient`.
+      start (n,): what the integral pulls on the start's positions (cotangents); or no length: not wanted.
+      padded (M_padded + P,): derivatives by alpha^mu and values.
+      work (WORK,): counts of work, added to.
+
+    Returns the integral.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)

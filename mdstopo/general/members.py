@@ -23,7 +23,8 @@ from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, el
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
-#: rows of `strength` (3, M_padded): alpha^mu, the mode of a law that switches, the permanent set of one that remembers
+#: rows of `strength` (3, M_padded + n_contact + 1): alpha^mu, the mode of a law that switches or of a contact, the
+#: permanent set of a law that remembers. The last column has the number of events that the modes include (`track`)
 SCALE, MODE, SET = range(3)
 
 #: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps
@@ -44,7 +45,15 @@ def scale_general(block, power, alpha, strength):
 
 @inline
 def direction(member, i, dx, dy, c, s):
-    """Length, b (3 numbers), the inverse length (0 at none) and R q of member i."""
+    """Length and direction of member i at a relative pose.
+
+    member (6, M_padded): P, Q in body frames (m) and what else `GeneralModel.member` has.
+    i: number of the member (padded).
+    dx, dy: place of the second body as seen from the first (m).
+    c, s: cos and sin of its angle.
+
+    Returns L (m), b = dL/dxi (3 numbers), 1 / L (1/m; 0 where there is no length) and R q (2 numbers, m).
+    """
     ax = c * member[2, i] - s * member[3, i]
     ay = s * member[2, i] + c * member[3, i]
     rx = dx + ax - member[0, i]
@@ -56,7 +65,7 @@ def direction(member, i, dx, dy, c, s):
 
 @inline
 def stretched(member, i, r, length):
-    """Delta of member i, which has a length at the relative pose r (POSE,)."""
+    """Elongation Delta (m) of member i at the relative pose r (POSE,), where it has a length."""
     x = member[2, i]
     y = member[3, i]
     rx = r[0] + (r[2] * x - r[3] * y) - member[0, i]
@@ -68,7 +77,7 @@ def stretched(member, i, r, length):
 
 @inline
 def stretch_of(member, i, r):
-    """Delta and dDelta/dt of member i at the relative pose r (POSE,)."""
+    """Elongation Delta (m) and its rate (m/s) of member i at the relative pose r (POSE,)."""
     length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
     return stretched(member, i, r, length), bx * r[4] + by * r[5] + bt * r[6]
 
@@ -84,9 +93,21 @@ def rate_of_row(model, p, row, v):
 
 @kernel
 def add_block(model, k, segment, t, strength, r, tangent, o):
-    """o (SUMS,) += the sums of block k at relative pose r (POSE,) and time t: Q, E, E_xi, and on demand K, C.
+    """Add the forces, energy and tangents of the members of a block to the sums of its pair.
 
     Springs are summed by `add_springs`.
+
+    Constant:
+      model: the compiled scene.
+      k: the block.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      r (POSE,): relative pose of the pair.
+      tangent: whether K and C are wanted.
+    Out:
+      o (SUMS,): Q, E, E_xi and on demand K, C (`mechanics.passes`), added to.
     """
     p = model.law[k]
     code = model.block[k, 3]
@@ -101,7 +122,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):
     lo = model.block[k, 1]
     for i in range(lo, lo + model.block[k, 5]):
         length, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
-        if length == 0.0:  # not where y is: that is so infinitely far away, too
+        if length == 0.0:  # not y == 0.0: that is so infinitely far away, too
             continue
         rate = bx * vx + by * vy + bt * vt
         scale = strength[0, i]
@@ -149,7 +170,18 @@ def add_block(model, k, segment, t, strength, r, tangent, o):
 
 @part
 def add_springs(model, k, strength, r, tangent, o):
-    """`add_block` of a block of springs."""
+    """Add the forces, energy and tangents of a block of springs to the sums of its pair.
+
+    Constant:
+      model: the compiled scene.
+      k: the block.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      r (POSE,): relative pose of the pair.
+      tangent: whether K and C are wanted.
+    Out:
+      o (SUMS,): Q, E, E_xi and on demand K, C (`mechanics.passes`), added to.
+    """
     member = model.member
     p = model.law[k]
     start = model.block[k, 1]
@@ -176,7 +208,19 @@ def add_springs(model, k, strength, r, tangent, o):
 
 @kernel
 def general_sums(model, segment, t, strength, rel, tangent, sums):
-    """sums (n_pair, SUMS) += those of all acting blocks at relative poses rel (n_pair, POSE)."""
+    """Add the forces, energy and tangents of all members that act, but inerters, to the sums of their pairs.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      rel (n_pair, POSE): relative poses.
+      tangent: whether K and C are wanted.
+    Out:
+      sums (n_pair, SUMS): Q, E, E_xi and on demand K, C (`mechanics.passes`), added to.
+    """
     for k in range(model.block.shape[0]):
         if model.active[segment, k] != 0 and model.block[k, 3] != INERTER:
             p = model.block[k, 0]
@@ -188,10 +232,11 @@ def general_sums(model, segment, t, strength, rel, tangent, sums):
 
 @kernel
 def set_modes(model, strength, rel, rel_rate, knots):
-    """The modes at the start from elongation, rate and second derivative (rel_rate: the pose of the accelerations).
+    """Set rows MODE and SET of strength, modes and permanent sets of members and contacts, as they are at the start.
 
-    knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of many
-    members, curves have none.
+    rel (n_pair, POSE): relative poses; rel_rate (n_pair, 3): their second derivatives in time.
+    knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of more
+    than KNOTTED members, curves have no modes.
     """
     for k in range(model.block.shape[0]):
         code = model.block[k, 3]
@@ -208,7 +253,7 @@ def set_modes(model, strength, rel, rel_rate, knots):
             whole = law_has_pieces(code) and (not knots or model.block[k, 5] > KNOTTED)
             strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
             strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
-            if law_remembers(code) and model.active[0, k] == 0:  # whatever it is like now, nothing has been done to it
+            if law_remembers(code) and model.active[0, k] == 0:  # it has not acted yet
                 strength[1, i] = 0.0
                 strength[2, i] = 0.0
     for j in range(model.contact_pair.shape[0]):
@@ -243,9 +288,23 @@ def second_rate(member, i, r, acc):
 
 @kernel
 def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):
-    """out (M_padded,) += f_i (b_i . u) + weight V_i of the members of block k at unit strength.
+    """Add what the members of a block contribute to a derivative by alpha^mu at one state: f_i (b_i . u) + weight V_i.
 
-    r (POSE,): relative pose; u (3,): virtual change of it; weight: of the stored energy. modes_of (M_padded,).
+    f_i and V_i are a member's force (N) and energy (J) at unit strength; not of inerters.
+
+    Constant:
+      model: the compiled scene.
+      k: the block.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      modes_of (M_padded or more,): mode of every member.
+      r (POSE,): relative pose of the pair.
+      u (3,): virtual change of that pose (m, m, rad).
+      weight: factor of the stored energy.
+    Out:
+      out (M_padded or more,): added to.
     """
     p = model.law[k]
     code = model.block[k, 3]
@@ -271,9 +330,11 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):
 
 @kernel
 def unscale_general(block, power, alpha, padded, out):
-    """out (N + P,) = mu alpha^(mu - 1) times the padded gradient by alpha^mu, summed over the laws of a member.
+    """Derivatives by alpha from those by alpha^mu: times mu alpha^(mu - 1), summed over the laws of a member.
 
-    Behind the N come the derivatives by parameters, of which padded (M_padded + P,) has as many behind its members.
+    block (n_block, 8), power (n_block,): as in `GeneralModel`; alpha (N,): the design.
+    padded (M_padded + P,): derivatives by alpha^mu of each member and law, then by the values of the laws' variables.
+    out (N + P,): set to the derivatives by alpha, then, unchanged, those by the values.
     """
     out[:] = 0.0
     members = block[block.shape[0] - 1, 2] if block.shape[0] > 0 else 0
@@ -292,7 +353,20 @@ def unscale_general(block, power, alpha, padded, out):
 
 @kernel
 def meeting(model, segment, t, strength, before, after):
-    """Padded index of a member whose ends meet between two relative poses while it would carry a force, or -1."""
+    """A member whose ends meet between two relative poses while it would carry a force, or -1.
+
+    There its direction is not defined, so the motion has no derivative.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      before, after (n_pair, POSE): the poses; between them ends move on straight lines.
+
+    Returns the number of the member (padded).
+    """
     for k in range(model.block.shape[0]):
         if model.active[segment, k] == 0 or model.block[k, 3] == INERTER:
             continue

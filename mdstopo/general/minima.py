@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 LOW = 0.05
 #: distances, in steps, of the places whose squares tell where a value turns round
 APART = (1e-2, 1e-3)
-#: how near to zero, as a time in steps at the rate beside it, a value is zero
+#: a minimum is a zero if, at the rate beside it, the value would reach zero within this share of a step
 NOUGHT = 1e-9
 #: how near to zero a value is that has a kink where a step was made to end at its zero, relative to the highest
 LANDED = 1e-6
@@ -106,7 +106,7 @@ def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> list[FloatArray]:
     bent = bool(has_kinks(driver.scene.model, j))
     for row in rows:
         k, c = int(row[STEP]), float(row[FRACTION])
-        between = k if c <= 0.0 else k + 1  # which boundary, where it is one
+        between = k if c <= 0.0 else k + 1  # the number of the boundary, if the place is one
         pieces.settle(row, k, float(pieces.fraction(np.array([k]), np.array([c]))[0]))
         if c <= 0.0 or c >= 1.0:
             if 0 < between < len(pieces.leads):

@@ -42,7 +42,24 @@ from mdstopo.mechanics.laws.table import (
 
 @kernel
 def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate):
-    """df/dp and dV/dp of member i of block k at unit strength, and its B over its bodies into row (6,)."""
+    """Derivatives of the force and energy of one member, at unit strength, by a parameter of its law.
+
+    Constant:
+      model: the compiled scene.
+      k: the block of the member.
+      i: number of the member (padded).
+      place: which parameter, as a place of the law's row, or FREE_LENGTH.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      row (6,): slopes dDelta/dq by the coordinates of the two bodies (m/m, m/rad).
+      row_rate (6,): their rates in time; of inerters untouched.
+
+    Returns df/dp and dV/dp (N and J per unit of the parameter).
+    """
     if model.block[k, 3] == INERTER:
         first = 3 * model.pair[model.block[k, 0], 0]
         second = 3 * model.pair[model.block[k, 0], 1]
@@ -60,7 +77,20 @@ def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row
 
 @kernel
 def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):
-    """out (M_padded + P,), behind the members, += s (weight V_p - f_p (b . T z)) of all parameters at one state."""
+    """Add s (weight dV/dp - df/dp (B . z)) of all members to the derivatives by the laws' parameters p, at one state.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      z (n,): virtual displacements at this state.
+      weight: factor of the stored energy, that of design members.
+    Out:
+      out (M_padded + P,): added to behind the members.
+    """
     row = np.empty(6)
     row_rate = np.empty(6)
     members = model.member.shape[1]
@@ -80,7 +110,20 @@ def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):
 
 @kernel
 def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale, out):
-    """out, behind the members, += scale df*/dp at fixed motion of member `who` of a group."""
+    """Add the derivatives, at fixed motion, of the force of one member by the parameters of its laws.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      group, who: the group, and the number of the member in it.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      scale: factor of the derivatives of f*.
+    Out:
+      out (M_padded + P,): added to behind the members.
+    """
     row = np.empty(6)
     row_rate = np.empty(6)
     members = model.member.shape[1]
@@ -98,7 +141,11 @@ def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale
 
 @kernel
 def event_slope(model, track, strength, event, e):
-    """dt_e/dp = -m_p/m' of an event by the parameter of entry e of `varied`; 0 where it has nothing to do with it."""
+    """Derivative of the time of an event by the parameter of entry e of `varied`: dt_e/dp = -m_p/m' (s per unit of p).
+
+    0 where the parameter is not in the margin m of the member that switched, or where the time is given. The modes
+    in strength are perhaps changed to those just before the event.
+    """
     k = model.varied[e, 0]
     place = model.varied[e, 1]
     state = track.event[event, 0]
@@ -139,7 +186,20 @@ def event_slope(model, track, strength, event, e):
 
 @kernel
 def add_event(model, track, strength, event, factor, out):
-    """out, behind the members, += factor dt_e/dp of an event; modes are not what they were before the call."""
+    """Add what the laws' parameters do to a value by shifting the time of an event.
+
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      event: number of the event.
+      factor: derivative of the value by the time of the event (per s).
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+        The modes are perhaps changed to those just before the event.
+    Out:
+      out (M_padded + P,): factor dt_e/dp is added behind the members.
+    """
     if factor == 0.0:
         return
     for e in range(model.varied.shape[0]):
@@ -148,7 +208,10 @@ def add_event(model, track, strength, event, factor, out):
 
 @kernel
 def begins_or_ends(model, track, count, state, e):
-    """Whether the law of entry e begins (1) or ceases (-1) to act at a state, at the time that varies; else 0."""
+    """Whether the law of entry e of `varied` begins (1) or ceases (-1) to act at a state; else 0.
+
+    count is the number of steps: the number of the last state.
+    """
     place = model.varied[e, 1]
     if place < ACTIVE_FROM:
         return 0
@@ -169,10 +232,27 @@ def begins_or_ends(model, track, count, state, e):
 
 @kernel
 def time_jump(model, track, strength, count, state, e, j, square, dv):
-    """What shifting the time of entry e does at a state: dv (n,) behind it, and to the integral of g_j (of its square).
+    """What shifting the time of entry e of `varied`, at which laws begin or end to act, does at one state.
 
-    Returns whether it does anything, and the latter (0 for j < 0). Only the first entry of a value does: it stands for
-    all laws that the value shifts.
+    Entries with the same value are shifted together: the first of them stands for all.
+
+    Constant:
+      model: the compiled scene.
+        Its `active` is changed on the way and then as before.
+      track: the history of steps (`Track`).
+      count: number of steps.
+    In:
+      state: number of the state.
+      e: entry of `varied`, of a law's begin or end.
+      j: a response whose integral is differentiated; -1: none.
+      square: whether the integral is that of the response's square.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+        The modes are perhaps changed to those of the step in which the laws act.
+    Out:
+      dv (n,): derivative of the velocities behind the state by that time (m/s^2, rad/s^2); 0 where it does nothing.
+
+    Returns whether it does anything, and the derivative of the integral by that time (0 without one).
     """
     dv[:] = 0.0
     which = model.varied[e, 2]
@@ -216,10 +296,23 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):
 
 @kernel
 def add_times(model, track, strength, count, state, j, square, lam_v, rate, out):
-    """out, behind the members, += what shifting the times of laws that begin or end at a state does.
+    """Add what shifting the times does, at one state, at which laws begin or end to act.
 
-    lam_v (n,): its cotangent of the velocities behind the state; rate: dg/dt of a peak that stands there, which moves
-    with the time; j, square: as of `time_jump`, for an integral. Modes are not what they were before the call.
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+      count: number of steps.
+    In:
+      state: number of the state.
+      j: a response whose integral is differentiated; -1: none.
+      square: whether the integral is that of the response's square.
+      lam_v (n,): cotangents of the velocities behind the state.
+      rate: rate in time of a peak that stands at the state, and moves with the time (per s); 0 for none.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+        The modes are perhaps changed to those of the steps beside the state.
+    Out:
+      out (M_padded + P,): added to behind the members.
     """
     dv = np.empty(lam_v.shape[0])
     for e in range(model.varied.shape[0]):

@@ -45,7 +45,7 @@ def count_sets(model):
 
 @kernel
 def slot_of(model, i):
-    """The slot of padded member i and its block, or -1, -1."""
+    """The slot of padded member i and its block; -1, -1 where its law does not remember."""
     slot = 0
     for k in range(model.block.shape[0]):
         if not law_remembers(model.block[k, 3]):
@@ -58,14 +58,34 @@ def slot_of(model, i):
 
 @kernel
 def set_slopes(model, k, i, strength, x, rate):
-    """Slopes of s f and of s V of member i of block k by its set; x: the elongation without it."""
+    """Derivatives of the force and energy of member i by its permanent set: of s f (N/m) and of s V (N).
+
+    model: the compiled scene.
+    k: the block of the member.
+    i: number of the member (padded).
+    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    x: elongation less the permanent set (m).
+    rate: rate of the elongation (m/s).
+    """
     _, by_x, _, _, pull = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), 0.0, 0.0, model.curves)
     return -strength[0, i] * by_x, -strength[0, i] * pull
 
 
 @kernel
 def add_sets(model, segment, strength, q, v, z, weight, out):
-    """out (slots,) += what the sets do to the forces at a state with virtual displacement z (n,), and to weight V."""
+    """Add, at one state, what the permanent sets do to the forces, by their virtual work, and to the stored energy.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      z (n,): virtual displacements at this state.
+      weight: factor of the stored energy, that of design members.
+    Out:
+      out (slots,): derivatives by the sets, added to.
+    """
     rel = np.empty((model.pair.shape[0], POSE))
     u = np.empty(3)
     relative_pose(model.pair, model.home, q, v, rel)
@@ -91,7 +111,22 @@ def add_sets(model, segment, strength, q, v, z, weight, out):
 
 @kernel
 def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):
-    """out (slots,) += scale dg_j/dp at fixed motion of a member force, whose slopes are bars (3, n)."""
+    """Add the derivatives, at fixed motion, of a member force by the permanent sets; of other responses there are none.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j: the response.
+      who: number of the member in its group.
+      t: time (s).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      bars (3, n): slopes of the response by q, v, a, which tell the sign of the force.
+      scale: factor of the derivatives.
+    Out:
+      out (slots,): derivatives by the sets, added to.
+    """
     if model.response[j, 0] != MEMBER_FORCE:
         return
     row = np.empty(6)
@@ -100,7 +135,7 @@ def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale,
     own = np.empty((2, 6))
     group = model.response[j, 5]
     _, pair = member_force(model, strength, segment, t, group, who, q, v, a, slopes, own)
-    along = 0.0  # the force may be none here: its sign is that of its slopes
+    along = 0.0  # the force may be zero here; then its slopes tell its sign
     for c in range(6):
         along += slopes[0, c] * bars[0, 3 * model.pair[pair, c // 3] + c % 3]
     sign = 1.0 if along >= 0.0 else -1.0
@@ -119,7 +154,22 @@ def add_explicit_sets(model, strength, segment, j, who, t, q, v, a, bars, scale,
 
 @kernel
 def add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, scale, out):
-    """out (slots,) += scale dg_j/dp at fixed motion of any response, whose slopes are bars (3, n)."""
+    """Add the derivatives, at fixed motion, of any response by the permanent sets.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j: the response.
+      who: of a member force the number of the member in its group.
+      t: time (s).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      bars (3, n): slopes of the response by q, v, a.
+      scale: factor of the derivatives.
+    Out:
+      out (slots,): derivatives by the sets, added to.
+    """
     if model.response[j, 0] == ENERGY:
         add_sets(model, segment, strength, q, v, np.zeros(q.shape[0]), scale, out)
     else:
@@ -140,7 +190,10 @@ def made_set(model, track, e):
 
 @kernel
 def time_back(model, track, e, pulled, bar):
-    """bar (slots,) of the set that the time of event e depends on, which pulls `pulled` on that time's slopes."""
+    """Add to bar (slots,), the cotangents of the sets, what they do to the time of event e.
+
+    pulled: derivative of the value that is differentiated by the time of the event (per s).
+    """
     slot, _ = slot_of(model, track.event[e, 1])
     if slot >= 0:
         bar[slot] -= pulled * track.kept[e, 2]
@@ -148,7 +201,10 @@ def time_back(model, track, e, pulled, bar):
 
 @kernel
 def time_forward(model, track, e, sets, i):
-    """What the change sets[:, i] of its member's set adds to the time of event e."""
+    """How much later event e happens because its member's permanent set changes (s per unit of variable i).
+
+    sets (slots, M_padded + P): derivatives of the sets (m) by each alpha^mu, then by each value; i: one of these.
+    """
     slot, _ = slot_of(model, track.event[e, 1])
     return -track.kept[e, 2] * sets[slot, i] if slot >= 0 else 0.0
 
@@ -169,8 +225,9 @@ def own_slope(model, track, e, entry, rate):
 
 @kernel
 def begins_divided(model, strength, q, v, near):
-    """A member (padded) that begins, within `near` (m), with a set that depends on parameters that vary on one side
-    only; or -1.
+    """A member (padded) whose permanent set at the start depends on varying parameters on one side only, or -1.
+
+    Its derivative differs on both sides; near: how near to such a place counts (m); q, v (n,): the start.
     """
     row = np.empty(6)
     row_rate = np.empty(6)
@@ -190,8 +247,20 @@ def begins_divided(model, strength, q, v, near):
 
 @kernel
 def sets_back(model, track, e, bar, lam_q, out):
-    """Behind event e the cotangent of the set that it made, bar (slots,), becomes one of the pose, lam_q (n,), and of
-    what parameters do to it, out (M_padded + P,) behind the members.
+    """Pull the cotangent of the permanent set that event e has made back to the positions and the parameters.
+
+    Nothing where the event has made none.
+
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      e: number of the event.
+    In place:
+      bar (slots,): cotangents of the sets behind the event; that of the set which was made becomes 0.
+    Out:
+      lam_q (n,): cotangents of the coordinates at the event, added to.
+      out (M_padded + P,): derivatives by the parameters, added to behind the members.
     """
     slot, k = made_set(model, track, e)
     if slot < 0:
@@ -211,9 +280,17 @@ def sets_back(model, track, e, bar, lam_q, out):
 
 @kernel
 def keep_start(model, track, lam_q, bar, start, out):
-    """start (n,) = the cotangents lam_q of the start's positions, with those of the sets that members begin with.
+    """Finish a reverse sweep at the start: pull back the sets that members begin with, and keep the cotangents there.
 
-    Nothing where start has no length. out: as of `sets_back`.
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In place:
+      lam_q (n,): cotangents of the start's coordinates; those of the sets are added to them.
+      bar (slots,): cotangents of the sets, which become 0 for those that members begin with.
+    Out:
+      start (n,): lam_q afterwards; or no length: not wanted.
+      out (M_padded + P,): derivatives by the parameters, added to behind the members.
     """
     if start.shape[0] == 0 and model.varied.shape[0] == 0:
         return
@@ -226,7 +303,12 @@ def keep_start(model, track, lam_q, bar, start, out):
 
 @kernel
 def sets_forward(model, track, e, column, sets):
-    """sets (slots, M_padded), the derivatives of the sets, behind event e; column as of `direct.through_step`."""
+    """Carry the derivatives of the permanent sets over event e, if it has made one.
+
+    column (M_padded + P, 4 n + 1): derivatives of q, v and the rest of the state, a row each variable
+      (`direct.through_step`).
+    sets (slots, M_padded + P): derivatives of the sets; the row of the set that was made is written.
+    """
     slot, k = made_set(model, track, e)
     if slot < 0:
         return
@@ -245,7 +327,18 @@ def sets_forward(model, track, e, column, sets):
 
 @kernel
 def through_sets(model, strength, track, w, matrix, out):
-    """out (slots, 4 n + 1): what unit sets do at the end of step w, by its map (`direct.step_map`)."""
+    """What unit changes of the permanent sets do to the end of a step.
+
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      w: number of the step.
+      matrix (4 n + s n, 4 n + 1): the map of the step (`direct.step_map`).
+    Out:
+      out (slots, 4 n + 1): changes of q, v, the carried rows and the integral, per m of set.
+    """
     n = model.mass.shape[0]
     segment = track.index[w, 2]
     o = track.index[w, 0]

@@ -27,8 +27,7 @@ from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 MISFIT = 1e-7
 #: corrections of the position at most; each squares the misfit
 MOST = 12
-#: sweeps at most until what the multipliers do to the reverse has settled, and the change of the last one by which it
-#: has, relative, as the root of mass times square
+#: sweeps of `swept` at most, and the change of a sweep, relative and weighed by mass, at which they have settled
 SWEEPS, SETTLED = 8, 1e-16
 
 
@@ -46,10 +45,20 @@ def misfit(model, phi, rows):
 
 @kernel
 def project(model, scale, q, v, desk, mu, nu):
-    """Move q, v (n,) onto the joints; mu, nu (n_row,) are the multipliers that did it.
+    """Move a state onto the joints, to the nearest one by mass.
 
-    scale: size of the scene, m. Returns the place of the unknown at which the joints are singular, or -1; or, behind
-    all places, the number of a joint that the others do not let fit.
+    Constant:
+      model: the compiled scene.
+      scale: size of the scene (m).
+    In place:
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s); driven ones are in place already.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+        It holds the joints at the state that was found, and the factors of their matrix.
+      mu, nu (n_row,): multipliers that moved the coordinates and the velocities.
+
+    Returns the place of the unknown at which the joints are singular, or -1; or, behind all places, the number of a
+    joint that the others do not let fit.
     """
     n = q.shape[0]
     n_row = mu.shape[0]
@@ -67,7 +76,7 @@ def project(model, scale, q, v, desk, mu, nu):
         none[:] = 0.0
     last = np.inf
     worst = np.inf
-    moved = 0.0  # since home: misfits are known to a share of it
+    moved = 0.0  # since home (m): misfits are only known relative to it
     for b in range(0, n, 3):
         moved = max(moved, abs(q[b]), abs(q[b + 1]), min(abs(q[b + 2]), 1.0) * scale)
     for _ in range(MOST):
@@ -113,7 +122,18 @@ def project(model, scale, q, v, desk, mu, nu):
 
 @kernel
 def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
-    """h_mu, h_nu (n_pair, 6, 6) = d(Phi_q^T mu)/dq and with nu; slope (n_joint, 3, 6) = d(Phi_q v)/dq."""
+    """How the products of Phi_q with mu, nu and v change with the coordinates.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      q, v (n,): the projected state (m, rad; m/s, rad/s).
+      mu, nu (n_row,): multipliers that moved it there.
+      desk: workspace of a balance, with the bodies turned (`forces.turn_bodies`).
+    Out:
+      h_mu, h_nu (n_pair, 6, 6): d(Phi_q^T mu)/dq and d(Phi_q^T nu)/dq of the joints of each pair.
+      slope (n_joint, 3, 6): d(Phi_q v)/dq.
+    """
     w = np.empty(PLACES)
     wd = np.empty(6)
     mine = np.empty(3)
@@ -133,10 +153,13 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
 
 @kernel
 def swept(model, desk, h, x, y):
-    """Solve [M + H^T, Phi_q^T; Phi_q, 0] with the factors of H = 0 on the desk, by sweeps: x (n,), y (n_row,) in place.
+    """Solve [M + H^T, Phi_q^T; Phi_q, 0] by sweeps with the factors of H = 0, which are on the desk.
 
-    H (n_pair, 6, 6) is as small as what a step has drifted. Returns whether the sweeps have settled; else x is as it
-    was, and y is zero.
+    H is as small as what a step has drifted, so few sweeps do. Returns whether they have settled.
+
+    h (n_pair, 6, 6): H by pairs of bodies.
+    x (n,): right side, then the solution; as it was where the sweeps have not settled.
+    y (n_row,): right side of the rows, of the first sweep; zero afterwards.
     """
     n = x.shape[0]
     right = np.empty(n)
@@ -167,7 +190,18 @@ def swept(model, desk, h, x, y):
 
 @kernel
 def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
-    """Pull cotangents of the projected state q, v back to the one before; bar_q, bar_v (R, n) in place."""
+    """Pull cotangents of projected states back to the states before the projection.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      q, v (n,): the projected state (m, rad; m/s, rad/s).
+      mu, nu (n_row,): multipliers that moved it there.
+    In place:
+      bar_q, bar_v (R, n): R cotangents of coordinates and velocities.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+    """
     n = q.shape[0]
     count = bar_q.shape[0]
     if mu.shape[0] == 0:
@@ -215,7 +249,18 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
 
 @kernel
 def project_forward(model, q, v, mu, nu, desk, dq, dv):
-    """Push changes dq, dv (n,) of the state before through the projection, in place."""
+    """Push changes of a state through its projection.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      q, v (n,): the projected state (m, rad; m/s, rad/s).
+      mu, nu (n_row,): multipliers that moved it there.
+    In place:
+      dq, dv (n,): changes of coordinates and velocities, before and then behind the projection.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+    """
     n = q.shape[0]
     if mu.shape[0] == 0:
         return

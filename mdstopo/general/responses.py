@@ -26,7 +26,7 @@ from mdstopo.mechanics.laws.table import law
 from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
 from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
 
-#: the kernels of responses by their code, column KIND of `GeneralModel.response`; `enter` fills it, at the end
+#: the kernels of responses by their code, column KIND of `GeneralModel.response`; `code_of` fills it
 LISTED: Listed[ResponseKernels] = Listed()
 #: codes of the two responses that depend on the design at fixed motion: stored energy, forces of members
 ENERGY, MEMBER_FORCE = 0, 3
@@ -39,11 +39,13 @@ APART = 3e-4
 
 @chosen(LISTED, lambda each: each.absolute or None, part)
 def _is_absolute(kind):
+    """Whether responses of a kind are absolute values, or the largest of several."""
     return False
 
 
 @chosen(LISTED, lambda each: True if each.vector else None, part)
 def _is_vector(kind):
+    """Whether responses of a kind are a component or the norm of a plane vector."""
     return False
 
 
@@ -55,6 +57,7 @@ def needs_balance(kind):
 
 @chosen(LISTED, lambda each: True if each.by_state else None, part)
 def _is_by_state(kind):
+    """Whether the rate of responses of a kind is g_q v + g_v a (`ResponseKernels.by_state`)."""
     return False
 
 
@@ -66,9 +69,21 @@ def kinked(model, j):
 
 @kernel
 def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
-    """f* of member i of a group, all its laws together; slopes (3, 6) by q, v, a of its bodies; own: scratch (2, 6).
+    """Force f* of one member of a group, all its laws together, with its slopes.
 
-    Returns f*, its pair.
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group, i: the group, and the number of the member in it.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      slopes (3, 6): of f* by q, v and a of the two bodies; an inerter's are those by a alone (`_inerter_slopes`).
+      own (2, 6): scratch.
+
+    Returns f* (N), positive in tension, and the pair of bodies.
     """
     total = 0.0
     pair = 0
@@ -101,7 +116,19 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
 
 @kernel
 def group_forces(model, strength, segment, t, group, q, v, a, out):
-    """out (M,) = f* of all members of a group: that of `member_force`, to the bit, without slopes."""
+    """Forces f* of all members of a group: those of `member_force`, to the bit, without slopes.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group: the group.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      out (M,): f* of each member of the group (N).
+    """
     row = np.empty(6)
     out[:] = 0.0
     for k in range(model.block.shape[0]):
@@ -134,7 +161,17 @@ def group_forces(model, strength, segment, t, group, q, v, a, out):
 
 @kernel
 def largest_force(model, strength, segment, t, group, q, v, a):
-    """The member of a group that carries the largest |f*|."""
+    """The number within its group of the member that carries the largest |f*|.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group: the group.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    """
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
     best = -1.0
@@ -159,7 +196,22 @@ def members_of(model, group):
 
 @kernel
 def equal_forces(model, strength, segment, t, group, stage, largest, tied):
-    """Which members of a group carry the largest |f*| at a stage (3, n), to TIE: into tied (members,); how many."""
+    """Find the members of a group that share the largest |f*|, to TIE.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group: the group.
+      stage (3, n): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      largest: the largest |f*| there (N).
+    Out:
+      tied (M,): numbers of these members, first of all; M is the size of the group.
+
+    Returns how many they are; 1 where all forces are zero, of which none is written.
+    """
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
     found = 0
@@ -173,14 +225,41 @@ def equal_forces(model, strength, segment, t, group, stage, largest, tied):
 
 @chosen(LISTED, lambda each: each.value, part)
 def _value(kind, model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):
+    """Value of a response by its kind (`ResponseKernels.value`).
+
+    kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
+    model: the compiled scene.
+    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    segment: number of the stretch of time between two breakpoints.
+    j: the response.
+    who: of a member force the number of the member in its group.
+    t: time (s).
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    lam (n_row,): multipliers of the joints.
+    desk: workspace as the balance of this state has left it.
+    bars (3, n), row_bar (n_row,): slopes by q, v, a and by lam, zero before.
+    """
     return np.nan
 
 
 @kernel
 def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):
-    """g_j at a balanced state; bars (3, n), row_bar (n_row,) = its slopes by q, v, a and lam (set, not added to).
+    """Value of response j, with its slopes, at a state whose balance has just been made.
 
-    who: the member looked at, for member forces.
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j: the response.
+      who: of a member force the number of the member in its group.
+      t: time (s).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      lam (n_row,): multipliers of the joints.
+      desk: workspace as the balance of this state has left it.
+    Out:
+      bars (3, n): slopes by q, v and a.
+      row_bar (n_row,): slopes by lam.
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
@@ -189,7 +268,7 @@ def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_
 
 @kernel
 def energy_value(model, desk, bars):
-    """Stored energy."""
+    """Elastic energy stored in all design members (J); its slopes by q are added to bars (3, n)."""
     value = 0.0
     for p in range(model.pair.shape[0]):
         o = desk.sums[p]
@@ -200,7 +279,20 @@ def energy_value(model, desk, bars):
 
 @kernel
 def members_value(model, strength, segment, j, who, t, q, v, a, bars):
-    """|f*| of member `who` of a group."""
+    """|f*| of one member of a group (N).
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      j: the response, which says which group.
+      who: number of the member in the group.
+      t: time (s).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      bars (3, n): slopes by q, v and a, added to.
+    """
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
     f, pair = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
@@ -217,25 +309,54 @@ def members_value(model, strength, segment, j, who, t, q, v, a, bars):
 
 @kernel
 def motion_value(model, j, q, v, a, bars):
-    """The component of a point's motion, or the angle, that is asked for."""
+    """Component or norm of a point's motion, or an angle, its rate or second derivative, as response j asks.
+
+    model: the compiled scene.
+    j: the response.
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    bars (3, n): slopes by q, v and a are added to it.
+    """
     return _motion(model, j, model.response[j, 3], q, v, a, bars)
 
 
 @kernel
 def joint_force_value(model, j, q, lam, bars, row_bar):
-    """Norm of the force that a joint transmits."""
+    """Norm of the force that a joint transmits (N).
+
+    model: the compiled scene.
+    j: the response, which says which joint.
+    q (n,): coordinates (m, rad).
+    lam (n_row,): multipliers of the joints.
+    bars (3, n): slopes by q are added to its first row.
+    row_bar (n_row,): slopes by lam are written into it.
+    """
     return _transmitted(model, j, FORCE, q, lam, bars, row_bar)
 
 
 @kernel
 def joint_moment_value(model, j, q, lam, bars, row_bar):
-    """Norm of the couple that a joint transmits."""
+    """Absolute value of the moment that a joint transmits (N m).
+
+    model: the compiled scene.
+    j: the response, which says which joint.
+    q (n,): coordinates (m, rad).
+    lam (n_row,): multipliers of the joints.
+    bars (3, n): slopes by q are added to its first row.
+    row_bar (n_row,): slopes by lam are written into it.
+    """
     return _transmitted(model, j, MOMENT, q, lam, bars, row_bar)
 
 
 @kernel
 def _motion(model, j, component, q, v, a, bars):
-    """A component of a point's motion (or an angle's) that response j looks at; its slopes are added to bars (3, n)."""
+    """One component of the motion of the point, or of the angle, that response j is about.
+
+    model: the compiled scene.
+    j: the response.
+    component: X, Y, NORM or ACROSS (`responses.kinematics`); angles have none.
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    bars (3, n): slopes by q, v and a are added to it.
+    """
     slope = np.empty((6, 3))
     b = 3 * model.response[j, 1]
     r = 3 * model.response[j, 2]
@@ -267,7 +388,16 @@ def _motion(model, j, component, q, v, a, bars):
 
 @kernel
 def _transmitted(model, j, which, q, lam, bars, row_bar):
-    """What the joint transmits that response j looks at (`joint_transmitted`); slopes as of `response`."""
+    """What the joint transmits that response j is about, with its slopes (`joint_transmitted`).
+
+    model: the compiled scene.
+    j: the response, which says which joint.
+    which: FORCE, MOMENT or ACROSS.
+    q (n,): coordinates (m, rad).
+    lam (n_row,): multipliers of the joints.
+    bars (3, n): slopes by q are added to its first row.
+    row_bar (n_row,): slopes by lam are written into it.
+    """
     joint = model.response[j, 5]
     w = np.empty(PLACES)
     mine = np.empty(3)
@@ -286,7 +416,7 @@ def _transmitted(model, j, which, q, lam, bars, row_bar):
 
 @kernel
 def is_norm(model, j):
-    """Whether response j is the Euclidean norm of a vector (2,), which has a direction of its own."""
+    """Whether response j is the Euclidean norm of a plane vector."""
     return _is_vector(model.response[j, 0]) and model.response[j, 3] == NORM
 
 
@@ -302,14 +432,31 @@ def has_kinks(model: GeneralModel, j: int) -> bool:
 
 @chosen(LISTED, lambda each: each.vector and each.vector.across, part)
 def _across(kind, model, j, q, v, a, lam, bars, row_bar):
+    """Slopes of the component perpendicular to a response's vector, by its kind (`VectorKernels.across`).
+
+    kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
+    model: the compiled scene.
+    j: the response.
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    lam (n_row,): multipliers of the joints.
+    bars (3, n), row_bar (n_row,): slopes by q, v, a and by lam, zero before.
+    """
     return np.nan
 
 
 @kernel
 def across_slopes(model, j, q, v, a, lam, bars, row_bar):
-    """Slopes of the component perpendicular to the vector whose norm response j is (`is_norm`), its direction held.
+    """Slopes of the component perpendicular to the vector whose norm response j is, with the direction held.
 
-    bars (3, n), row_bar (n_row,): as of `response`; zero where the vector is.
+    Constant:
+      model: the compiled scene.
+    In:
+      j: the response, a norm (`is_norm`).
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      lam (n_row,): multipliers of the joints.
+    Out:
+      bars (3, n): slopes by q, v and a; zero where the vector is.
+      row_bar (n_row,): slopes by lam.
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
@@ -318,24 +465,52 @@ def across_slopes(model, j, q, v, a, lam, bars, row_bar):
 
 @kernel
 def motion_across(model, j, q, v, a, bars):
-    """The component of a point's motion perpendicular to it."""
+    """Add the slopes of the component of a point's motion that is perpendicular to the vector of this motion.
+
+    model: the compiled scene.
+    j: the response.
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    bars (3, n): slopes by q, v and a are added to it.
+    """
     return _motion(model, j, ACROSS_MOTION, q, v, a, bars)
 
 
 @kernel
 def joint_force_across(model, j, q, lam, bars, row_bar):
-    """The component of the force that a joint transmits perpendicular to it."""
+    """Add the slopes of the component perpendicular to the force that a joint transmits.
+
+    model: the compiled scene.
+    j: the response, which says which joint.
+    q (n,): coordinates (m, rad).
+    lam (n_row,): multipliers of the joints.
+    bars (3, n): slopes by q are added to its first row.
+    row_bar (n_row,): slopes by lam are written into it.
+    """
     return _transmitted(model, j, ACROSS_FORCE, q, lam, bars, row_bar)
 
 
 @chosen(LISTED, lambda each: each.vector and each.vector.components, part)
 def _components(kind, model, j, q, v, a, lam, out):
-    """out (2,) = the vector whose norm response j is, in the frame in which it is formed."""
+    """The vector whose norm response j is, in the frame where it is formed, by its kind (`VectorKernels.components`).
+
+    kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
+    model: the compiled scene.
+    j: the response.
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    lam (n_row,): multipliers of the joints.
+    out (2,): the vector.
+    """
 
 
 @kernel
 def motion_components(model, j, q, v, a, out):
-    """Both components of a point's motion."""
+    """Both components of a point's motion.
+
+    model: the compiled scene.
+    j: the response.
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    out (2,): the components along x and y.
+    """
     spare = np.zeros((3, q.shape[0]))
     out[0] = _motion(model, j, X, q, v, a, spare)
     out[1] = _motion(model, j, Y, q, v, a, spare)
@@ -352,9 +527,21 @@ def joint_force_components(model, j, lam, out):
 
 @kernel
 def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):
-    """Rate in time, at a state of step k, of the component of `across_slopes`; differenced as `rated` does.
+    """Rate in time, at a state within a step, of the component of `across_slopes`; by differences, as in `rated`.
 
-    a (n,), lam (n_row,) and the desk are used up.
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      k, c: number of the step, and the fraction of it at which the state is.
+      j: the response, a norm (`is_norm`).
+      t: time (s).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      a (n,), lam (n_row,): scratch.
+      desk: workspace of a balance (`balance.Desk`).
     """
     n = q.shape[0]
     segment = track.index[k, 2]
@@ -381,7 +568,21 @@ def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):
 
 @kernel
 def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):
-    """Slopes by q and v of an inerter's force, by sixth-order differences of its formula: rarely needed."""
+    """Add the slopes by q and v of an inerter's force, by sixth-order differences of its formula: rarely needed.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      who: number of the member in the group.
+      j: the response, which says which group.
+      sign: sign of f*, whose absolute value is differentiated.
+      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+        The first two are changed on the way and then as before.
+    Out:
+      bars (3, n): slopes by q and v are added to its first two rows.
+    """
     own = np.empty(6)
     for k in range(model.block.shape[0]):
         if model.block[k, 6] != model.response[j, 5] or model.block[k, 3] != INERTER or model.active[segment, k] == 0:
@@ -411,7 +612,16 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):
 
 @kernel
 def value_at(model, strength, segment, t, state, j, desk):
-    """g_j at a state (2, n), in the modes that members are in."""
+    """Value of response j at a state, in the modes that members are in; of member forces the largest.
+
+    model: the compiled scene.
+    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    segment: number of the stretch of time between two breakpoints.
+    t: time (s).
+    state (2, n): coordinates and velocities (m, rad; m/s, rad/s).
+    j: the response.
+    desk: workspace of a balance (`balance.Desk`).
+    """
     n = model.mass.shape[0]
     q = state[0].copy()
     v = state[1].copy()
@@ -428,12 +638,29 @@ def value_at(model, strength, segment, t, state, j, desk):
 
 @kernel
 def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, lam, bars, row_bar, near):
-    """g_j and dg_j/dt at a state of step k; a, lam, the desk and the slopes are those of it afterwards.
+    """Value of response j and its rate in time at a state within a step.
 
-    j < 0: no response is asked for; without `rates` the rate may be meaningless, and costs nothing, and where g is one
-    of positions or velocities alone there is no balance: a, lam and the desk are those of another state.
-    Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, dg/dt = g_q v +
-    g_v a; else it is differenced along the method's own motion. near: scratch (4, n).
+    Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, the rate is
+    dg/dt = g_q v + g_v a; else it is differenced along the method's own motion.
+
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      k, c: number of the step, and the fraction of it at which the state is.
+      j: the response; below 0 none is asked for, and only the balance is made.
+      who: of a member force the number of the member in its group.
+      rates: whether the rate is wanted; else it may be meaningless, and where g is one of positions or velocities alone
+        there is no balance: a, lam and the desk stay those of another state.
+      t: time (s).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      a (n,), lam (n_row,): accelerations and multipliers of the state.
+      desk: workspace as the balance of the state leaves it.
+      bars (3, n), row_bar (n_row,): slopes of the response by q, v, a and by lam.
+      near (4, n): scratch.
     """
     n = q.shape[0]
     segment = track.index[k, 2]

@@ -23,7 +23,20 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH, SPRING, law
 
 @kernel
 def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work):
-    """out (R, M_padded + P) += what `gather.add_designs` adds for each row; z (R, 17, n), at `stages` stages from o."""
+    """Add the derivatives by the design of many rows at the stages of one step: `gather.add_designs` for all of them.
+
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      o, stages: number of the first stage, and how many there are.
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      z (R, 17, n): virtual displacements of each row at each stage.
+    Out:
+      out (R, M_padded + P): derivatives by alpha^mu and values of each row, added to.
+      work (WORK,): counts of work, added to.
+    """
     count = z.shape[0]
     n_pair = model.pair.shape[0]
     work[DESIGN] += stages * count
@@ -76,7 +89,22 @@ def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work
 
 @kernel
 def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):
-    """Block k at stage j, where it has the relative pose r; seen (4, M): room for f and b."""
+    """Add the derivatives by alpha^mu of the members of block k, no inerters, at one stage.
+
+    Constant:
+      model: the compiled scene.
+      k: the block.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      r (POSE,): relative pose of the block's pair.
+      u (R, stages, n_pair, 3): virtual changes -T z of the relative poses.
+      j: the stage, counted from the first of the step.
+    Out:
+      out (R, M_padded + P): f (b . u) of each member is added to.
+      seen (4, M): scratch for f and b, M at least the members of the block.
+    """
     p = model.law[k]
     pair = model.block[k, 0]
     lo = model.block[k, 1]
@@ -104,7 +132,15 @@ def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):
 
 @kernel
 def _add_inerters(model, k, stage, z, j, out):
-    """Block k of inerters at stage j."""
+    """Add the derivatives by alpha^mu of the inerters of block k at one stage.
+
+    model: the compiled scene.
+    k: the block.
+    stage (3, n): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    z (R, 17, n): virtual displacements of each row at each stage.
+    j: the stage, counted from the first of the step.
+    out (R, M_padded + P): added to.
+    """
     row = np.empty(6)
     for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
         f = inerter_force(model, k, i, stage[0], stage[1], stage[2], row)
@@ -114,7 +150,17 @@ def _add_inerters(model, k, stage, z, j, out):
 
 @kernel
 def _add_parameters(model, segment, t, strength, stage, z, j, out):
-    """`parameters.add_parameters` without energy, of all rows at stage j."""
+    """Add the derivatives by the laws' parameters at one stage: `parameters.add_parameters` of rows, without energy.
+
+    model: the compiled scene.
+    segment: number of the stretch of time between two breakpoints.
+    t: time (s).
+    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    stage (3, n): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    z (R, 17, n): virtual displacements of each row at each stage.
+    j: the stage, counted from the first of the step.
+    out (R, M_padded + P): added to behind the members.
+    """
     row = np.empty(6)
     row_rate = np.empty(6)
     total = np.empty(out.shape[0])

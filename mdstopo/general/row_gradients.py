@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 #: rows times members of one reverse sweep at most, for the memory they take
 BLOCK = 2**23
-#: rows of which the arrays of a call are kept for the next one
+#: the arrays of a call are kept for the next one if it has at most so many rows
 KEPT = 32
 
 

@@ -22,10 +22,31 @@ from mdstopo.general.track import carve_track, restore_modes
 
 @kernel
 def step_of_rows(tag, model, tables, strength, track, count, w, c, lam_q, lam_v, lam_x, bar_set, z, y, desk, out, work):
-    """Pull the cotangents of R rows, of fraction c (R,) of step w's motion, back to its start and before its events.
+    """Pull the cotangents of R rows through one step back to its start, and to before the events there.
 
-    lam_q, lam_v (R, n), lam_x (R, 2, n), bar_set (R, slots), in place; out (R, M_padded + P) is added to; z (R, 17, n),
-    y (n_row,): room. c becomes 1. Returns the step before.
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      tables: coefficients of the method.
+      track: the history of steps (`Track`).
+      count: number of steps.
+    In:
+      w: number of the step.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+        The modes change on the way.
+      c (R,): the fraction of the step whose state each row's cotangents belong to; becomes 1.
+      lam_q, lam_v (R, n): cotangents of coordinates and velocities.
+      lam_x (R, 2, n): those of what the method carries from step to step besides (`duties`).
+      bar_set (R, slots): those of the permanent sets.
+    Out:
+      z (R, 17, n): virtual displacements of the stages' balances.
+      y (n_row,): scratch.
+      desk: workspace of a balance (`balance.Desk`).
+      out (R, M_padded + P): derivatives by alpha^mu and values, added to.
+      work (WORK,): counts of work, added to.
+
+    Returns the number of the step before, or -1.
     """
     none = np.empty((0, 3, lam_q.shape[1]))
     no_rows = np.empty((0, model.size[0]))
@@ -56,10 +77,25 @@ def step_of_rows(tag, model, tables, strength, track, count, w, c, lam_q, lam_v,
 
 @kernel
 def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk, starts, out, work):
-    """out (R, M_padded + P) = derivatives of R rows of `extremes` (R, COLUMNS), the latest first, by alpha^mu.
+    """Differentiate R rows of `extremes` by alpha^mu and the laws' values, in one sweep backwards over the steps.
 
-    which (R, 2): the response, and whether the component across is meant (`adjoint.row_cotangents`). starts (R, n), or
-    (R, 0): the cotangents of the start's positions come out.
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      tables: coefficients of the method.
+      count: number of steps.
+    In:
+      which (R, 2): number of each row's response, and 1 where the component across its vector is meant
+        (`adjoint.row_cotangents`), else 0.
+      rows (R, COLUMNS): the rows, the latest first.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      track: the history of steps (`Track`); partial steps are kept behind it.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+      starts (R, n): cotangents of the start's positions; or (R, 0): not wanted.
+      out (R, M_padded + P): the derivatives.
+      work (WORK,): counts of work, added to.
     """
     n = model.mass.shape[0]
     total = rows.shape[0]
@@ -103,9 +139,27 @@ def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk
 def pull_rows(
     tag, ints, floats, tables, alpha, limits, count, which, rows, room, room_ints, strength, padded, out, starts, work
 ):
-    """out (R, N + P) = derivatives of R rows of `extremes` by alpha (N,) and values; as of `rows_gradients`.
+    """Differentiate R rows of `extremes` by alpha and the laws' values, in one sweep backwards over the steps.
 
-    Room: padded (R, M_padded + P).
+    Constant:
+      tag: the method of integration (`duties`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_track`).
+    In:
+      alpha (N,): the design.
+      count: number of steps.
+      which (R, 2): number of each row's response, and 1 where the component across its vector is meant
+        (`adjoint.row_cotangents`), else 0.
+      rows (R, COLUMNS): the rows, the latest first.
+    In place:
+      room, room_ints: flat arrays of the history of steps (`carve_track`); partial steps are kept behind it.
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out:
+      padded (R, M_padded + P): derivatives by alpha^mu, then by the values of the laws' variables.
+      out (R, N + P): derivatives by alpha, then by these values.
+      starts (R, n): cotangents of the start's positions; or (R, 0): not wanted.
+      work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)

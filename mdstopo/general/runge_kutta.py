@@ -69,14 +69,34 @@ CHATTER = 400
 def advance(
     model, table, s, strength, segment, t, h, q0, v0, tangent, o, desk, lam, q, v, a, track, ends, push, size, work
 ):
-    """One step of length h from q0, v0: stages into q, v, a (s, n), the end on the joints into ends (2, n).
+    """Make one step, and put its end onto the joints.
 
-    push (2, n_row): the multipliers of the projection. With o >= 0 the stages are kept in `track` from there on.
-    Returns the place of an unknown at which the joints are singular, or -1.
+    Constant:
+      model: the compiled scene.
+      table (3, 17, 17): coefficients of the method (`integrators.runge_kutta_tables`).
+      s: number of its stages.
+      size: size of the scene (m).
+    In:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t, h: time at the start, and length of the step (s).
+      q0, v0 (n,): coordinates and velocities at the start (m, rad; m/s, rad/s).
+      tangent: whether the tangents of the stages are wanted.
+      o: number of the first stage as which they are kept in `track`; -1: they are not kept.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+      lam (n_row,): multipliers of the joints at the last stage.
+      q, v, a (s or more, n): coordinates, velocities, accelerations of the stages.
+      track: the history of steps (`Track`), where stages are kept.
+      ends (2, n): coordinates and velocities at the end.
+      push (2, n_row): the multipliers of the projection there.
+      work (WORK,): counts of work, added to.
+
+    Returns -1, or what `projection.project` returns of joints that are singular or do not fit.
     """
     n = q0.shape[0]
     vectors = table[2]
-    desk.switches[THOROUGH] = 0  # the end shows what a stage would
+    desk.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
     desk.switches[APART] = 1 if has_factors(track) else 0
     for i in range(s):
         for d in range(n):
@@ -129,9 +149,21 @@ def scene_size(model):
 
 @kernel
 def start_modes(model, strength, desk, q, v, a, lam, knots):
-    """The modes at the start: by elongation, then its rate, then its second derivative with what is surely closed.
+    """Set the modes and permanent sets at the start: by elongation, then by its rate, then by its second derivative.
 
-    knots: as of `members.set_modes`.
+    The last is that of a balance with the modes that elongations and rates tell.
+
+    Constant:
+      model: the compiled scene.
+      knots: whether each piece of a curve is a mode (`members.set_modes`).
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      q, v (n,): the start (m, rad; m/s, rad/s); driven parts are put in place.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+      a (n,), lam (n_row,): accelerations and multipliers of that balance.
+
+    Returns the place of an unknown at which the joints are singular, or -1.
     """
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, POSE))
@@ -150,10 +182,31 @@ def start_modes(model, strength, desk, q, v, a, lam, knots):
 
 @kernel
 def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, graze, noise, work, where):
-    """Switch every member whose margin is used up, one after the other; returns how many events there are now.
+    """Switch every member whose margin is used up, one after the other, and note each as an event.
 
-    -1: no room; a (n,) holds the accelerations behind the last one. The loop ends because each member switches at
-    most twice here. where: as `simulate`'s, for members that go less than `graze` beyond.
+    The loop ends because each member switches at most twice here.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      state: number of the state at which this happens.
+      events: how many events there have been.
+      graze: a member whose margin would fall below zero by less than this only grazes (m).
+      noise: margins that are below zero by no more than this are rounding.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      a (n,): accelerations before the first event, then behind the last one.
+      track: the history of steps (`Track`), which takes the events.
+      where (3,): where[2] becomes a member that grazes so that the motion has no derivative.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+      lam (n_row,): multipliers of the joints behind the last event.
+      work (WORK,): counts of work, added to.
+
+    Returns how many events there are now; -1: there is no room for them.
     """
     n = q.shape[0]
     n_pair = model.pair.shape[0]
@@ -196,11 +249,25 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
 
 @entry
 def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):
-    """Integrate alpha (N,) over model.times; returns (code, number of steps, number of events, time reached).
+    """Integrate the motion of a design over model.times.
 
-    Arguments as `integrators.runge_kutta.simulate`'s, limits and rooms those of `track`. where (3,), each -1 where
-    there is none: the member or the unknown that is to blame for an early end; a member whose ends have met; one that
-    grazes so that the motion has no derivative.
+    Constant:
+      ints, floats: the packed scene (`pack_general`).
+      tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
+      settings (4,): the tolerance; -; a fixed step (s; above 0: no error control); -.
+      limits (6,): steps allowed, then sizes of the history of steps (`carve_track`).
+    In:
+      alpha (N,): the design.
+      tangent: whether tangents are kept for a reverse sweep.
+    Out:
+      room, room_ints: flat arrays of the history of steps (`carve_track`).
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member, at the end.
+      work (WORK,): counts of work, added to.
+      where (3,): each -1 where there is none: the member or the unknown that is to blame for an early end; a member
+        whose ends have met; a member that grazes so that the motion has no derivative.
+
+    Returns a code (`integrators.steps`; NEEDS_ROOM asks for larger rooms), the number of steps, that of events, and the
+    time reached (s).
     """
     model = unpack_general(ints, floats)
     tolerance = MARGIN * settings[0] * max(settings[0] / LOOSE, 1.0) ** SLACK
@@ -225,7 +292,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     nowhere = np.int64(-1)
     keep = np.bool_(tangent)
     size = scene_size(model)
-    rounding = ROUNDING * size  # margins that count as none: a member that has just switched is there
+    rounding = ROUNDING * size  # margins below this count as zero: a member that has just switched has such a one
     rel = np.empty((n_pair, POSE))
     rel0 = np.empty((n_pair, POSE))
     before = np.empty((n_pair, POSE))
@@ -253,9 +320,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model, np.bool_(True))
     rubbing = model.contact_pair.shape[0] > 0
-    brake = 0.0  # the rate at which contacts brake, and the one that does most
-    braking = -1
-    held = 0  # steps in a row that are no longer because of that
+    brake = 0.0  # the rate at which contacts brake
+    braking = -1  # the contact that brakes most
+    held = 0  # steps in a row that were kept short by that rate
     if switching:
         singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
@@ -270,7 +337,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         return SINGULAR, 0, 0, t
     sigma = least_singular_value(model, desk)
     largest = sigma
-    way = np.inf  # until the joints repeat each other
+    way = np.inf  # time until the next pose at which joints repeat each other
     must = True
     relative_pose(pair, model.home, q0, v0, rel0)
     motion = np.zeros(n_pair)
@@ -280,7 +347,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     for p in range(n_pair):
         scale[p] = desk.sums[p, 7] + desk.sums[p, 11]
         if desk.sums[p, 3] > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / scale[p])  # a pair that starts strained
+            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / scale[p])  # members of the pair store energy at the start
     rounding_at_start(model, strength, rel0, v0, scale, motion, noise)
     for p in range(n_pair):
         shaken += abs(scale[p]) * noise[p]
@@ -325,7 +392,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             drive_state(model, segment, t, q0, v0)
             keep_state(track, count, t, q0, v0, track.push[count, 0], track.push[count, 1])
             if switching:
-                # what begins to act here may stand on either side
+                # a member whose law begins to act at this time may be on either side of its switch
                 balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
                 first = events
                 events = log_switches(
@@ -335,7 +402,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
-                    track.salt[e] = 0.0  # the time is given
+                    track.salt[e] = 0.0  # the time is given: it does not vary with the design
                     track.kept[e, 2] = 0.0
         while t < end:
             where[0] = -1
@@ -364,7 +431,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 push, size, work,
             )  # fmt: skip
             if singular >= 0:
-                # a step that overshoots a singular place may be too long; a short one stands before it
+                # a long step may have gone beyond a singular pose, a shorter one need not; a very short one is at it
                 if h < 1e-9 * span:
                     where[0] = singular
                     return SINGULAR, count, events, t
@@ -376,7 +443,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             relative_pose(pair, model.home, ends[0], ends[1], rel)
             motion_scale(pair, ends[0], rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
-            # beside a singular pose velocities are what joints leave of them, and the step has to reach that pose
+            # near a singular pose errors of velocities do not count as if they lasted: joints determine velocities
+            # there, and the step has to reach across the pose
             lasting = longest if sigma >= CLOSE * largest else 0.0
             error = _error(table[2], s, h, lasting, a, weight)
             if crosses(h, way):

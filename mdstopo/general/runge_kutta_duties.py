@@ -13,7 +13,27 @@ from mdstopo.integrators.runge_kutta_tables import STAGES
 
 @kernel
 def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
-    """A step of length c h from the start of step k; kept as step count + 1 where asked."""
+    """The state inside a step: the end of a step of length c h from the same start.
+
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      tables: coefficients of the method.
+    In:
+      count: number of steps.
+      k, c: number of the step, and the fraction of it.
+      keep: whether the partial step is kept, as number count + 1, for a reverse sweep.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+        The modes become those of step k.
+      track: the history of steps (`Track`).
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+      q, v (n,): the state (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns the number of the step that ends there: count + 1 where it is kept; else k.
+    """
     n = q.shape[0]
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
@@ -45,20 +65,63 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
 
 @kernel
 def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
-    """Duty 2; a point inside a step is a partial step's end, so c is always 1."""
+    """Pull R cotangents of the end of a step back to its start.
+
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      tables: coefficients of the method.
+      track: the history of steps (`Track`).
+    In:
+      w: number of the step.
+      c: not used: a point inside a step is the end of a partial one (`point_of`).
+      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows: none.
+    In place:
+      lam_q, lam_v (R, n): the cotangents of coordinates and velocities.
+      lam_x: not used: nothing else is carried from step to step.
+    Out:
+      z (R, s or more, n): virtual displacements of the stages' balances.
+      y (n_row,): scratch.
+      desk: workspace of a balance (`balance.Desk`).
+      work (WORK,): counts of work, added to.
+    """
     explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work)
 
 
 @kernel
 def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
-    """Duty 3; nothing is implicit here."""
+    """Push changes of the state at the start of a step to its end.
+
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      tables: coefficients of the method.
+      track: the history of steps (`Track`).
+    In:
+      w: number of the step.
+      c, sweeps, dx: not used: partial steps are steps of their own, no stage is implicit, nothing else is carried.
+      force (s, n): changes of the forces at the stages (N, N m).
+    In place:
+      dq, dv (n,): changes of coordinates and velocities.
+    Out:
+      changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
+      desk: workspace of a balance (`balance.Desk`).
+
+    Returns True: there are no sweeps that might not settle.
+    """
     explicit_forward(model, tables, track, w, dq, dv, force, changes, rows, desk)
     return True
 
 
 @kernel
 def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
-    """The parabola: the motion has the accelerations of its balance everywhere."""
+    """The motion a little later, on a parabola: it has the accelerations of its balance everywhere.
+
+    tag, track, k, c: method, history, step and fraction; not used.
+    e: how much later (s); below 0: earlier.
+    q, v, a (n,): the motion here (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q_out, v_out (n,): coordinates and velocities there.
+    """
     for d in range(q.shape[0]):
         q_out[d] = q[d] + e * (v[d] + 0.5 * e * a[d])
         v_out[d] = v[d] + e * a[d]
@@ -66,13 +129,21 @@ def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
 
 @kernel
 def derivatives(tag):
-    """Velocities and accelerations."""
+    """How many derivatives of the motion are those of the balance: velocities and accelerations."""
     return 2
 
 
 @kernel
 def weights_of(tag, model, tables, track, w, out):
-    """An integral is the velocity of one more coordinate."""
+    """Weights of the stages in an integral over one step, as of the velocity of one more coordinate.
+
+    tag: the method of integration (`duties`).
+    model: the compiled scene.
+    tables: coefficients of the method.
+    track: the history of steps (`Track`).
+    w: number of the step.
+    out (s or more,): the weights (s).
+    """
     method = 1 if model.size[2] != 0 else 0
     for j in range(STAGES[method]):
         out[j] = (track.t[w + 1] - track.t[w]) * tables[method, 2, 2, j]

@@ -26,9 +26,11 @@ if TYPE_CHECKING:
 MOST, FAR = 400, 0.1
 #: the farthest that an equilibrium is looked for: by how many sizes of the scene a body may move, and how far turn, rad
 SIZES, TURN = 2.0, 2.0 * np.pi
-#: steps grow so much, where the force along them at their end is what was foreseen, to a share of that at their start
+#: steps grow by this factor where the force along them at their end is off from what was foreseen by at most this share
+#: of that at their start
 GROWTH, AGREES = 4.0, 0.25
-#: share of the force along a step that may point back at its end, and looks for a better end at most
+#: how large a force that points back at the end of a step may be, relative to that at its start; and how often at most
+#: a better end is looked for
 BACK, LOOKS = 0.1, 30
 #: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
 NEAR, ARRIVED = 1e-6, 1e-13
@@ -139,6 +141,7 @@ def _stepped(
 
 
 def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> str:
+    """Why there is no equilibrium: the body that has moved most by a shift (n,), with angles times arms (n,)."""
     body = driver.scene.bodies[int(np.abs(shift * arms).reshape(-1, 3).max(axis=1).argmax())]
     return f"body {body} finds no static equilibrium near its stated place"
 
@@ -169,11 +172,11 @@ class _AtRest:
         self.jac = self._rows[:, self.free] / root
 
     def rate(self) -> float:
-        """Of the fastest motion, 1/s^2."""
+        """Largest stiffness by mass: square of the angular frequency of the fastest motion (1/s^2)."""
         return float(np.linalg.norm(self.stiffness, 2)) if len(self.free) else 0.0
 
     def land(self, q: FloatArray) -> FloatArray:
-        """Look at the place on the joints next to q (n,), which is returned."""
+        """Look at the nearest place on the joints to q (n,), which is returned."""
         self.at(q)
         for _ in range(3):
             if np.abs(self._phi).max(initial=0.0) <= ARRIVED * self._size:
@@ -264,6 +267,7 @@ class _AtRest:
         return null
 
     def _wide(self, u: Any) -> FloatArray:
+        """(n,): a step from its free part in scaled coordinates."""
         wide = np.zeros(len(self.force))
         wide[self.free] = u / self._root
         return wide

@@ -15,7 +15,7 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH
 
 @kernel
 def rest(model, alpha, strength, q, v):
-    """Strengths and modes of members at q (n,), where nothing moves: v (n,) = 0; what is driven is put in place."""
+    """Put scales, modes and sets of members at rest at q (n,): v (n,) becomes 0, what is driven is put in place."""
     scale_general(model.block, model.power, alpha, strength)
     drive_state(model, np.int64(0), model.times[0], q, v)
     v[:] = 0.0
@@ -27,10 +27,21 @@ def rest(model, alpha, strength, q, v):
 
 @entry
 def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
-    """force (n,) at rest at q (n,), stiffness (n, n) = -dF/dq + d(Phi_q^T lam)/dq, rows (n_row, n) = Phi_q, phi
-    (n_row,).
+    """Forces and their stiffness at rest; damping, rates and inerters have no part in it.
 
-    alpha (N,); lam (n_row,): multipliers of the joints. Damping, rates and inerters have no part in it.
+    Constant:
+      ints, floats: the packed scene (`pack_general`).
+      alpha (N,): the design.
+    In:
+      lam (n_row,): multipliers of the joints.
+    In place:
+      q (n,): coordinates (m, rad); the driven ones are put in place.
+    Out:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      force (n,): F without the joints' part (N, N m).
+      stiffness (n, n): -dF/dq + d(Phi_q^T lam)/dq.
+      rows (n_row, n): Phi_q.
+      phi (n_row,): Phi (m or rad).
     """
     model = unpack_general(ints, floats)
     desk = make_desk(model)
@@ -63,7 +74,17 @@ def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
 
 @entry
 def unit_forces(ints, floats, alpha, strength, q, out):
-    """out (M_padded, n) = dF/d(alpha^mu) of each design member at rest at q (n,): -f_i B_i^T."""
+    """What the alpha^mu of each design member adds to the forces at rest: -f_i B_i^T.
+
+    Constant:
+      ints, floats: the packed scene (`pack_general`).
+      alpha (N,): the design.
+    In place:
+      q (n,): coordinates (m, rad); the driven ones are put in place.
+    Out:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      out (M_padded, n): dF/d(alpha^mu) (N, N m); zero for what is no design member, does not act, or is an inerter.
+    """
     model = unpack_general(ints, floats)
     n = model.mass.shape[0]
     v = np.zeros(n)
@@ -85,9 +106,18 @@ def unit_forces(ints, floats, alpha, strength, q, out):
 
 @entry
 def value_forces(ints, floats, alpha, strength, q, out):
-    """out (P, n) = dF/dp by each value of the laws' variables at rest at q (n,): -sum s f_p B^T over its members.
+    """What each value of the laws' variables adds to the forces at rest: -sum s f_p B^T over its members.
 
-    By times at which laws begin or end to act there is none, nor by what multiplies rates.
+    Times at which laws begin or end to act add nothing, nor does what multiplies rates.
+
+    Constant:
+      ints, floats: the packed scene (`pack_general`).
+      alpha (N,): the design.
+    In place:
+      q (n,): coordinates (m, rad); the driven ones are put in place.
+    Out:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      out (P, n): dF/dp (N, N m by the unit of each value).
     """
     model = unpack_general(ints, floats)
     n = model.mass.shape[0]

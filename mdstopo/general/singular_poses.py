@@ -38,7 +38,10 @@ SAFE = 1e-3
 
 @kernel
 def least_singular_value(model, desk):
-    """sigma at the state whose joints have just been factorised on the desk, about; 1 where that is not known."""
+    """An estimate of sigma, at the state whose joints were factorised last on the desk.
+
+    1 where it is not known: where the factors there are not those of the joints' matrix, or there are no joints.
+    """
     if desk.switches[OF_JOINTS] == 0 or model.envelope.shape[0] == 0:
         return 1.0
     size, _ = growth(model.envelope, desk.gram, desk.diagonal, desk.x)
@@ -88,8 +91,21 @@ def crosses(h, way):
 
 @kernel
 def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):
-    """The estimated error `whole` (`integrators.runge_kutta._error`) of a step without its part across the joints at
-    its end, which are factorised on the desk; all of it where it might lead to another branch.
+    """Estimated error of a step across a pose without its part across the joints, relative to the motion.
+
+    Constant:
+      model: the compiled scene.
+      vectors (7 or more, 17): C, BB, B, E_Q, E_V, E2_Q, E2_V of the method (`integrators.runge_kutta_tables`).
+      s: number of its stages.
+    In:
+      desk: workspace with the factors of the joints' matrix at the end of the step.
+      h: length of the step (s).
+      a (s or more, n): accelerations at its stages (m/s^2, rad/s^2).
+      weight (n,): weights of the coordinates (1/m, 1/rad; `integrators.steps.motion_weights`).
+      whole: the whole error (`integrators.runge_kutta._error`).
+      sigma: least singular value of the joints at the end of the step.
+
+    Returns `whole` where that is large enough to lead to another branch.
     """
     if not whole < SAFE * sigma:
         return whole
@@ -109,6 +125,6 @@ def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):
             size[m] = max(size[m], h * h * weight[d] * abs(off[d]))
     worst = max(size[0], size[1])
     coarse = max(size[2], size[3])
-    if coarse > 0.0 and worst > 0.0:  # as there
+    if coarse > 0.0 and worst > 0.0:  # as in `integrators.runge_kutta._error`
         worst = worst * worst / np.sqrt(worst * worst + 0.01 * coarse * coarse)
     return worst

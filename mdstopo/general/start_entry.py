@@ -15,7 +15,12 @@ from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
 
 @entry
 def slopes_of(joint, joint_par, home, q, phi, jac):
-    """phi (n_joint, 3), jac (n_joint, 3, 6) of joints (n_joint, 5) with joint_par (n_joint, 12) at q (n,) from home."""
+    """Phi and Phi_q of joints at one configuration.
+
+    joint (n_joint, 5), joint_par (n_joint, 12), home (n / 3, 5): as in `GeneralModel`.
+    q (n,): coordinates (m, rad).
+    phi (n_joint, 3), jac (n_joint, 3, 6): are written, as many rows as each joint has.
+    """
     w = np.empty(PLACES)
     for j in range(joint.shape[0]):
         place_joint(home, joint[j, 1], joint[j, 2], q, w)
@@ -24,7 +29,17 @@ def slopes_of(joint, joint_par, home, q, phi, jac):
 
 @entry
 def assemble(ints, floats, q, v, move, phi, rates):
-    """phi, rates (n_joint, 3) = Phi and Phi_q v at the start; with `move`, q, v (n,) are put on the joints first."""
+    """Phi and Phi_q v of the joints at the start, which is put on the joints first where asked.
+
+    Constant:
+      ints, floats: the packed scene (`pack_general`).
+    In:
+      move: whether the start is moved onto the joints.
+    In place:
+      q, v (n,): the start (m, rad; m/s, rad/s); the driven ones are put in place.
+    Out:
+      phi, rates (n_joint, 3): Phi (m or rad) and Phi_q v (m/s or rad/s), as many rows as each joint has.
+    """
     model = unpack_general(ints, floats)
     desk = make_desk(model)
     drive_state(model, 0, model.times[0], q, v)
@@ -44,7 +59,16 @@ def assemble(ints, floats, q, v, move, phi, rates):
 
 @entry
 def reactions(joint, joint_par, home, row, q, lam, out):
-    """out (T, n_joint, 3) = Fx, Fy, M of each joint on its first body at states q (T, n) with lam (T, n_row)."""
+    """Force and moment of each joint on its first body, at many states.
+
+    Constant:
+      joint (n_joint, 5), joint_par (n_joint, 12), home (n / 3, 5), row (n_joint, 3): as in `GeneralModel`.
+    In:
+      q (T, n): coordinates (m, rad).
+      lam (T, n_row): multipliers.
+    Out:
+      out (T, n_joint, 3): Fx, Fy, M (N, N, N m).
+    """
     w = np.empty(PLACES)
     mine = np.empty(3)
     for k in range(q.shape[0]):
@@ -57,7 +81,17 @@ def reactions(joint, joint_par, home, row, q, lam, out):
 
 @entry
 def linearise(ints, floats, alpha, strength, stiffness, mass, rows):
-    """stiffness, mass (n, n) and rows (n_row, n) = Phi_q of small motion about the start with design alpha (N,)."""
+    """Stiffness, mass and constraints of small undamped motion about the start.
+
+    Constant:
+      ints, floats: the packed scene (`pack_general`).
+    In:
+      alpha (N,): the design.
+    Out:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      stiffness, mass (n, n): zero before.
+      rows (n_row, n): Phi_q; zero before.
+    """
     model = unpack_general(ints, floats)
     desk = make_desk(model)
     n = model.mass.shape[0]

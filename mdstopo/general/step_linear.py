@@ -52,9 +52,20 @@ def lay_out(model, track, o, desk):
 
 @kernel
 def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):
-    """Solve with W(w_q, w_v) of stage o, which is laid out, or its transpose; a (n,), lam (n_row,) in place.
+    """Solve with W(w_q, w_v) of a stage, or with its transpose.
 
     Where factors are kept, weights are 0 and the matrix is symmetric.
+
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      o: number of the stage, which is laid out on the desk (`lay_out`).
+      w_q, w_v: weights of the stiffness (s^2) and the damping (s).
+      transposed: whether the transpose is meant.
+    In place:
+      desk: workspace of a balance (`balance.Desk`).
+      a (n,), lam (n_row,): the right side, then the solution; driven parts become 0.
     """
     if has_factors(track):
         solve_joints(model, desk.inverse, track.pull[o], track.gram[o], track.diagonal[o], desk.x, a, lam)
@@ -65,7 +76,14 @@ def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):
 
 @kernel
 def prepare_stage_back(model, track, o, w_q, w_v, desk):
-    """Put what `stage_back` needs of stage o on the desk: once for any number of rows."""
+    """Prepare a stage for `stage_back`: once for any number of rows.
+
+    model: the compiled scene.
+    track: the history of steps (`Track`).
+    o: number of the stage.
+    w_q, w_v: weights of the stiffness (s^2) and the damping (s); 0 where factors are kept.
+    desk: workspace of a balance, which takes what is prepared.
+    """
     if has_factors(track):
         copy_rows(track.turned[o], desk.turned)
         return
@@ -75,10 +93,19 @@ def prepare_stage_back(model, track, o, w_q, w_v, desk):
 
 @kernel
 def stage_back(model, track, o, desk, z, y, bar_q, bar_v):
-    """From what pulls on a stage's accelerations and multipliers, z (n,) and y (n_row,), to the virtual displacement of
-    its balance, in place; and what that pulls on the stage's state, added to bar_q, bar_v (n,).
+    """Pull cotangents of a stage's accelerations and multipliers back to its coordinates and velocities.
 
-    The stage is the one that was prepared last.
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      o: number of the stage, the one that was prepared last (`prepare_stage_back`).
+      desk: workspace of a balance, with what was prepared.
+    In place:
+      z (n,), y (n_row,): cotangents of accelerations and multipliers, then the virtual displacement of the balance and
+        what belongs to it in the rows.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
     if has_factors(track):
         stage = track.stage[o]
@@ -92,10 +119,23 @@ def stage_back(model, track, o, desk, z, y, bar_q, bar_v):
 
 @kernel
 def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work):
-    """Pull cotangents lam_q, lam_v (R, n) of the end of step w back to its start, in place.
+    """Pull R cotangents of the end of an explicit step back to its start.
 
-    bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of each stage's q, v, a and lam, the same for all (no rows:
-    none). Out: z (R, s, n), the virtual displacement of each stage's balance.
+    Constant:
+      model: the compiled scene.
+      tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
+      track: the history of steps (`Track`).
+    In:
+      w: number of the step.
+      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, the same for
+        all R; no rows: none.
+    In place:
+      lam_q, lam_v (R, n): cotangents of coordinates and velocities.
+    Out:
+      z (R, s or more, n): virtual displacements of the stages' balances.
+      y (n_row,): scratch.
+      desk: workspace of a balance (`balance.Desk`).
+      work (WORK,): counts of work, added to.
     """
     count, n = lam_q.shape
     method = 1 if model.size[2] != 0 else 0
@@ -122,7 +162,23 @@ def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, d
 
 @part
 def _explicit_stage_back(model, table, track, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, desk):
-    """Stage j of `explicit_back`, which is prepared, for one row: z[j], and what pulls on its q and v, u[j], g[j]."""
+    """One stage of `explicit_back`, for one row of cotangents.
+
+    Constant:
+      model: the compiled scene.
+      table (3, 17, 17): coefficients of the method.
+      track: the history of steps (`Track`).
+    In:
+      o, j: number of the step's first stage, and of this one counted from it; it has been prepared.
+      h: length of the step (s).
+      bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows: none.
+      lam_q, lam_v (n,): cotangents of the end's coordinates and velocities.
+      desk: workspace of a balance, with what was prepared.
+    Out:
+      z (s or more, n): z[j], the virtual displacement of the stage's balance.
+      y (n_row,): scratch.
+      u, g (s, n): u[j] and g[j], cotangents of the stage's coordinates and velocities; those of later stages are read.
+    """
     s, n = u.shape
     y[:] = 0.0
     by_end = h * h * table[2, 1, j]
@@ -150,7 +206,15 @@ def _explicit_stage_back(model, table, track, o, j, h, bars, rows_bar, lam_q, la
 
 @part
 def _gather_start(model, table, s, h, u, g, lam_q, lam_v):
-    """lam_q, lam_v (n,) of one row, in place: from the end of a step to its start, with what pulls on the stages."""
+    """Cotangents of the start of an explicit step from those of its end and its stages, for one row.
+
+    model: the compiled scene.
+    table (3, 17, 17): coefficients of the method.
+    s: number of stages.
+    h: length of the step (s).
+    u, g (s, n): cotangents of the stages' coordinates and velocities.
+    lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, which become those of the start's.
+    """
     n = lam_q.shape[0]
     for d in range(n):
         lam_v[d] += h * lam_q[d]
@@ -166,9 +230,21 @@ def _gather_start(model, table, s, h, u, g, lam_q, lam_v):
 
 @kernel
 def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_changes, desk):
-    """Push changes dq, dv (n,) of the start of step w and forces (s, n) of its stages to its end, in place.
+    """Push changes of the start of an explicit step, and of the forces at its stages, to its end.
 
-    Out: stage_changes (s, 3, n), row_changes (s, n_row): of each stage's q, v, a and lam.
+    Constant:
+      model: the compiled scene.
+      tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
+      track: the history of steps (`Track`).
+    In:
+      w: number of the step.
+      force (s, n): changes of the forces at the stages (N, N m).
+    In place:
+      dq, dv (n,): changes of coordinates and velocities.
+    Out:
+      stage_changes (s, 3, n): of the stages' coordinates, velocities, accelerations.
+      row_changes (s, n_row): of their multipliers.
+      desk: workspace of a balance (`balance.Desk`).
     """
     n = dq.shape[0]
     method = 1 if model.size[2] != 0 else 0
@@ -204,11 +280,24 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
 
 @kernel
 def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):
-    """force (n,) and row (n_row,), changes of the balance, become those of the accelerations and multipliers of stage o
-    whose state changes by dq, dv.
+    """Changes of a stage's accelerations and multipliers from those of its state and of the forces on it.
 
-    sweeps > 0: what the stage's own acceleration changes in its state goes through W alone by so many fixed-point
-    sweeps at most (the iterative method), until they change by less than SETTLED; returns whether they did.
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      o: number of the stage.
+      w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
+      sweeps: 0 where the matrix W accounts for that; else so many fixed-point sweeps at most (the iterative method) do,
+        until they change by less than SETTLED.
+      dq, dv (n,): changes of coordinates and velocities, without those by the stage's own accelerations.
+    In place:
+      force (n,): changes of the forces, then of the accelerations.
+      row (n_row,): changes of the right side of the rows, then of the multipliers.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+
+    Returns whether the sweeps have settled; True without any.
     """
     k, c = lay_out(model, track, o, desk)
     push_forward(model, desk, k, c, track.turn[o], dq, dv, force, row)
@@ -220,7 +309,21 @@ def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):
 
 @kernel
 def _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row):
-    """[M Phi^T; Phi 0] x = rhs - (w_q K + w_v C) x by fixed-point sweeps; force, row: the right side, then x."""
+    """Solve [M Phi_q^T; Phi_q 0] x = rhs - (w_q K + w_v C) x by fixed-point sweeps; G_q, G_v stand below K, C.
+
+    Constant:
+      model: the compiled scene.
+      track: the history of steps (`Track`).
+    In:
+      o: number of the stage, which is laid out on the desk (`lay_out`).
+      w_q, w_v: weights of the stiffness (s^2) and the damping (s).
+      sweeps: how many at most.
+    In place:
+      desk: workspace of a balance (`balance.Desk`).
+      force (n,), row (n_row,): the right side, then x.
+
+    Returns whether the sweeps have settled.
+    """
     n = force.shape[0]
     n_row = row.shape[0]
     none = track.K[o]

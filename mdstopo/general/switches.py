@@ -14,7 +14,7 @@ DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART = range(5)
 
 @kernel
 def switches_of(model):
-    """The switches at first."""
+    """The switches (5,) of a new desk."""
     switches = np.zeros(5, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0
@@ -24,7 +24,7 @@ def switches_of(model):
 
 @kernel
 def is_diagonal(model):
-    """Whether the mass is: nothing but inerters couples accelerations."""
+    """Whether the mass matrix is diagonal: only inerters couple accelerations."""
     inertial = 0
     for k in range(model.block.shape[0]):
         inertial += model.block[k, 3] == INERTER

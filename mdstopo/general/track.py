@@ -43,7 +43,7 @@ TRACK = (
 
 
 class Track:
-    """Made in kernels only, by `carve_track`."""
+    """The history of steps inside kernels, made by `carve_track`; the fields are those of the table above."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
@@ -117,7 +117,16 @@ def carve_track(model, limits, floats, ints):
 
 @kernel
 def keep_stage(track, o, t, q, v, a, lam, desk, tangent):
-    """Store stage o, and with `tangent` the tangents on the desk."""
+    """Store a stage.
+
+    track: the history of steps (`Track`).
+    o: number of the stage.
+    t: time (s).
+    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    lam (n_row,): multipliers of the joints.
+    desk: workspace as the balance of the stage has left it.
+    tangent: whether its tangents are stored, and the factors of the joints' matrix where these are kept.
+    """
     track.when[o] = t
     stage = track.stage[o]
     for d in range(q.shape[0]):
@@ -164,7 +173,14 @@ def mass_of(track, o):
 
 @kernel
 def keep_state(track, k, t, q, v, mu, nu):
-    """State k and the multipliers that put it on the joints."""
+    """Store a state.
+
+    track: the history of steps (`Track`).
+    k: number of the state.
+    t: time (s).
+    q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    mu, nu (n_row,): multipliers that put them on the joints (`projection`).
+    """
     track.t[k] = t
     for d in range(q.shape[0]):
         track.state[k, 0, d] = q[d]

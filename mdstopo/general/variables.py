@@ -132,7 +132,7 @@ class Placing:
             active[:, k] = (middle > begin) & (middle < until)
         for row in varied:
             begin, until = acts.get(int(row[0]), (np.nan, np.nan))
-            # what holds at rest cannot begin later than the start without another equilibrium: only earlier
+            # a law with a force at rest can only begin earlier: if it began later, the equilibrium would be another
             begins = begin == start and int(row[0]) not in held
             row[3] = (row[1] == laws.ACTIVE_FROM and begins) or (row[1] == laws.ACTIVE_UNTIL and until == end)
         return model._replace(active=active, varied=varied)

@@ -32,12 +32,30 @@ def visit(
     seen,
     work,
 ):
-    """States, and where j >= 0 response j, at places (K, 2): steps and fractions of them, each on its step's side.
+    """States, and values and rates of a response, at any places of a finished motion.
 
-    exact: the method's own motion inside steps, else the quintic through both ends' states and accelerations. rates:
-    whether rates are wanted. who: a member, or -1 for the one with the largest force. Out: out (3, K, n) = q, v, a;
-    lam_out (K, n_row + n_driven), the multipliers of the solved rows, then those of the driven coordinates (what
-    M a + Phi_q^T lam = F leaves to them); seen (K, 3): value, rate, member.
+    Constant:
+      tag: the method of integration (`duties`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_track`).
+    In:
+      count: number of steps.
+      room, room_ints: flat arrays of the history of steps (`carve_track`).
+      exact: whether states inside steps are those of the method's own motion; else of the quintic through the
+        coordinates, velocities and accelerations at both ends.
+      rates: whether rates are wanted; else, where response j needs no balance, there may be no a and lam_out either.
+      j: the response; below 0: none.
+      who: number of the member whose force is looked at; -1: at each place the one with the largest force.
+      places (K, 2): steps, and fractions of them; 0 and 1 are the states at the ends as they are in that step.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out:
+      out (3, K, n): coordinates, velocities, accelerations.
+      lam_out (K, n_row + n_driven): multipliers of the solved rows, then those of the driven coordinates, what
+        M a + Phi_q^T lam = F leaves to them.
+      seen (K, 3): value of the response, its rate (per s), number of the member.
+      work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -78,10 +96,27 @@ def visit(
 def compare(
     tag, ints, floats, tables, limits, count, room, room_ints, strength, exact, j, places, who, top, seen, work
 ):
-    """Members beside each other, of the group that response j looks at, at places (K, 2) and `exact` as of `visit`.
+    """Forces of the members of a group beside each other, at any places of a finished motion.
 
-    Out: top (count of members,), the largest |f*| of each at all places; seen (C, K, 2), f* and its rate of the
-    members who (C,), by differences along the motion; nobody: no rates are computed.
+    Constant:
+      tag: the method of integration (`duties`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_track`).
+    In:
+      count: number of steps.
+      room, room_ints: flat arrays of the history of steps (`carve_track`).
+      exact: whether states inside steps are those of the method's own motion; else of a quintic (`visit`).
+      j: the response, which says which group.
+      places (K, 2): steps, and fractions of them.
+      who (C,): numbers within the group of the members whose forces and rates are wanted; without any no rates are
+        computed.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out:
+      top (M,): the largest |f*| of each member of the group over all places (N).
+      seen (C, K, 2): f* of the members who (N) and its rate (N/s), by differences along the motion.
+      work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
     track = carve_track(model, limits, room, room_ints)
@@ -135,9 +170,29 @@ def time_at(track, k, c):
 
 @kernel
 def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work):
-    """q, v (n,) at fraction c of step k, with the modes of that step.
+    """The state at a fraction of a step, with the modes of that step.
 
-    ends (6, n): the quintic's, made anew where k is not `last`; the step whose ends they are is returned.
+    Constant:
+      tag: the method of integration (`duties`).
+      model: the compiled scene.
+      tables: coefficients of the method.
+      count: number of steps.
+    In:
+      k, c: number of the step, and the fraction of it.
+      exact: whether the state inside it is that of the method's own motion; else of a quintic.
+      last: number of the step whose ends are in `ends`; -1: none.
+    In place:
+      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+        The modes become those of step k.
+      track: the history of steps (`Track`).
+      ends (6, n): coordinates, velocities, accelerations of the quintic's start, then of its end.
+    Out:
+      desk: workspace of a balance (`balance.Desk`).
+      lam (n_row,): scratch.
+      q, v (n,): the state (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns the number of the step whose ends are in `ends` now.
     """
     no = np.bool_(False)
     h = track.t[k + 1] - track.t[k]
