@@ -76,7 +76,16 @@ def distance_velocity_slope(par, w, wd, out):
 
 @kernel
 def distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
-    """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
+    """Slopes of Phi_q a + gamma at fixed a.
+
+    In:
+      par (WIDTH,): parameters of the joint.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (1 or more, 6): d(Phi_q a + gamma)/dq.
+      by_v (1 or more, 6): d(gamma)/dv.
+    """
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     wa = wd[2]
     wb = wd[5]
@@ -130,6 +139,12 @@ def distance_stiffness(par, w, lam, k):
 
 @kernel
 def _across(i, ex, ey, px, py, cx, cy):
+    """How far d moves across the link by one coordinate, (-ey, ex) . dd/dw_i.
+
+    i: the coordinate: x, y, angle of the first body, then of the second.
+    ex, ey: unit vector along the link.
+    px, py, cx, cy: arms of the points on both bodies (m), global axes.
+    """
     if i == 0:
         return ey
     if i == 1:

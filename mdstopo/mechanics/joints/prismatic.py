@@ -77,7 +77,16 @@ def prismatic_velocity_slope(par, w, wd, out):
 
 @kernel
 def prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
-    """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
+    """Slopes of Phi_q a + gamma at fixed a; the angle's rows are zero.
+
+    In:
+      par (WIDTH,): parameters of the joint.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (2 or more, 6): d(Phi_q a + gamma)/dq.
+      by_v (2 or more, 6): d(gamma)/dv.
+    """
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     wa = wd[2]
     wb = wd[5]
