@@ -253,6 +253,15 @@ def _skipped(
     turning: list[Load],
     block: IndexArray,
 ) -> tuple[str, ...]:
+    """What the arrays of a scene leave out, and why: a sentence each.
+
+    case: the case.
+    names: bodies in the order of the state.
+    damped: whether any force depends on velocity.
+    times (n_seg + 1,): ends of the segments of the loads (s).
+    turning: loads whose effect depends on the angle of their body.
+    block (n_block, BLOCK): as of `Model`.
+    """
     notes = []
     if not damped:
         notes.append("velocity terms: nothing is damped")
