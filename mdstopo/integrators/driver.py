@@ -153,7 +153,7 @@ class Driver:
 
     @property
     def _looking_entries(self) -> Any:
-        """Behind the method's own: these enter what the method offers to whatever looks at its steps."""
+        """As `looking`, without waiting; after the method's own entries, which enter its functions in `contract`."""
         if self._looking is None and self.entry is not None:
             self._looking = self._load_looking()
         return self._looking
@@ -230,11 +230,11 @@ class Driver:
                 break
         if found is plain or abs(total - first) > float(self.settings[0]) * abs(total):
             return found
-        self._take(self._plain)  # it was good enough: numbers stay what they were
+        self._take(self._plain)  # longer steps were good enough: numbers stay what they were
         return self._run(tangent)
 
     def _take(self, packed: Packed) -> None:
-        """Let the kernels see a model, packed."""
+        """Have the kernels compute a model, packed; calls that were prepared for another one are dropped."""
         if packed is not self.packed:
             self.packed = packed
             self._simulate, self._look = {}, {}

@@ -160,7 +160,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     inv_mass = model.inv_mass
     times = model.times
     reach = model.reach
-    # numbers written in a call are types of their own, and would have the callee compiled once more
+    # a number written in a call has a type of its own, for which the callee would be compiled once more
     yes = np.bool_(True)
     t_node = own.t
     rel = own.rel

@@ -99,13 +99,13 @@ def _point_weights(legendre, s, c, beta_q, beta_v):
 
 @kernel
 def parent_of(steps, w):
-    """Windows follow one another."""
+    """The window before: windows follow one another."""
     return w - 1
 
 
 @kernel
 def stage_weights(tables, steps, w, out):
-    """Gauss weights."""
+    """Gauss weights, times the length of the window."""
     level = steps.index[w, 1]
     h = steps.t[w + 1] - steps.t[w]
     for j in range(COUNTS[level]):
@@ -114,7 +114,7 @@ def stage_weights(tables, steps, w, out):
 
 @kernel
 def carried(steps):
-    """Nothing but q and v."""
+    """None: a window takes over nothing but q and v."""
     return 0
 
 

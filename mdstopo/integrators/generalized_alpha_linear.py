@@ -98,7 +98,7 @@ def sample(steps, count, damped, t, g, d):
 
 @kernel
 def parent_of(steps, w):
-    """Steps follow one another."""
+    """The step before: steps follow one another."""
     return w - 1
 
 
@@ -118,7 +118,7 @@ def stage_weights(tables, steps, w, out):
 
 @kernel
 def carried(steps):
-    """The acceleration and the auxiliary one."""
+    """Two: a step takes over the acceleration and the auxiliary one, too."""
     return 2
 
 
@@ -180,7 +180,7 @@ def reverse_step(
         steps.turn[o + last] if turning else start_q, h * h * beta * e1, h * gamma * e1, damped, turning,
         np.bool_(True), half, band, pivots,
     )  # fmt: skip
-    # stages from the last to the first: what pulls on a stage's acceleration, its z, and on to its state
+    # stages from the last to the first: the derivative by a stage's acceleration, its z, and then that by its state
     for j in range(last, -1, -1):
         x = z[j]
         if j == last:

@@ -156,7 +156,7 @@ def sample(steps, count, damped, t, g, d):
 
 @kernel
 def parent_of(steps, w):
-    """Kept with each step, because a partial step follows its parent out of order."""
+    """The step before, which is kept with each step: a partial step stands behind all others."""
     return steps.index[w, 1]
 
 
@@ -171,7 +171,7 @@ def stage_weights(tables, steps, w, out):
 
 @kernel
 def carried(steps):
-    """Nothing but q and v."""
+    """None: a step takes over nothing but q and v."""
     return 0
 
 

@@ -15,7 +15,7 @@ from mdstopo.scene.model import BLOCK, DAMPING, MEMBER, STIFFNESS, VECTOR, Model
 
 #: costs of a member of a grid and of another: all that are left have to cost at most three quarters of what all do
 IN_GRID, PLAIN = 2, 3
-#: rows of strengths with room for the members that carry, as in `Model.member`
+#: rows of an array of strengths with room behind them for the members that carry, in rows as of `Model.member`
 ROOMY = 12
 
 
@@ -97,7 +97,7 @@ def _count_chunks(counter, chunk, block, strength, count):
 
 @kernel
 def _count(k, start, stop, block, strength):
-    """How many members of the part start..stop of block k carry something."""
+    """How many of the members in places start to stop of block k carry something."""
     s = strength[0, start:stop]
     found = 0
     if block[k, 3] == 0:

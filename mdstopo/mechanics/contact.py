@@ -45,7 +45,7 @@ def second_rise(c, r, acc):
 
 @inline
 def contact_force(c, height, rise, slide, mode):
-    """N, N_height, N_rise, T, T_height, T_rise, T_slide."""
+    """Normal force and friction with their slopes: N, N_height, N_rise, T, T_height, T_rise, T_slide."""
     if mode != CLOSED:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     normal = -c[0] * height - c[1] * rise

@@ -21,7 +21,7 @@ DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
 
 @kernel
 def turned(home, angle):
-    """`geometry.turned_body` of a body with this row of `home`."""
+    """What `geometry.turned_body` gives for a body, from its row of `home` and the angle it has turned by (rad)."""
     m, s = small_turn(angle)
     c = home[3] * m - home[4] * s
     s = home[4] * m + home[3] * s

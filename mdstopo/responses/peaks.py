@@ -221,7 +221,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
             value *= sign
             rate *= sign
             if not crossing and not (d[i] > 0.0 and rate < 0.0) and not (d[i] < 0.0 and rate > 0.0):
-                break  # the dip of the cubic was none of the motion's
+                break  # the cubic has an extremum here, the motion has none
             crossing = True
             if rate > 0.0:
                 a = time

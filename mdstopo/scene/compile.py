@@ -117,7 +117,9 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
 
 
 def _nearness(group: MemberGroup, member: FloatArray, block: list[int]) -> list[float]:
-    """A row of `Model.near`: up to a share of the longest member, in which digits are to be won.
+    """A row of `Model.near`: how far bodies may have moved for elongations to come from displacements.
+
+    That is a share of the longest member: beyond it displacements are no more accurate than lengths.
 
     In grids, whose kernels do not ask which is shorter, no end has moved by more than half of the shortest member.
     """

@@ -16,7 +16,7 @@ from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 
-#: where energies are looked at: `find_peaks` has been at both ends already
+#: where energies are evaluated: at both ends `find_peaks` has done it already
 AT_START, AT_END, ELSEWHERE = range(3)
 
 

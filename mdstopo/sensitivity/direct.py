@@ -17,7 +17,7 @@ from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.propagation import apply_matrix, step_matrix
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 
-#: the step before one that the motion never takes
+#: in place of the step before, for what is at the start of the motion
 NOWHERE = -2
 
 
@@ -245,7 +245,7 @@ def direct(
             unscale_gradient(model, alpha, total_line, history[k])
         if k == count:
             break
-        # the rows whose look begins where this step does, then the step itself
+        # first the rows in this step, each by a linear map of its own, then the step itself
         for job in range(jobs + 1):
             row = job < jobs
             w = k
@@ -255,7 +255,7 @@ def direct(
                 r = job % n_row
                 if r >= found[j] or spread[j] or before[j, r] != k - 1:
                     continue
-                # again, because one that is kept behind the steps gives way to the next
+                # found again: a partial step behind the others has been overwritten by that of the next row
                 w, c = look_at_row(
                     model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                     rel, sums, mu[j, r], work,
@@ -268,7 +268,7 @@ def direct(
             )  # fmt: skip
             work[5] += 1
             for out in range(2):
-                # out = 0: what the last row of the matrix looks at; out = 1: the changes at the end
+                # out = 0: the last row of the matrix, which is the response's; out = 1: the changes at the end
                 if (row and out == 1) or (not row and out == 0 and not integral):
                     continue
                 target = padded[job // n_row, job % n_row : job % n_row + 1] if row else total

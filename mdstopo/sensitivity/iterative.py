@@ -247,7 +247,7 @@ def iterative(
     states = np.zeros((n_obj, n_row, 3, n))
     place = np.empty((n_obj, n_row), np.int64)
     fraction = np.empty((n_obj, n_row))
-    place[:] = -1  # what is no peak is looked at nowhere
+    place[:] = -1  # integrals over time belong to no step
     integral = False
     for j in range(n_obj):
         if reductions[j] == MEAN or reductions[j] == INTEGRAL:

@@ -17,7 +17,7 @@ from mdstopo.mechanics.laws.spring import elongation_of
 
 @kernel
 def _line(par, w, wd):
-    """Arms, unit vector, 1/length (0 at none), relative velocity, rate, and its turn f = e'."""
+    """Arms, unit vector e, 1/length (0 at no length), relative velocity d', and rate of the length."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
     y = w[4] + cy - w[1] - py
@@ -53,7 +53,7 @@ def distance_rows(par, w, phi, jac):
 
 @kernel
 def distance_gamma(par, w, wd, gamma):
-    """Centripetal part and the turning of the link."""
+    """gamma: the centripetal part, and that of the turning link."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     bx = wd[2] ** 2 * px - wd[5] ** 2 * cx
     by = wd[2] ** 2 * py - wd[5] ** 2 * cy

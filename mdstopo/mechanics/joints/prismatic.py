@@ -50,7 +50,7 @@ def prismatic_rows(par, w, phi, jac):
 
 @kernel
 def prismatic_gamma(par, w, wd, gamma):
-    """What the second derivative has beside Phi_q a."""
+    """gamma: what the second derivative of Phi has beside Phi_q a."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     dx = wd[3] - wd[0] - wd[5] * cy
     dy = wd[4] - wd[1] + wd[5] * cx
@@ -154,7 +154,7 @@ def prismatic_moment(par, w, lam, by_lam, by_q):
 
 
 def prismatic_at_home(joint: PrismaticJoint, home: AtHome) -> dict[int, float]:
-    """How far the second point is off the axis."""
+    """How far the second point is off the axis at home (m), by its place in the parameters."""
     nx, ny = -joint.axis[1], joint.axis[0]
     return {8: (home.c * nx - home.s * ny) * home.x + (home.s * nx + home.c * ny) * home.y}
 

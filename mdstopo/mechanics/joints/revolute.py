@@ -174,7 +174,7 @@ def revolute_stiffness(par, w, lam, k):
 
 
 def point_at_home(_: object, home: AtHome) -> dict[int, float]:
-    """Phi of the points."""
+    """Phi at home, by the places of its entries in the parameters."""
     return {8: home.x, 9: home.y}
 
 
