@@ -120,8 +120,8 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
       pose (S, n_pair, POSE): relative poses of the stages.
       settings (4,): of `look`; the tolerance and the fixed step are read.
     Out:
-      meeting (2 or more,): index of the member in the padded arrays, or -1; then, where there is
-        one, the stage before which they meet; as many as there are stages: before the end.
+      meeting (2 or more,): index of the member in the padded arrays, or -1; where there is one, then the number of
+        the stage before which its ends meet, or the number of stages where they meet after the last one.
     """
     meeting[0] = -1
     pair = model.pair
