@@ -13,11 +13,11 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
 3. `parent_of(steps, w)`: the step before step w, -1 where w begins at the start.
 4. `stage_weights(tables, steps, w, out)`: weights (s,) of the stages in the integral over step w.
 5. `reverse_step(pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped,
-   turning, accuracy, work)`: pulls cotangents back through step w, from its end (lam) and from its point (mu, zero
-   where c_point < 0), explicit ones of the stage positions added (no rows: none); leaves z (s, n), the virtual
-   displacement of each stage's force balance. lam_x (n_carried, n) belongs to whatever else the method carries from
-   step to step. accuracy: relative, to which an iteration has to go; 0: to rounding.
-6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: pushes
+   turning, accuracy, work)`: carries derivatives of a response back through step w, from its end (lam) and from its
+   point (mu, zero where c_point < 0), explicit ones by the stages' coordinates added (no rows: none); leaves z (s, n),
+   the virtual displacement of each stage's force balance. lam_x (n_carried, n) belongs to whatever else the method
+   carries from step to step. accuracy: relative, to which an iteration has to go; 0: to rounding.
+6. `tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning)`: carries
    changes forward through step w (in place) to its end or its point; dx (n_carried, n) as lam_x.
 7. `carried(steps) -> int`: rows of lam_x and dx; none for one-step methods.
 8. `steps_of(tag, arrays)`: the steps' tuple from the arrays of `steps.carve`, because what Python hands over are flat
@@ -37,27 +37,74 @@ _MAKERS: dict[int, Implementation] = {}
 
 
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """Duty 2."""
+    """The state at a fraction of a step, by the method's own interpolation (duty 2).
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the method.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns the step w and its fraction c_w (-1: its end) from which a reverse sweep starts for it.
+    """
     raise NotImplementedError
 
 
 def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """Duty 2, for a reverse sweep."""
+    """The state at a fraction of a step, with all that a reverse sweep from there needs (duty 2).
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the method.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+      steps: where the interpolation is a partial step, this is kept behind the others.
+
+    Returns the step w and its fraction c_w (-1: its end) from which a reverse sweep starts for it.
+    """
     raise NotImplementedError
 
 
 def sample(steps, count, damped, t, g, d):
-    """Duty 9."""
+    """Times, stored energies and their rates along the motion, without its first and last state (duty 9).
+
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+    Out:
+      t (S or more,): times (s), rising; S is the number of stages.
+      g (S or more,): energies then (J).
+      d (S or more,): their rates (W); NaN where unknown.
+
+    Returns how many samples there are.
+    """
     raise NotImplementedError
 
 
 def parent_of(steps, w):
-    """Duty 3."""
+    """The step before step w, -1 where w begins at the start of the motion (duty 3)."""
     raise NotImplementedError
 
 
 def stage_weights(tables, steps, w, out):
-    """Duty 4."""
+    """out (s,) = weights of the stages in the integral over step w (duty 4)."""
     raise NotImplementedError
 
 
@@ -65,22 +112,59 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Duty 5."""
+    """Carry derivatives of a response back through a step: its transposed linearisation (duty 5).
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables: constant arrays of the method.
+      steps: what the integrator kept.
+      w: number of the step.
+      c_point: fraction of the step at which the response is evaluated; negative: none.
+      mu_q, mu_v (n,): derivatives of the response by q and v there; zero where c_point < 0.
+      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+      accuracy: relative, to which an iteration has to go; 0: to rounding.
+    In and out:
+      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
+      lam_x (n_carried, n): the same for what else the method carries from step to step.
+    Out:
+      z (s, n): virtual displacement of each stage's force balance.
+      work (WORK,): counts of work, added to.
+    """
     raise NotImplementedError
 
 
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Duty 6."""
+    """Carry changes of the state forward through a step: its linearisation (duty 6).
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables: constant arrays of the method.
+      steps: what the integrator kept.
+      w: number of the step.
+      c_point: fraction of the step up to which; negative: to its end.
+      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    In and out:
+      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
+      dx (n_carried, n): the same of what else the method carries from step to step.
+    Out:
+      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
+    """
     raise NotImplementedError
 
 
 def carried(steps):
-    """Duty 7."""
+    """How many rows lam_x and dx have: none for one-step methods (duty 7)."""
     raise NotImplementedError
 
 
 def steps_of(tag, arrays):
-    """Duty 8."""
+    """The tuple of steps of the arrays of `steps.carve`; the tag says of which method (duty 8)."""
     raise NotImplementedError
 
 
@@ -92,7 +176,7 @@ def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, 
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
-    """The kernel for this type of steps."""
+    """The kernel that does the duty `name` for this type of steps; None where it is none of ours."""
     kind = getattr(steps, "instance_class", None)  # of a named tuple's type
     if kind is None:
         return None
@@ -106,7 +190,19 @@ def _implementation(name: str, steps: Any) -> Implementation | None:
 
 @kernel
 def sample_stages(steps, count, damped, t, g, d):
-    """Every stage of a step."""
+    """Every stage of the steps as a sample, for methods whose stages are ordered and exact.
+
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+    Out:
+      t (S or more,): times (s), rising; S is the number of stages.
+      g (S or more,): energies then (J).
+      d (S or more,): their rates (W).
+
+    Returns how many samples there are.
+    """
     first = steps.index[0, 0]
     m = steps.index[count, 0] - first
     for i in range(m):
@@ -118,6 +214,24 @@ def sample_stages(steps, count, damped, t, g, d):
 
 @by_type(point_of)
 def _point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
+    """Choose the kernel of `point_of` by the type of steps, which is all that is known here of the arguments:
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the method.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns the step w and its fraction c_w (-1: its end) from which a reverse sweep starts for it.
+    """
     return _implementation("point_of", steps)
 
 
@@ -136,11 +250,50 @@ def _reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
+    """Choose the kernel of `reverse_step` by the type of steps, which is all that is known here of the arguments:
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables: constant arrays of the method.
+      steps: what the integrator kept.
+      w: number of the step.
+      c_point: fraction of the step at which the response is evaluated; negative: none.
+      mu_q, mu_v (n,): derivatives of the response by q and v there; zero where c_point < 0.
+      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+      accuracy: relative, to which an iteration has to go; 0: to rounding.
+    In and out:
+      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
+      lam_x (n_carried, n): the same for what else the method carries from step to step.
+    Out:
+      z (s, n): virtual displacement of each stage's force balance.
+      work (WORK,): counts of work, added to.
+    """
     return _implementation("reverse_step", steps)
 
 
 @by_type(tangent_step)
 def _tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
+    """Choose the kernel of `tangent_step` by the type of steps, which is all that is known here of the arguments:
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables: constant arrays of the method.
+      steps: what the integrator kept.
+      w: number of the step.
+      c_point: fraction of the step up to which; negative: to its end.
+      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    In and out:
+      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
+      dx (n_carried, n): the same of what else the method carries from step to step.
+    Out:
+      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
+    """
     return _implementation("tangent_step", steps)
 
 
@@ -151,11 +304,42 @@ def _carried(steps):
 
 @by_type(reach)
 def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
+    """Choose the kernel of `reach` by the type of steps, which is all that is known here of the arguments:
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the method.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns the step w and its fraction c_w (-1: its end) from which a reverse sweep starts for it.
+    """
     return _implementation("reach", steps)
 
 
 @by_type(sample)
 def _sample(steps, count, damped, t, g, d):
+    """Choose the kernel of `sample` by the type of steps, which is all that is known here of the arguments:
+
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+    Out:
+      t (S or more,): times (s), rising; S is the number of stages.
+      g (S or more,): energies then (J).
+      d (S or more,): their rates (W); NaN where unknown.
+
+    Returns how many samples there are.
+    """
     return _implementation("sample", steps)
 
 

@@ -80,12 +80,7 @@ class Looked(NamedTuple):
 
 
 class Driver:
-    """One scene, one method, ready to run.
-
-    looks: imports the compiled entries that look at steps (look, dense). alpha (N,): the array that every design is put
-    in; shared with whoever gives designs. integrated: whether something is looked at that is integrated over time, so
-    that steps have to be good for that, too.
-    """
+    """One scene, one method, ready to run."""
 
     def __init__(
         self,
@@ -99,6 +94,18 @@ class Driver:
         beside: Compiling | None = None,
         integrated: bool = False,
     ) -> None:
+        """Make room, and pack the scene; nothing is compiled or imported yet.
+
+        scene: the compiled load case.
+        method: the integrator.
+        looks: imports the compiled entries that look at steps (look, dense).
+        tolerance: relative error that objectives and gradients may have.
+        step: fixed step (s); 0: adaptive steps; negative: see `generalized_alpha.longest_step`.
+        reductions (n_obj,): codes of `sensitivity.reductions`, one an objective.
+        alpha (N,): the array that every design is put in, shared with whoever gives designs.
+        beside: another process that may be compiling what looks at steps.
+        integrated: whether something is looked at that is integrated over time.
+        """
         self.scene = scene
         self.method = method
         self._entry: Any = None
@@ -146,7 +153,7 @@ class Driver:
 
     @property
     def _looking_entries(self) -> Any:
-        """Behind the method's own: these enter what the method offers to whatever looks at its steps."""
+        """As `looking`, without waiting; after the method's own entries, which enter its functions in `contract`."""
         if self._looking is None and self.entry is not None:
             self._looking = self._load_looking()
         return self._looking
@@ -223,11 +230,11 @@ class Driver:
                 break
         if found is plain or abs(total - first) > float(self.settings[0]) * abs(total):
             return found
-        self._take(self._plain)  # it was good enough: numbers stay what they were
+        self._take(self._plain)  # longer steps were good enough: numbers stay what they were
         return self._run(tangent)
 
     def _take(self, packed: Packed) -> None:
-        """Let the kernels see a model, packed."""
+        """Have the kernels compute a model, packed; calls that were prepared for another one are dropped."""
         if packed is not self.packed:
             self.packed = packed
             self._simulate, self._look = {}, {}
@@ -278,6 +285,15 @@ class Driver:
         times: FloatArray | None = None,
         packed: Packed | None = None,
     ) -> tuple[Any, ...]:
+        """Arguments of the compiled entry `dense`, with fresh arrays for what it writes.
+
+        count: steps that were taken.
+        limits (3,): steps allowed, room for steps, room for stages.
+        room, room_ints: the steps (`steps.carve`).
+        strength (3 or more, M_padded): as the run left them.
+        times (T,): times that are asked for (s); none by default.
+        packed: the model that was computed; by default the driver's present one.
+        """
         asked = np.zeros(0) if times is None else times
         ints, floats = self.packed if packed is None else packed
         return (

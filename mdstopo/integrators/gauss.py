@@ -81,12 +81,24 @@ MOST_CAUTIOUS = 100.0
 
 @entry
 def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):
-    """Integrate alpha (N,) over model.times; returns (code, number of windows, time reached).
+    """Integrate the motion of a design over model.times, window after window.
 
-    In: the packed model; settings: tolerance, the error of the interpolated motion relative to the motion itself;
-    Newton tolerance; fixed step (> 0: windows of that length, seven nodes, no error control); limits: windows allowed,
-    room for windows, for stages. Room: room, room_ints, where the steps stay; strength (3 or more, M_padded), see
-    `carrying`. work: counts, added to. Tangents are always kept. NEEDS_ROOM asks for more room.
+    Constant:
+      ints, floats: the packed model.
+      tables (n_level, 7, s_max, s_max): of `gauss_tables`.
+    In:
+      alpha (N,): the design.
+      damped: whether any force depends on velocity.
+      tangent: not used; tangents are always kept.
+      settings (3 or more,): tolerance, the error of the interpolated motion relative to the motion itself; Newton
+        tolerance; fixed step (s; > 0: windows of that length, seven nodes, no error control).
+      limits (3,): windows allowed, room for windows, room for stages.
+    Out:
+      room, room_ints: the steps (`steps.carve`).
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `carrying` on further rows.
+      work (WORK,): counts of work, added to.
+
+    Returns the code, the number of windows and the time reached (s); NEEDS_ROOM asks for more room.
     """
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
@@ -119,7 +131,24 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
 
 @part
 def _windows(model, tables, strength, settings, most, damped, turning, steps, own, work):
-    """Window after window from the start to the end; returns as `simulate` does."""
+    """Integrate window after window from the start to the end.
+
+    Constant:
+      model: the compiled scene.
+      tables (n_level, 7, s_max, s_max): of `gauss_tables`.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      settings (3 or more,): tolerance, Newton tolerance, fixed step (s; > 0: windows of that length).
+      most: windows allowed.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    Out:
+      steps: the windows (`GaussSteps`).
+      own: room to work in (`Room`), of zeros and unwritten arrays.
+      work (WORK,): counts of work, added to.
+
+    Returns the code, the number of windows and the time reached (s), as `simulate` does.
+    """
     tolerance = settings[0]
     newton_tolerance = settings[1]
     fixed_step = settings[2]
@@ -131,7 +160,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
     inv_mass = model.inv_mass
     times = model.times
     reach = model.reach
-    # numbers written in a call are types of their own, and would have the callee compiled once more
+    # a number written in a call has a type of its own, for which the callee would be compiled once more
     yes = np.bool_(True)
     t_node = own.t
     rel = own.rel

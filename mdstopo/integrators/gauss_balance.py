@@ -45,11 +45,32 @@ def balance(
     pair, inv_mass, planes, s, q0, v0, hv0, none, h, f, own, damped, turning, alike, weight, accuracy, ref, a,
     q, v, work,
 ):  # fmt: skip
-    """Solve the linearised balance for a by sweeps; q, v become the states that belong to it. Rows as in `rows`.
+    """Solve the linearised balance of a window for the accelerations at its nodes by sweeps. Rows as in `rows`.
 
-    In: forces f and tangents (`Room`) at ref (2, s, W), the tangents alike at all nodes or not; a as a first guess;
-    weight (W,) of `motion_weights`; none (W,) zeros; accuracy: relative change of the states at which to stop. Returns
-    the relative correction of the states against ref, or -1 where the sweeps do not contract.
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (W,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      planes (7, s_max, s_max): of `gauss_tables`, for this number of nodes.
+      s: number of nodes.
+      q0, v0 (W,): coordinates and velocities at the start of the window.
+      hv0 (W,): h v0.
+      none (W,): zeros.
+      h: length of the window (s).
+      f (s or more, W): forces at ref (N, N m).
+      own: room (`Room`), with the tangents at ref; its rows 2 to 4 and its dense matrices are overwritten.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+      alike: whether the tangents are the same at all nodes, as in a prediction.
+      weight (W,): of `motion_weights`.
+      accuracy: relative change of the states at which to stop.
+      ref (2, s or more, W): q and v at the nodes, about which the balance is linear.
+    In and out:
+      a (s or more, W): accelerations at the nodes; a first guess before.
+    Out:
+      q, v (s or more, W): the states at the nodes that belong to a.
+      work (WORK,): counts of work, added to.
+
+    Returns the relative correction of the states against ref, or -1 where the sweeps do not contract.
     """
     k = own.K
     c = own.C
@@ -125,10 +146,20 @@ def dense_rows(n):
 
 @part
 def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):
-    """out (s, n, W) = M^-1 (load tangent - K), K (s, n_pair, 6, 6), by columns; transposed: by rows.
+    """Write the tangents of all nodes as dense matrices M^-1 (load tangent - K), by columns.
 
-    Zeros at and beyond n in each row. The few numbers of a few bodies are multiplied faster in whole vectors
-    than pair by pair.
+    The few numbers of a few bodies are multiplied faster in whole vectors than pair by pair.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      k (s or more, n_pair, 6, 6): K of each pair.
+      turn (s or more, n): derivative of the loads by the angle of their body, read if they turn.
+      turning: whether loads turn.
+      inverse (n or more,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      s: number of nodes.
+      transposed: by rows instead.
+    Out:
+      out (s or more, n, W): overwritten, with zeros at and beyond n in each row.
     """
     for i in range(s):
         m = out[i]
@@ -157,8 +188,12 @@ def fill_dense(pair, k, turn, turning, inverse, s, transposed, out):
 
 @part
 def fastest_rate(pair, inv_mass, k, c, damped, settled):
-    """Estimate of the largest |eigenvalue| of the first-order system at one state, 1/s, by power iteration.
+    """Estimate the largest |eigenvalue| of the first-order system at one state by power iteration (1/s).
 
+    pair (n_pair, 2): the bodies of each pair.
+    inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+    k, c (1 or more, n_pair, 6, 6): -dF/dq and -dF/dv of each pair; c is read if damped.
+    damped: whether any force depends on velocity.
     settled: relative change at which the iteration ends.
     """
     n = inv_mass.shape[0]
@@ -190,7 +225,23 @@ def fastest_rate(pair, inv_mass, k, c, damped, settled):
 
 @part
 def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):
-    """u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x; z is room."""
+    """Multiply by the transposed tangents: u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x, at s nodes.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      k, c (s, n_pair, 6, 6): -dF/dq and -dF/dv of each pair; c is read if damped.
+      turn (s, n): derivative of the loads by the angle of their body, read if they turn.
+      dense (1 or 2, s, n, W): the same of `fill_dense`, transposed, or (.., 0, W): then pair by pair.
+      inverse (W,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      x (s, W): what is multiplied.
+      s: number of nodes.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    Out:
+      u, y (s, W): the products.
+    Room:
+      z (s, W).
+    """
     u[:] = 0.0
     if damped:
         y[:] = 0.0

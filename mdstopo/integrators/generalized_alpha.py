@@ -68,9 +68,22 @@ def weights_of(radius):
 
 @kernel
 def effective_matrix(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning, transposed, half, band, pivots):
-    """Factorise I + M^-1 (w_q (K - load tangent) + w_v C), or its transpose, into band and pivots.
+    """Factorise I + M^-1 (w_q (K - load tangent) + w_v C) of one stage, or its transpose.
 
-    k, c (n_pair, 6, 6), turn (n,) of one stage. Returns False where it is singular.
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      k, c (n_pair, 6, 6): -dF/dq and -dF/dv of each pair; c is read if damped.
+      turn (n,): derivative of the loads by the angle of their body, read if they turn.
+      w_q, w_v: how q and v follow the acceleration in a step (s^2, s).
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+      transposed: whether the transpose is wanted.
+      half: of `banded.half_width`.
+    Out:
+      band (n, 3 half + 1), pivots (n,): the factors, for `banded.solve`.
+
+    Returns False where the matrix is singular.
     """
     band[:] = 0.0
     for d in range(inv_mass.shape[0]):
@@ -99,11 +112,23 @@ def effective_matrix(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning, tran
 
 @kernel
 def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps, steps, work):
-    """Integrate from the first to the last of model.times; returns (code, number of steps).
+    """Integrate from the first to the last of model.times, with equal steps in each segment of the loads.
 
-    tables: (1,) spectral radius. strength: (3, M_padded). step: longest step, s; segments are divided equally.
-    newton_tolerance: correction relative to the motion after which the next would be rounding. work: counts, added
-    to. NEEDS_ROOM, before any step is taken, where `steps` is too small (there are two more stages a segment).
+    Constant:
+      model: the compiled scene.
+      tables (1,): the spectral radius.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      damped: whether any force depends on velocity.
+      newton_tolerance: correction relative to the motion after which the next would be rounding.
+      step: the longest step (s).
+      max_steps: steps allowed.
+    Out:
+      steps: `AlphaSteps`.
+      work (WORK,): counts of work, added to.
+
+    Returns the code and the number of steps; NEEDS_ROOM, before any step is taken, where `steps` is too small (there
+    are two more stages a segment).
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]

@@ -21,7 +21,25 @@ __all__ = ["TAG", "rate_at_start", "simulate"]
 
 @entry
 def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):
-    """Simulate alpha (N,) once; the steps stay in room, with tangents. Returns (code, steps, time reached)."""
+    """Integrate the motion of a design over model.times with equal steps in each segment.
+
+    Constant:
+      ints, floats: the packed model.
+      tables (1,): the spectral radius.
+    In:
+      alpha (N,): the design.
+      damped: whether any force depends on velocity.
+      tangent: not used; tangents are always kept.
+      settings (3 or more,): tolerance, which is not used; Newton tolerance; step (s), negative: radians of the fastest
+        vibration (`generalized_alpha.longest_step`).
+      limits (3,): steps allowed, room for steps, room for stages.
+    Out:
+      room, room_ints: the steps (`steps.carve`).
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `carrying` on further rows.
+      work (WORK,): counts of work, added to.
+
+    Returns the code, the number of steps and the time reached (s); NEEDS_ROOM asks for more room.
+    """
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
     model, strength, _ = carrying(whole, strength, np.bool_(True))

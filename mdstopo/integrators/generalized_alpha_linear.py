@@ -39,7 +39,15 @@ def hermite(c):
 
 @part
 def cubic(start, end, h, c, q, v):
-    """The cubic between the ends of a step h, whose states (2 or more, n) are q and q'; and its derivative."""
+    """The cubic between the ends of a step, and its derivative, at a fraction of it.
+
+    In:
+      start, end (2 or more, n): q and q' at the ends of the step.
+      h: its length (s).
+      c: the fraction, 0 to 1.
+    Out:
+      q, v (n,): the cubic and its derivative.
+    """
     q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
     for d in range(q.shape[0]):
         q[d] = q0 * start[0, d] + q1 * end[0, d] + h * (v0 * start[1, d] + v1 * end[1, d])
@@ -48,14 +56,38 @@ def cubic(start, end, h, c, q, v):
 
 @kernel
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The cubic between the ends of step k, and its derivative."""
+    """The cubic between the ends of step k, and its derivative.
+
+    In:
+      steps: what the integrator kept.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+
+    Not used: model, tables, strength, count, damped, work.
+
+    Returns k and c: a reverse sweep starts there.
+    """
     cubic(steps.state[k], steps.state[k + 1], steps.t[k + 1] - steps.t[k], c, q, v)
     return k, c
 
 
 @kernel
 def sample(steps, count, damped, t, g, d):
-    """Every end of a step: what else is a stage is there already, or off the motion."""
+    """Every end of a step as a sample: what else is a stage is there already, or off the motion.
+
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+    Out:
+      t (S or more,): times (s), rising; S is the number of stages.
+      g (S or more,): energies then (J).
+      d (S or more,): their rates (W).
+
+    Returns how many samples there are.
+    """
     for k in range(count - 1):
         o = steps.index[k + 1, 0] - 1
         t[k] = steps.scalar[o, 0]
@@ -66,7 +98,7 @@ def sample(steps, count, damped, t, g, d):
 
 @kernel
 def parent_of(steps, w):
-    """Steps follow one another."""
+    """The step before: steps follow one another."""
     return w - 1
 
 
@@ -86,7 +118,7 @@ def stage_weights(tables, steps, w, out):
 
 @kernel
 def carried(steps):
-    """The acceleration and the auxiliary one."""
+    """Two: a step takes over the acceleration and the auxiliary one, too."""
     return 2
 
 
@@ -95,7 +127,28 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Duty 5 of the contract."""
+    """Carry derivatives of a response back through step w (duty 5).
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables (1,): the spectral radius.
+      steps: what the integrator kept.
+      w: number of the step.
+      c_point: fraction of the step at which the response is evaluated; negative: none.
+      mu_q, mu_v (n,): derivatives of the response by q and v there; zero where c_point < 0.
+      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    In and out:
+      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
+      lam_x (2, n): the same by the accelerations and the auxiliary ones.
+    Out:
+      z (s, n): virtual displacement of each stage's force balance.
+      work (WORK,): counts of work, added to.
+
+    Not used: accuracy.
+    """
     n = lam_q.shape[0]
     o = steps.index[w, 0]
     last = steps.index[w + 1, 0] - 1 - o
@@ -127,7 +180,7 @@ def reverse_step(
         steps.turn[o + last] if turning else start_q, h * h * beta * e1, h * gamma * e1, damped, turning,
         np.bool_(True), half, band, pivots,
     )  # fmt: skip
-    # stages from the last to the first: what pulls on a stage's acceleration, its z, and on to its state
+    # stages from the last to the first: the derivative by a stage's acceleration, its z, and then that by its state
     for j in range(last, -1, -1):
         x = z[j]
         if j == last:
@@ -176,7 +229,24 @@ def reverse_step(
 
 @kernel
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Duty 6 of the contract."""
+    """Carry changes of the state forward through step w (duty 6).
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables (1,): the spectral radius.
+      steps: what the integrator kept.
+      w: number of the step.
+      c_point: fraction of the step up to which; negative: to its end.
+      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    In and out:
+      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
+      dx (2, n): the same of the accelerations and the auxiliary ones, always to the end.
+    Out:
+      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
+    """
     n = dq.shape[0]
     o = steps.index[w, 0]
     last = steps.index[w + 1, 0] - 1 - o

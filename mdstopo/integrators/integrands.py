@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: how often a motion is computed anew: each time steps are halved
 ROUNDS = 8
-#: from this time on halving is in vain where it leaves more than so much: what does not fall is rounding
+#: from this round on steps are halved no more where that leaves more than so much of what it was: the rest is rounding
 PATIENCE, VAIN = 2, 0.7
 #: what a step may leave by its terms, relative to the tolerance and the whole integral. In truth it leaves some hundred
 #: times less: of 60 random scenes one or two have such a step, in vain. So what changes the integral by less than the

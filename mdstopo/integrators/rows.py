@@ -35,7 +35,17 @@ def copy_row(source, target):
 
 @part
 def combine_rows(matrix, s, columns, factor, base, a, out):
-    """out[i] = base[i] + factor sum_j matrix_ij a[j] for i < s, j < columns; base (s, W), a (columns, W)."""
+    """out[i] = base[i] + factor sum_j matrix_ij a[j] for i < s, j < columns.
+
+    In:
+      matrix (s or more, columns or more): of which the first rows and columns count.
+      s: how many rows come out.
+      factor: of the sums.
+      columns: how many rows go in.
+      base (s or more, W), a (columns or more, W): rows.
+    Out:
+      out (s or more, W): overwritten up to s.
+    """
     for d in range(0, out.shape[1], lanes()):
         for i in range(s):
             x = zero()
@@ -46,7 +56,19 @@ def combine_rows(matrix, s, columns, factor, base, a, out):
 
 @part
 def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):
-    """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s, j < columns; all rows."""
+    """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i < s, j < columns.
+
+    In:
+      matrix (s or more, columns or more): of which the first rows and columns count.
+      s: how many rows come out.
+      factor: of the sums.
+      columns: how many rows go in.
+      start, slope (W,): alike for all rows.
+      c (s or more,): times of the nodes, 0 to 1.
+      a (columns or more, W): rows.
+    Out:
+      out (s or more, W): overwritten up to s.
+    """
     for d in range(0, out.shape[1], lanes()):
         x0 = load(start, d)
         x1 = load(slope, d)
@@ -60,6 +82,19 @@ def integrate_to_nodes(matrix, s, columns, factor, start, slope, c, a, out):
 @part
 def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx):
     """out[i] = start + c_i slope + factor sum_j matrix_ij a[j] for i, j < s, and dx[i] = out[i] - ref[i].
+
+    In:
+      matrix (s or more, s or more): of which the first rows and columns count.
+      s: how many rows.
+      factor: of the sums.
+      start, slope (W,): alike for all rows.
+      c (s or more,): times of the nodes, 0 to 1.
+      a, ref (s or more, W): rows.
+      weight (W,): of the changes.
+    In and out:
+      out (s or more, W): overwritten up to s.
+    Out:
+      dx (s or more, W): overwritten up to s.
 
     Returns max over i and coordinates of weight times the change of out[i]; NaN where one is not finite.
     """
@@ -85,6 +120,15 @@ def move_to_nodes(matrix, s, factor, start, slope, c, a, weight, ref, out, dx):
 @part
 def renew_rows(matrix, s, factor, base, a, weight, out):
     """out[i] = base[i] + factor sum_j matrix_ij a[j] for i, j < s.
+
+    In:
+      matrix (s or more, s or more): of which the first rows and columns count.
+      s: how many rows.
+      factor: of the sums.
+      base, a (s or more, W): rows.
+      weight (W,): of the changes.
+    In and out:
+      out (s or more, W): overwritten up to s.
 
     Returns max over i and coordinates of weight times the change of out[i], and of weight |out[i]|.
     """

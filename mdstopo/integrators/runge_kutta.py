@@ -78,9 +78,28 @@ def advance(
     ends,
     work,
 ):
-    """One step of length h from q0, v0: the stages into q, v, a (s, n), the end into ends (2, n).
+    """Take one step of an explicit method.
 
-    With o >= 0 the stages are kept in `steps` from there on.
+    Constant:
+      model: the compiled scene.
+      table (3, s_max, s_max): of `runge_kutta_tables`, for this method.
+      s: number of stages.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      segment: of the loads.
+      t, h: start and length of the step (s).
+      q0, v0 (n,): coordinates and velocities at its start.
+      tangent: whether tangents are wanted.
+      damped: whether any force depends on velocity.
+      o: number of the first stage in `steps`, where stages are kept; -1: they are not.
+    Out:
+      q, v, a (s or more, n): the stages.
+      steps: with o >= 0 the stages are kept there.
+      ends (2, n): q and v at the end.
+      work (WORK,): counts of work, added to.
+    Room:
+      rel (1, n_pair, POSE), sums (1, n_pair, SUMS), f (1, n), k, c (1, n_pair, 6, 6), turn (1, n): what the force
+      balance of a stage sees; turn has to be zero where no load turns.
     """
     n = q0.shape[0]
     aa = table[0]
@@ -124,7 +143,15 @@ def advance(
 
 @kernel
 def _error(vectors, s, h, longest, a, weight):
-    """Estimated error of a step relative to the motion; NaN where one appears. longest: step so far (`lasting`)."""
+    """Estimate the error of a step relative to the motion; NaN where one appears.
+
+    vectors (7 or more, s_max): weights of the stages, plane VECTORS of the method's table.
+    s: number of stages.
+    h: length of the step (s).
+    longest: step so far (s), see `lasting`.
+    a (s or more, n): accelerations at the stages.
+    weight (n,): of `motion_weights`.
+    """
     later = lasting(h, longest)
     worst = 0.0
     coarse = 0.0
@@ -151,12 +178,24 @@ def _error(vectors, s, h, longest, a, weight):
 
 @entry
 def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, room, room_ints, strength, work):
-    """Integrate alpha (N,) over model.times; returns (code, number of steps, time reached).
+    """Integrate the motion of a design over model.times, step after step.
 
-    In: the packed model; tangent: whether tangents are kept for a reverse sweep; settings: tolerance, the error of a
-    step relative to the motion; -; fixed step (> 0: no error control); limits: steps allowed, room for steps, for
-    stages. Room: room, room_ints, where the steps stay, and two more than are taken (`point_of`); strength
-    (3 or more, M_padded), see `carrying`. work: counts, added to. NEEDS_ROOM asks for more room.
+    Constant:
+      ints, floats: the packed model.
+      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
+    In:
+      alpha (N,): the design.
+      damped: whether any force depends on velocity.
+      tangent: whether tangents are kept for a reverse sweep.
+      settings (3 or more,): tolerance, the error of a step relative to the motion; one that is not used; fixed step (s;
+        > 0: no error control).
+      limits (3,): steps allowed, room for steps, room for stages.
+    Out:
+      room, room_ints: the steps (`steps.carve`); there has to be room for two more than are taken (`point_of`).
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `carrying` on further rows.
+      work (WORK,): counts of work, added to.
+
+    Returns the code, the number of steps and the time reached (s); NEEDS_ROOM asks for more room.
     """
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)

@@ -19,7 +19,23 @@ from mdstopo.mechanics.passes import SUMS
 
 @kernel
 def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, work):
-    """A step of length c h from the start of step k; its stages are kept behind all others where asked."""
+    """Take a step of length c h from the start of step k.
+
+    Constant:
+      model: the compiled scene.
+      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+      keep: whether to keep its stages behind all others, as step count + 1 of `steps`, and its tangents.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+    """
     n = q.shape[0]
     n_pair = model.pair.shape[0]
     method = 1 if damped else 0
@@ -48,21 +64,67 @@ def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, wo
 
 @kernel
 def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state after a partial step, which is not kept."""
+    """The state after a partial step, which is not kept.
+
+    Constant:
+      model: the compiled scene.
+      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns k and c.
+    """
     _partial(model, tables, strength, steps, count, k, c, damped, np.bool_(False), q, v, work)
     return k, c
 
 
 @kernel
 def reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state after a partial step, which is kept as step count + 1."""
+    """The state after a partial step, which is kept as step count + 1.
+
+    Constant:
+      model: the compiled scene.
+      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      k: number of the step.
+      c: fraction of it, 0 to 1.
+      damped: whether any force depends on velocity.
+    Out:
+      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
+      work (WORK,): counts of work, added to.
+
+    Returns count + 1 and -1: a reverse sweep starts at the end of the partial step.
+    """
     _partial(model, tables, strength, steps, count, k, c, damped, np.bool_(True), q, v, work)
     return count + 1, -1.0
 
 
 @kernel
 def sample(steps, count, damped, t, g, d):
-    """Starts of steps with their rates; inside, stage values without (a Nystroem stage has no velocity)."""
+    """Starts of steps with their rates; inside, stage values without (a Nystroem stage has no velocity).
+
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+    Out:
+      t (S or more,): times (s), rising; S is the number of stages.
+      g (S or more,): energies then (J).
+      d (S or more,): their rates (W); NaN where unknown.
+
+    Returns how many samples there are.
+    """
     s = STAGES[1 if damped else 0]
     m = 0
     for w in range(count):
@@ -94,7 +156,7 @@ def sample(steps, count, damped, t, g, d):
 
 @kernel
 def parent_of(steps, w):
-    """Kept with each step, because a partial step follows its parent out of order."""
+    """The step before, which is kept with each step: a partial step stands behind all others."""
     return steps.index[w, 1]
 
 
@@ -109,7 +171,7 @@ def stage_weights(tables, steps, w, out):
 
 @kernel
 def carried(steps):
-    """Nothing but q and v."""
+    """None: a step takes over nothing but q and v."""
     return 0
 
 
@@ -118,7 +180,25 @@ def reverse_step(
     pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
     accuracy, work,
 ):  # fmt: skip
-    """Duty 5 of the contract; a point inside a step is a partial step's end, so c_point is never used."""
+    """Carry derivatives of a response back through step w (duty 5); a point inside a step is a partial step's end.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
+      steps: what the integrator kept.
+      w: number of the step.
+      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    In and out:
+      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
+    Out:
+      z (s, n): virtual displacement of each stage's force balance.
+      work (WORK,): counts of work, added to.
+
+    Not used: c_point, mu_q, mu_v, lam_x, accuracy.
+    """
     n = lam_q.shape[0]
     o = steps.index[w, 0]
     s = steps.index[w + 1, 0] - o
@@ -156,7 +236,24 @@ def reverse_step(
 
 @kernel
 def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Duty 6 of the contract; a point inside a step is a partial step's end."""
+    """Carry changes of the state forward through step w (duty 6); a point inside a step is a partial step's end.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables (2, 3, s_max, s_max): of `runge_kutta_tables`.
+      steps: what the integrator kept.
+      w: number of the step.
+      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    In and out:
+      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
+    Out:
+      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
+
+    Not used: c_point, dx.
+    """
     n = dq.shape[0]
     o = steps.index[w, 0]
     s = steps.index[w + 1, 0] - o

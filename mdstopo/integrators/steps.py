@@ -97,7 +97,14 @@ Q, V, OWN = range(3)
 
 @part
 def carve(floats, ints, n, n_pair, steps, stages, damped, turning):
-    """The arrays of `FIELDS` with room for so many steps and stages, as views of flat arrays (see `room_for`)."""
+    """The arrays of `FIELDS` with room for so many steps and stages, as views of flat arrays.
+
+    floats, ints: the flat arrays, at least as long as `room_for` says.
+    n, n_pair: coordinates, and pairs of bodies.
+    steps, stages: how many there is to be room for.
+    damped: whether any force depends on velocity: no rows of C otherwise.
+    turning: whether loads turn: no rows of turn otherwise.
+    """
     index = ints[: 3 * (steps + 1)].reshape((steps + 1, 3))
     t = floats[: steps + 1]
     f = steps + 1
@@ -120,7 +127,13 @@ def carve(floats, ints, n, n_pair, steps, stages, damped, turning):
 
 
 def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning: bool) -> tuple[int, int]:
-    """Lengths of the flat arrays of floats and of integers that `carve` needs."""
+    """Lengths of the flat arrays of floats and of integers that `carve` needs.
+
+    n, n_pair: coordinates, and pairs of bodies.
+    steps, stages: how many there is to be room for.
+    damped: whether any force depends on velocity.
+    turning: whether loads turn.
+    """
     per_stage = 3 + 3 * n + 39 * n_pair + (36 * n_pair if damped else 0) + (n if turning else 0)
     return (steps + 1) * (1 + 2 * n) + stages * per_stage, 3 * (steps + 1)
 
@@ -140,7 +153,15 @@ def copy_tangents(source, target):
 
 @part
 def keep_state(times, state, k, t, q, v):
-    """State k: time, q, v."""
+    """Keep a state between two steps.
+
+    In:
+      k: its number.
+      t: time (s).
+      q, v (n,): coordinates and velocities.
+    Out:
+      times (steps + 1,), state (steps + 1, 2, n): of which entry k is written.
+    """
     times[k] = t
     for d in range(state.shape[2]):
         state[k, 0, d] = q[d]
@@ -163,7 +184,19 @@ def step_at(times, count, t):
 
 @part
 def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_out, c_out, turn_out):
-    """Store what the force balance of stage o saw: its state, sums and tangents."""
+    """Keep what the force balance of a stage saw: its state, sums and tangents.
+
+    In:
+      o: number of the stage.
+      t: time (s).
+      q, v (n,): coordinates and velocities.
+      own (n,): a vector of the method's own.
+      rel (n_pair, POSE), sums (n_pair, SUMS): relative poses, and sums of the members there.
+      k, c (n_pair, 6, 6): tangents of each pair; c is read where C has rows.
+      turn (n,): derivative of the loads by the angle of their body, read where turn_out has rows.
+    Out:
+      scalar, stage, pull, k_out, c_out, turn_out: arrays of the steps, of which row o is written.
+    """
     energy = 0.0
     rate = 0.0
     for p in range(rel.shape[0]):
@@ -221,7 +254,17 @@ def gross_loads(model, out):
 
 @part
 def add_gross_force(pair, rel, reach, p, force, out):
-    """out (n,) += a force of any direction between the bodies of pair p, and its moments."""
+    """Add a force of any direction between the bodies of a pair, and its moments, without regard to signs.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      rel (n_pair, POSE): relative poses.
+      reach (n_pair,): largest distance of an attachment point from its centre of mass (m).
+      p: number of the pair.
+      force: its size (N).
+    Out:
+      out (n or more,): added to (N, N m).
+    """
     arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
     for side in range(2):
         b = 3 * pair[p, side]
@@ -244,12 +287,22 @@ def add_preloads(model, strength, rel, out):
 
 @part
 def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
-    """noise (n_pair,): what rounding leaves uncertain of how far each pair has moved, m.
+    """Estimate what rounding leaves uncertain of how far each pair has moved.
 
     Displacements are summed since the start, so it is a share of what forces move bodies by, not of where these are:
-    of the strain at the start, and of what the loads and velocities do until members hold against them. inverse (n,):
-    of the masses; load (n,) of `gross_loads`; stiffness (n_pair,): of a pair's members, N/m; strain (n_pair,): at the
-    start, m.
+    of the strain at the start, and of what the loads and velocities do until members hold against them.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      inverse (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      rel (n_pair, POSE): relative poses at the start.
+      v (n or more,): velocities at the start (m/s, rad/s).
+      load (n or more,): largest loads (N, N m), of `gross_loads`.
+      stiffness (n_pair,): of all members of a pair (N/m).
+      strain (n_pair,): at the start (m).
+    Out:
+      noise (n_pair,): what is uncertain (m).
     """
     span = model.times[model.times.shape[0] - 1] - model.times[0]
     for p in range(model.pair.shape[0]):
@@ -270,9 +323,16 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
 
 @part
 def noise_of(pair, noise, rel, reach, q, p):
-    """What rounding leaves uncertain of how far pair p has moved, m, in a state q (n,) with poses rel (n_pair, POSE).
+    """What rounding leaves uncertain of how far a pair has moved, in a state (m).
 
-    noise: of `rounding_of_pairs`; and what both bodies have moved together is rounded, too.
+    What both bodies have moved together is rounded, too.
+
+    pair (n_pair, 2): the bodies of each pair.
+    noise (n_pair,): of `rounding_of_pairs` (m).
+    rel (n_pair, POSE): relative poses.
+    reach (n_pair,): largest distance of an attachment point from its centre of mass (m).
+    q (n or more,): coordinates (m, rad).
+    p: number of the pair.
     """
     a = 3 * pair[p, 0]
     b = 3 * pair[p, 1]

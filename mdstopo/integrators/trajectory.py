@@ -60,7 +60,15 @@ class Trajectory:
         work: dict[str, int],
         home: FloatArray,
     ) -> "Trajectory":
-        """The trajectory of the coordinates that have a home (n,), of steps that tell what these have moved since."""
+        """The trajectory of steps, which tell what bodies have moved since home.
+
+        load_case: its name.
+        steps: what the driver gave, with its dense output.
+        status, message: how the simulation ended, and why.
+        work: counts by name.
+        home (n,): places and angles (m, rad) of the coordinates that the trajectory has; it leaves out further ones of
+          the steps.
+        """
         t, n = steps.t.copy(), len(home)
         q, v = steps.state[:, 0, :n].copy(), steps.state[:, 1, :n].copy()
         q += home

@@ -52,10 +52,19 @@ def load_tangent(model, segment, t, q, turn):
 
 @part
 def pair_tangents(pair, rel, sums, damped, k_out, c_out):
-    """Tangents in body coordinates of one pose: k_out (n_pair, 6, 6) = -dF/dq, c_out = -dF/dv (if damped).
+    """Tangents of one pose in the coordinates of each pair's bodies.
 
     K = T^T (K_xi T + C_xi d(Tv)/dq) - d(T^T Q)/dq, C = T^T C_xi T, written in global axes: with D = x_B - x_A and
     w = -J D, R dxi_d = dD + w dpsi_A, and R d(xi'_d) = -omega_A J dD - J R xi'_d dpsi_A.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      rel (n_pair, POSE): relative poses.
+      sums (n_pair, SUMS): of the members, with K and C.
+      damped: whether any force depends on velocity.
+    Out:
+      k_out (n_pair, 6, 6): -dF/dq by x, y, psi of the first body, then of the second.
+      c_out (n_pair, 6, 6): -dF/dv, if damped; otherwise left as it is.
     """
     for p in range(pair.shape[0]):
         pair_tangent(p, rel, sums, damped, k_out, c_out)
@@ -63,7 +72,17 @@ def pair_tangents(pair, rel, sums, damped, k_out, c_out):
 
 @kernel
 def pair_tangent(p, rel, sums, damped, k_out, c_out):
-    """`pair_tangents` of pair p alone."""
+    """`pair_tangents` of pair p alone.
+
+    In:
+      p: number of the pair.
+      rel (n_pair, POSE): relative poses.
+      sums (n_pair, SUMS): of the members, with K and C.
+      damped: whether any force depends on velocity.
+    Out:
+      k_out (n_pair, 6, 6): of which [p] = -dF/dq is written.
+      c_out (n_pair, 6, 6): of which [p] = -dF/dv is written, if damped.
+    """
     o = sums[p]
     ca = rel[p, 7]
     sa = rel[p, 8]
@@ -120,7 +139,13 @@ def pair_tangent(p, rel, sums, damped, k_out, c_out):
 
 @part
 def _turned(c, s, xx, xy, yx, yy):
-    """R [xx, xy; yx, yy] R^T, R turning by the angle whose cos and sin are c and s."""
+    """Turn a matrix of two rows into other axes: R [xx, xy; yx, yy] R^T.
+
+    c, s: cosine and sine of the angle by which R turns.
+    xx, xy, yx, yy: entries of the matrix.
+
+    Returns the four entries of the product, by rows.
+    """
     ax = c * xx - s * yx
     ay = c * xy - s * yy
     bx = s * xx + c * yx
@@ -130,7 +155,16 @@ def _turned(c, s, xx, xy, yx, yy):
 
 @inline
 def _spread(xx, xy, yx, yy, ax, ay, bx, by, tx, ty, ta, tb, wx, wy, m):
-    """m (6, 6) = T~^T N for rows x, y, theta of N with columns D (2), psi_A, psi_B; T~ = [-I w I 0; 0 -1 0 1]."""
+    """Write the tangent of a pair, m = T~^T N with T~ = [-I w I 0; 0 -1 0 1], of slopes by relative coordinates.
+
+    N has the rows x, y, theta, in global axes, and columns for D = x_B - x_A (two), psi_A and psi_B.
+
+    xx, xy, ax, bx: row x of N.
+    yx, yy, ay, by: row y of N.
+    tx, ty, ta, tb: row theta of N.
+    wx, wy: w, D turned by a right angle backwards (m).
+    m (6, 6): out, by x, y, psi of the first body, then of the second.
+    """
     m[3, 0] = -xx
     m[3, 1] = -xy
     m[3, 2] = ax
@@ -225,10 +259,25 @@ def add_turning_transposed(turn, x, out, count):
 
 @part
 def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, k_out, c_out, turn):
-    """Generalised forces, and on demand tangents, at m states in one pass over the members.
+    """Generalised forces on the bodies, and on demand their tangents, at m states in one pass over the members.
 
-    Constant: model, strength. In: segment, m, t (m,), q, v (m, n). Out: rel (m, n_pair, POSE), sums (m, n_pair, SUMS),
-    f (m, n); with `tangent` also k_out (m, n_pair, 6, 6), c_out (the same, if damped), turn (m, n, if loads turn).
+    Constant:
+      model: the compiled scene.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      segment: of the loads, for all m times.
+      m: how many states.
+      t (m or more,): times (s).
+      q, v (m or more, n): coordinates and velocities (m, rad; m/s, rad/s).
+      tangent: whether tangents are wanted.
+      damped: whether any force depends on velocity.
+    Out:
+      rel (m or more, n_pair, POSE): relative poses.
+      sums (m or more, n_pair, SUMS): of the members.
+      f (m or more, n): forces and moments on the coordinates (N, N m).
+      k_out (m or more, n_pair, 6, 6): -dF/dq of each pair, with tangents.
+      c_out (m or more, n_pair, 6, 6): -dF/dv of each pair, with tangents and if damped.
+      turn (m or more, n): derivative of the loads by the angle of their body, with tangents and if loads turn.
     """
     place_bodies(model.pair, model.home, q, v, m, rel)
     member_sums(springs_of(model), strength, rel, m, tangent, sums)
@@ -237,14 +286,41 @@ def forces(model, strength, segment, m, t, q, v, tangent, damped, rel, sums, f, 
 
 @part
 def place_bodies(pair, home, q, v, m, rel):
-    """rel (m, n_pair, POSE) at m states."""
+    """Find the relative poses of all pairs at m states.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      home (n_body, HOME): where bodies are when q is zero.
+      q, v (m or more, n): coordinates and velocities (m, rad; m/s, rad/s).
+      m: how many states.
+    Out:
+      rel (m or more, n_pair, POSE): the first m are overwritten.
+    """
     for j in range(m):
         relative_pose(pair, home, q[j], v[j], rel[j])
 
 
 @part
 def sum_bodies(model, segment, m, t, q, tangent, damped, rel, sums, f, k_out, c_out, turn):
-    """What `forces` gives, of the members' sums at the poses rel."""
+    """Forces and tangents of the bodies (`forces`) from sums over the members that are known.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      segment: of the loads, for all m times.
+      m: how many states.
+      t (m or more,): times (s).
+      q (m or more, n): coordinates (m, rad).
+      tangent: whether tangents are wanted.
+      damped: whether any force depends on velocity.
+      rel (m or more, n_pair, POSE): relative poses.
+      sums (m or more, n_pair, SUMS): of the members at these poses.
+    Out:
+      f (m or more, n): forces and moments on the coordinates (N, N m).
+      k_out (m or more, n_pair, 6, 6): -dF/dq of each pair, with tangents.
+      c_out (m or more, n_pair, 6, 6): -dF/dv of each pair, with tangents and if damped.
+      turn (m or more, n): derivative of the loads by the angle of their body, with tangents and if loads turn.
+    """
     pair = model.pair
     turning = model.load_body.shape[0] > 0
     for j in range(m):

@@ -15,16 +15,17 @@ from mdstopo.scene.model import BLOCK, DAMPING, MEMBER, STIFFNESS, VECTOR, Model
 
 #: costs of a member of a grid and of another: all that are left have to cost at most three quarters of what all do
 IN_GRID, PLAIN = 2, 3
-#: rows of strengths with room for the members that carry, as in `Model.member`
+#: rows of an array of strengths with room behind them for the members that carry, in rows as of `Model.member`
 ROOMY = 12
 
 
 @part
 def carrying(model, strength, fill):
-    """The model without members that carry nothing, its strengths, and how many members are left.
+    """The model without the members that carry nothing, its strengths, and how many members are left.
 
-    In: strength (3, M_padded), or (ROOMY, M_padded) with room behind; fill: write them there, else they are there from
-    the same strengths. The model itself comes back where there is no room, or too few carry nothing.
+    In: strength (3, M_padded), or (ROOMY, M_padded) with room behind, to which the members that carry are written;
+    fill: whether to do that, else they are there already, from the same strengths. The model itself comes back where
+    there is no room, or too few carry nothing.
     """
     springs, own, left = _that_carry(springs_of(model), strength, fill)
     return (
@@ -40,7 +41,7 @@ def carrying(model, strength, fill):
 
 @kernel
 def _that_carry(springs, strength, fill):
-    """The same of `Springs`: few arrays to choose between."""
+    """What `carrying` does, for a model's `Springs`: few arrays to choose between."""
     block = springs.block
     parts = springs.chunk.shape[0]
     count = np.zeros(parts, np.int64)
@@ -87,6 +88,7 @@ def _that_carry(springs, strength, fill):
 
 @kernel
 def _count_chunks(counter, chunk, block, strength, count):
+    """Count the members that carry something in chunk after chunk, until none is left: what each thread does."""
     i = taken(counter)
     while i < chunk.shape[0]:
         count[i] = _count(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, strength)
@@ -95,7 +97,7 @@ def _count_chunks(counter, chunk, block, strength, count):
 
 @kernel
 def _count(k, start, stop, block, strength):
-    """How many members of the part start..stop of block k carry something."""
+    """How many of the members in places start to stop of block k carry something."""
     s = strength[0, start:stop]
     found = 0
     if block[k, 3] == 0:
@@ -111,6 +113,17 @@ def _count(k, start, stop, block, strength):
 
 @kernel
 def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
+    """Copy the members that carry something of chunk after chunk, until none is left: what each thread does.
+
+    In:
+      counter (1,): chunks that some thread has taken so far; counted on.
+      chunk, block, member: as of `Model`.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+      begin (n_chunk,): the first place in room for the members of each chunk.
+      count (n_chunk,): how many members of each chunk carry something.
+    Out:
+      room (MEMBER, M_padded): rows as of `Model.member`, with strengths for the last three.
+    """
     i = taken(counter)
     while i < chunk.shape[0]:
         _gather(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, begin[i], count[i], room)
@@ -119,7 +132,19 @@ def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
 
 @kernel
 def _gather(k, start, stop, block, member, strength, begin, count, room):
-    """Write those of the part start..stop of block k that carry something to room (MEMBER, M_padded) from begin on."""
+    """Copy those of the members in places start to stop of block k that carry something.
+
+    In:
+      k: number of the block.
+      start, stop: places in the padded arrays.
+      block (n_block, BLOCK), member (MEMBER, M_padded): as of `Model`.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+      begin: the first place in room.
+      count: how many there are.
+    Out:
+      room (MEMBER, M_padded): rows as of `Model.member`, with strengths for the last three; damping and preload are
+        written where the block has them.
+    """
     viscous = block[k, 3] == 1
     place = np.empty(stop - start, np.int64)
     found = 0

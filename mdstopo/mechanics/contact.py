@@ -45,7 +45,7 @@ def second_rise(c, r, acc):
 
 @inline
 def contact_force(c, height, rise, slide, mode):
-    """N, N_height, N_rise, T, T_height, T_rise, T_slide."""
+    """Normal force and friction with their slopes: N, N_height, N_rise, T, T_height, T_rise, T_slide."""
     if mode != CLOSED:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     normal = -c[0] * height - c[1] * rise
@@ -104,7 +104,14 @@ def _touching(c, depth, rise):
 
 @inline
 def contact_next(c, along, height, rise, second, mode):
-    """The mode to go to where this one's margin is negative; second: the rate of rise."""
+    """The mode that follows where this one's margin is negative.
+
+    c (CONTACT,): parameters of the contact.
+    along, height (m): where the point is seen from the edge.
+    rise (m/s): rate of the height.
+    second (m/s^2): rate of rise.
+    mode: the present one.
+    """
     on_edge = along >= 0.0 and along <= c[10]
     if mode == BESIDE:
         return ABOVE
@@ -140,5 +147,8 @@ def contact_start(c, along, height, rise, second):
 
 @inline
 def contact_grazes(c, mode):
-    """As `laws.gap.gap_grazes`: a damped touch that only just happens leaves no derivative of the motion (2)."""
+    """What a margin that is only just used up (or not) does to derivatives, as `law_grazes` in `mechanics.laws.table`.
+
+    A damped touch that only just happens leaves no derivative of the motion: 2.
+    """
     return 2 if mode == ABOVE and c[1] > 0.0 else 0

@@ -47,13 +47,23 @@ def relative_pose(pair, home, q, v, rel):
 
 @part
 def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):
-    """Fill rel[p] from one state and cos - 1 and sin of the angles that both bodies have turned by since home.
+    """Fill the relative pose of pair p from one state, with the turns of both bodies given.
 
     With D_0 the vector between the bodies at home and w the change of it,
 
         d - d_0 = R_A^T w + (R_A - R_A0)^T D_0,      R - R_0 = R_0 (R(theta - theta_0) - I),
 
     of which no term is larger than what has changed.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      p: number of the pair.
+      home (n_body, HOME): where bodies are when q is zero.
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      ma, sa: cos - 1 and sin of the angle by which the first body has turned since home.
+      mb, sb: the same of the second body.
+    Out:
+      rel (n_pair, POSE): of which [p] is written.
     """
     one = pair[p, 0]
     two = pair[p, 1]
@@ -126,7 +136,16 @@ def pair_displacement(pair, rel, p, dq, out):
 
 @part
 def add_pair_force(pair, rel, p, qx, qy, qt, out):
-    """out (n,) += T^T (qx, qy, qt): a force on the relative pose as forces and moments on both bodies."""
+    """Add a force on the relative pose of a pair to the forces on its bodies, T^T (qx, qy, qt).
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      rel (n_pair, POSE): relative poses.
+      p: number of the pair.
+      qx, qy, qt: force on d_x, d_y (N), in the axes of the first body, and on theta (N m).
+    Out:
+      out (n,): forces and moments on the coordinates (N, N m), added to.
+    """
     a = 3 * pair[p, 0]
     b = 3 * pair[p, 1]
     ca = rel[p, 7]

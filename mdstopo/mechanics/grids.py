@@ -19,14 +19,29 @@ PLACES = 4 * TILE
 
 @kernel
 def tile_of(rows, width):
-    """Rows and columns of a tile."""
+    """Rows and columns of a tile, of a grid with so many rows, each of so many places."""
     tall = rows if rows * width <= PLACES else min(rows, ROWS)
     return tall, min(width, PLACES // tall // lanes() * lanes())
 
 
 @part
 def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, sums, column):
-    """Add the rows from start to stop of block k to sums (m, columns, SUMS) at the poses rel (m, n_pair, POSE)."""
+    """Add the sums over the members in places start to stop of block k, which is a grid.
+
+    In:
+      k: number of the block.
+      start, stop: places in the padded arrays, beginning with a row of the grid; what is behind the last whole row is
+        left out.
+      block (n_block, BLOCK), member (MEMBER, M_padded): as of `Model`.
+      near (2,): the block's row of `Model.near`.
+      stiffness (M_padded,): times alpha^mu (N/m).
+      rel (m or more, n_pair, POSE): relative poses.
+      m: how many of them.
+      tangent: whether K is wanted.
+      column: where in the second axis of sums the block's pair is.
+    Out:
+      sums (m or more, columns, SUMS): added to.
+    """
     p = block[k, 0]
     width = block[k, 6]
     counted = block[k, 4] >= 0
@@ -61,7 +76,20 @@ def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, su
 
 @part
 def design_grid(start, stop, width, near, member, pose, u, weight, out):
-    """Add what `grid_design` does at the poses pose (any, POSE) to out (M_padded,) for the rows from start to stop."""
+    """Add f (b . u) at the first poses and weight V at the others for the members in places start to stop of a grid.
+
+    In:
+      start, stop: places in the padded arrays, beginning with a row of the grid; what is behind the last whole row is
+        left out.
+      width: places in a row.
+      near (2,): the block's row of `Model.near`.
+      member (MEMBER, M_padded): as of `Model`, of which stiffness counts at alpha = 1 (N/m).
+      pose (S + E, POSE): relative poses of the block's pair.
+      u (S, 3): virtual changes of the first ones.
+      weight (E,): of the stored energies V at the others.
+    Out:
+      out (M_padded,): added to.
+    """
     rows = (stop - start) // width
     tall, wide = tile_of(rows, width)
     room = np.empty((tall, pose.shape[0], 4))

@@ -48,7 +48,7 @@ def threads_for(springs, poses):
 
 @part
 def scale_members(model, alpha, strength):
-    """strength (3, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12).
+    """strength (3 or more, M_padded) = alpha^mu times stiffness, damping and preload (Eq. 12).
 
     Rows 1 and 2 of design springs that have neither damping nor preload are left as they are: zero.
     """
@@ -59,6 +59,15 @@ def scale_members(model, alpha, strength):
 
 @kernel
 def _scale_chunks(counter, chunk, block, power, member, alpha, strength):
+    """Scale the members of chunk after chunk, until none is left: what each thread does.
+
+    In:
+      counter (1,): chunks that some thread has taken so far; counted on.
+      chunk, block, power, member: as of `Model`.
+      alpha (N,): the design.
+    Out:
+      strength (3 or more, M_padded): see `scale_members`.
+    """
     i = taken(counter)
     while i < chunk.shape[0]:
         _scale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, member, alpha, strength)
@@ -67,7 +76,17 @@ def _scale_chunks(counter, chunk, block, power, member, alpha, strength):
 
 @kernel
 def _scale(k, start, stop, block, power, member, alpha, strength):
-    """The part start..stop of block k."""
+    """Scale the members in places start to stop of block k; those of fixed blocks keep what they have at alpha = 1.
+
+    In:
+      k: number of the block.
+      start, stop: places in the padded arrays.
+      block (n_block, BLOCK), power (n_block,): as of `Model`.
+      member (MEMBER, M_padded): as of `Model`; stiffness, damping and preload at alpha = 1 (N/m, N s/m, N).
+      alpha (N,): the design.
+    Out:
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu there, zeros in the padding.
+    """
     if block[k, 4] < 0:
         for i in range(start, stop):
             for row in range(3):
@@ -117,9 +136,17 @@ def _rows(block, k, start, stop):
 
 @kernel
 def member_sums(springs, strength, rel, m, tangent, sums):
-    """One pass over all members (`Springs`) at m relative poses.
+    """Sum all members to forces and energies of pairs at m relative poses, on demand with tangents, in one pass.
 
-    In: strength (3, M_padded), rel (m, n_pair, POSE), tangent (are K and C wanted). Out: sums (m, n_pair, SUMS).
+    Constant:
+      springs: what a pass needs of the model (`Springs`).
+    In:
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+      rel (m or more, n_pair, POSE): relative poses.
+      m: how many of them.
+      tangent: whether K and C are wanted; they are zero otherwise.
+    Out:
+      sums (m or more, n_pair, SUMS): the first m are overwritten; energy is that of design members.
     """
     block = springs.block
     chunk = springs.chunk
@@ -144,6 +171,18 @@ def member_sums(springs, strength, rel, m, tangent, sums):
 
 @kernel
 def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, part):
+    """Sum the members of chunk after chunk, each chunk by itself, until none is left: what each thread does.
+
+    In:
+      counter (1,): chunks that some thread has taken so far; counted on.
+      chunk, block, near, member: as of `Model`.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+      rel (m or more, n_pair, POSE): relative poses.
+      m: how many of them.
+      tangent: whether K and C are wanted.
+    Out:
+      part (n_chunk, m, 1, SUMS): sums of each chunk, for the pair of its block.
+    """
     i = taken(counter)
     while i < chunk.shape[0]:
         out = part[i]
@@ -155,7 +194,21 @@ def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, 
 
 @kernel
 def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, column):
-    """Add the part start..stop of block k to sums (m, columns, SUMS)."""
+    """Add the sums over the members in places start to stop of block k.
+
+    In:
+      k: number of the block.
+      start, stop: places in the padded arrays.
+      block (n_block, BLOCK), member (MEMBER, M_padded): as of `Model`.
+      near (2,): the block's row of `Model.near`.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+      rel (m or more, n_pair, POSE): relative poses.
+      m: how many of them.
+      tangent: whether K and C are wanted.
+      column: where in the second axis of sums the block's pair is.
+    Out:
+      sums (m or more, columns, SUMS): added to.
+    """
     if block[k, 6] > 0:
         sum_grid(k, start, stop, block, near, member, strength[0], rel, m, tangent, sums, column)
         return
@@ -221,12 +274,23 @@ def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, c
 
 @part
 def design_gradient(model, stage, pose, z, used, point, weight, out, work):
-    """out (M_padded,) += sum over stages of z_s . (force of each member at unit strength) + sum_e weight_e V_i(q_e).
+    """Add sum over stages of z_s . (force of each member at unit strength) + sum_e weight_e V_i(q_e) to the gradient.
 
-    One pass, no histories. In: stage (S, 3, n) with q, v; pose (any, n_pair, POSE): relative poses of the first of
-    them; z (S, n): virtual displacements, the adjoint of the force balance; used (S,): which stages. The member's
-    generalised force is -T^T b f, so each adds -f_i (b_i . T z_s). point (E, 2 or more, n), weight (E,): where the
-    energies V are looked at. Fixed members are passed over. work: counts the stages.
+    One pass over the members, no histories. A member's generalised force is -T^T b f, so each adds -f_i (b_i . T z_s).
+    Fixed members are passed over.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      stage (S or more, 3, n): q, v of the stages (m, rad; m/s, rad/s), and a vector that is not looked at.
+      pose (any, n_pair, POSE): relative poses of the first stages, which are not found again.
+      z (S, n): virtual displacements at the stages, the adjoint of the force balance.
+      used (S,): 1 for the stages that count, 0 for the others.
+      point (E, 2 or more, n): q, v of the states whose energy counts.
+      weight (E,): of the energies V in these states.
+    Out:
+      out (M_padded,): derivatives by alpha^mu, added to.
+      work: counts of work; the stages in this pass are added.
     """
     pair = model.pair
     n_pair = pair.shape[0]
@@ -274,6 +338,17 @@ def energy_gradient(model, point, weight, out):
 
 @kernel
 def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
+    """Add to the design gradient of chunk after chunk, until none is left: what each thread does.
+
+    In:
+      counter (1,): chunks that some thread has taken so far; counted on.
+      chunk, block, near, member: as of `Model`.
+      rel (S + E, n_pair, POSE): relative poses, those of the stages first.
+      u (S, n_pair, 3): virtual changes of the stages' poses.
+      weight (E,): of the energies at the other poses.
+    Out:
+      out (M_padded,): added to.
+    """
     i = taken(counter)
     while i < chunk.shape[0]:
         _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, near[chunk[i, 0]], member, rel, u, weight, out)
@@ -282,9 +357,18 @@ def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
 
 @kernel
 def _design(k, start, stop, block, near, member, rel, u, weight, out):
-    """The part start..stop of block k: works at the first poses of rel (any, n_pair, POSE), energies at the others.
+    """Add f (b . u) at the first poses and weight V at the others for the members in places start to stop of block k.
 
-    u (S, n_pair, 3): changes of the first poses.
+    In:
+      k: number of the block; nothing is done for one of fixed members.
+      start, stop: places in the padded arrays.
+      block (n_block, BLOCK), member (MEMBER, M_padded): as of `Model`.
+      near (2,): the block's row of `Model.near`.
+      rel (S + E, n_pair, POSE): relative poses.
+      u (S, n_pair, 3): virtual changes of the first ones.
+      weight (E,): of the stored energies V at the others.
+    Out:
+      out (M_padded,): added to.
     """
     if block[k, 4] < 0:
         return
@@ -325,6 +409,16 @@ def unscale_gradient(model, alpha, padded, out):
 
 @kernel
 def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):
+    """Turn the gradient of chunk after chunk into that by alpha, until none is left: what each thread does.
+
+    In:
+      counter (1,): chunks that some thread has taken so far; counted on.
+      chunk, block, power: as of `Model`.
+      alpha (N,): the design.
+      padded (M_padded,): gradient by alpha^mu.
+    Out:
+      out (N,): gradient by alpha.
+    """
     i = taken(counter)
     while i < chunk.shape[0]:
         _unscale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, alpha, padded, out)
@@ -333,7 +427,17 @@ def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):
 
 @kernel
 def _unscale(k, start, stop, block, power, alpha, padded, out):
-    """The part start..stop of block k."""
+    """Turn the gradient by alpha^mu into that by alpha for the members in places start to stop of block k.
+
+    In:
+      k: number of the block; nothing is done for one of fixed members.
+      start, stop: places in the padded arrays.
+      block (n_block, BLOCK), power (n_block,): as of `Model`.
+      alpha (N,): the design.
+      padded (M_padded,): gradient by alpha^mu.
+    Out:
+      out (N,): mu alpha^(mu - 1) times it, at the variables of these members.
+    """
     if block[k, 4] < 0:
         return
     mu = power[k]

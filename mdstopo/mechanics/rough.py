@@ -43,9 +43,15 @@ def _seen(ax, ay, room, j):
 
 @part
 def _tangent(qx, qy, k, kl, room, c, s):
-    """Q and K as in `spring_grid.grid_tangent`. q: of the columns; k, kl (rows, columns): k, k l0; room: e of the rows.
+    """Q and the upper triangle of K of a tile in single precision, as in `spring_grid.grid_tangent`.
 
-    With u = k l0/L they are w = k - u and g = u.
+    With u = k l0/L they are sums of w = k - u and g = u.
+
+    In:
+      qx, qy (columns,): points Q of the columns (m).
+      k, kl (rows, columns): stiffness times alpha^mu (N/m), and that times the free length (N).
+      room (rows, 2): e of each row, d less its point P (m).
+      c, s: cosine and sine of theta.
     """
     rows, width = k.shape
     k = k.reshape(rows * width)
@@ -106,7 +112,22 @@ def _aligned_rows(count, width):
 
 @part
 def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):
-    """Add a block to sums, tile by tile. Room for a tile's k and then its k l0: own; for its q: q."""
+    """Add the sums over a grid in single precision, tile by tile.
+
+    In:
+      block (BLOCK,): the block's row of `Model.block`.
+      wide: columns of a tile.
+      member (MEMBER, M_padded): as of `Model`.
+      stiffness (M_padded,): times alpha^mu (N/m).
+      rel (m or more, n_pair, POSE): relative poses.
+      m: how many of them.
+    Out:
+      sums (m or more, n_pair, SUMS): added to.
+    Room:
+      room (tall, 2): e of the rows of a tile, of which there are at most `tall`.
+      own (2 tall, wide or more): a tile's stiffness, then that times the free length.
+      q (2, wide or more): points Q of a tile's columns.
+    """
     p = block[0]
     width = block[6]
     tall = own.shape[0] // 2
@@ -150,7 +171,26 @@ def _shorten_products(k, l0, own, product):
 
 @part
 def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):
-    """As `assembly.forces` with tangents, where `may_be_rough`; whether the forces are numbers."""
+    """Generalised forces on the bodies and their tangents at m states, in single precision, where `may_be_rough`.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      segment: of the loads, for all m times.
+      m: how many states.
+      t (m or more,): times (s).
+      q, v (m or more, n): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      rel (m or more, n_pair, POSE): relative poses.
+      sums (m or more, n_pair, SUMS): of the members, without energies.
+      f (m or more, n): forces and moments on the coordinates (N, N m).
+      k_out (m or more, n_pair, 6, 6): -dF/dq of each pair.
+      c_out (m or more, n_pair, 6, 6): left as it is: nothing is damped.
+      turn (m or more, n): derivative of the loads by the angle of their body, if loads turn.
+
+    Returns whether all forces are finite.
+    """
     place_bodies(model.pair, model.home, q, v, m, rel)
     rough_sums(springs_of(model), strength, rel, m, sums)
     sum_bodies(model, segment, m, t, q, np.bool_(True), np.bool_(False), rel, sums, f, k_out, c_out, turn)

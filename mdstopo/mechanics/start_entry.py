@@ -11,7 +11,17 @@ from mdstopo.scene.packing import unpack
 
 @entry
 def start_tangents(ints, floats, strength, damped, k, turn):
-    """k (1, n_pair, 6, 6) = -dF/dq of each pair and turn (1, n), the loads' derivative by the angles, at the start."""
+    """Tangents of the forces at the start of the motion.
+
+    Constant:
+      ints, floats: the packed model.
+    In:
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+      damped: whether any force depends on velocity.
+    Out:
+      k (1, n_pair, 6, 6): -dF/dq of each pair.
+      turn (1, n): derivative of the loads by the angle of their body, if loads turn.
+    """
     model = unpack(ints, floats)
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]

@@ -12,7 +12,20 @@ from mdstopo.mechanics.passes import member_sums
 
 @part
 def energy_at(pair, home, springs, strength, q, v, rel, sums):
-    """g and dg/dt at one state; rel (1, n_pair, POSE) and sums (1, n_pair, SUMS) are filled."""
+    """Stored energy g and its rate dg/dt in one state.
+
+    Constant:
+      pair (n_pair, 2): the bodies of each pair.
+      home (n_body, HOME): where bodies are when q is zero.
+      springs: what a pass over the members needs (`Springs`).
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      rel (1, n_pair, POSE), sums (1, n_pair, SUMS): relative poses and sums of the members in that state.
+
+    Returns g (J) and dg/dt (W).
+    """
     relative_pose(pair, home, q, v, rel[0])
     member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
     return energy_of(rel[0], sums[0])

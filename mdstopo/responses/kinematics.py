@@ -21,7 +21,7 @@ DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
 
 @kernel
 def turned(home, angle):
-    """`geometry.turned_body` of a body with this row of `home`."""
+    """What `geometry.turned_body` gives for a body, from its row of `home` and the angle it has turned by (rad)."""
     m, s = small_turn(angle)
     c = home[3] * m - home[4] * s
     s = home[4] * m + home[3] * s
@@ -30,9 +30,22 @@ def turned(home, angle):
 
 @kernel
 def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
-    """The response; slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r. The norm's slope is zero where the norm is.
+    """Displacement, velocity or acceleration of a point of body b as seen from body r: a component or the norm.
 
-    With ACROSS the norm comes back with the slopes of the component perpendicular to the vector, a quarter turn ahead.
+    The norm's slope is zero where the norm is.
+
+    In:
+      order: DISPLACEMENT, VELOCITY or ACCELERATION.
+      component: X, Y or NORM; ACROSS: the norm, with the slopes of the component perpendicular to the vector, a quarter
+        turn ahead.
+      s (2,): the point in the frame of b (m).
+      home_b, home_r (HOME,): where the observed body b and the observer's body r are at home.
+      qb, vb, ab (3,): what b has moved since, its velocities and accelerations (m, rad and derivatives).
+      qr, vr, ar (3,): the same of r; accelerations are read for ACCELERATION only.
+    Out:
+      slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r.
+
+    Returns the response (m, m/s or m/s^2).
     """
     cb, sb, cb_since, sb_since = turned(home_b, qb[2])
     ca, sa, ca_since, sa_since = turned(home_r, qr[2])
@@ -139,7 +152,18 @@ def point_response(order, component, s, home_b, home_r, qb, vb, ab, qr, vr, ar, 
 
 @kernel
 def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
-    """psi_b - psi_r, unwrapped, or its first or second derivative; slope as in `point_response`."""
+    """Angle of body b as seen from body r, unwrapped, or its first or second derivative.
+
+    In:
+      order: DISPLACEMENT (psi_b - psi_r), VELOCITY or ACCELERATION.
+      home_b, home_r (HOME,): where the observed body b and the observer's body r are at home.
+      qb, vb, ab (3,): what b has moved since, its velocities and accelerations (m, rad and derivatives).
+      qr, vr, ar (3,): the same of r; accelerations are read for ACCELERATION only.
+    Out:
+      slope (6, 3): by q_b, v_b, a_b, q_r, v_r, a_r.
+
+    Returns the response (rad, rad/s or rad/s^2).
+    """
     for i in range(6):
         for j in range(3):
             slope[i, j] = 0.0

@@ -60,10 +60,18 @@ def keep_peak(peaks, found, time, value):
 
 @kernel
 def brackets_of(t, g, d, closeness, bracket, peaks):
-    """Sort samples t, g, d (S,) into brackets (S, 2): index of the left sample, and where between to look first.
+    """Find the stretches between samples in which there may be a peak, and peaks at the ends of time.
 
-    Peaks at the ends of time go to `peaks` at once. Brackets that cannot hold a peak within `closeness` of the
-    highest sample are dropped. Returns the numbers of brackets and of peaks.
+    Stretches that cannot hold a peak within `closeness` of the highest sample are dropped.
+
+    In:
+      t, g, d (S,): times (s), values and rates of the samples.
+      closeness: relative.
+    Out:
+      bracket (S, 2): index of the sample at the left, and where in the stretch to look first (0 to 1).
+      peaks (rows, 4): time and value of peaks at the ends of time.
+
+    Returns the numbers of brackets and of peaks.
     """
     samples = t.shape[0]
     highest = -np.inf
@@ -108,10 +116,26 @@ def brackets_of(t, g, d, closeness, bracket, peaks):
 
 @part
 def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, peaks, pull, work):
-    """Fill peaks (rows, 4) with the highest peaks of sign g (VALUE holds g); return how many.
+    """Find the highest peaks of the stored energy g times a sign.
 
-    Only peaks within `closeness` (relative) of the highest are refined and kept. Out: the first two of pull
-    (2 or more, n_pair, 3), E_xi at the start and at the end.
+    Only peaks within `closeness` of the highest are refined and kept.
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the integrator.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+      sign: 1 for maxima of g, -1 for minima.
+      closeness: how near to the highest a peak competes, relative.
+    Out:
+      peaks (rows, 4): time (s), value of g (J), step, fraction of it; highest first.
+      pull (2 or more, n_pair, 3): of which the first two, E_xi at the start and at the end, are written.
+      work (WORK,): counts of work, added to.
+
+    Returns how many peaks were kept.
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
@@ -197,7 +221,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
             value *= sign
             rate *= sign
             if not crossing and not (d[i] > 0.0 and rate < 0.0) and not (d[i] < 0.0 and rate > 0.0):
-                break  # the dip of the cubic was none of the motion's
+                break  # the cubic has an extremum here, the motion has none
             crossing = True
             if rate > 0.0:
                 a = time

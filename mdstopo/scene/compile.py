@@ -117,7 +117,9 @@ def compile_members(case: Case, index: dict[str, int]) -> Members:
 
 
 def _nearness(group: MemberGroup, member: FloatArray, block: list[int]) -> list[float]:
-    """A row of `Model.near`: up to a share of the longest member, in which digits are to be won.
+    """A row of `Model.near`: how far bodies may have moved for elongations to come from displacements.
+
+    That is a share of the longest member: beyond it displacements are no more accurate than lengths.
 
     In grids, whose kernels do not ask which is shorter, no end has moved by more than half of the shortest member.
     """
@@ -253,6 +255,15 @@ def _skipped(
     turning: list[Load],
     block: IndexArray,
 ) -> tuple[str, ...]:
+    """What the arrays of a scene leave out, and why: a sentence each.
+
+    case: the case.
+    names: bodies in the order of the state.
+    damped: whether any force depends on velocity.
+    times (n_seg + 1,): ends of the segments of the loads (s).
+    turning: loads whose effect depends on the angle of their body.
+    block (n_block, BLOCK): as of `Model`.
+    """
     notes = []
     if not damped:
         notes.append("velocity terms: nothing is damped")

@@ -1,4 +1,4 @@
-"""Who is to blame: members and bodies by name when a motion cannot be computed.
+"""What stopped a motion that cannot be computed: members and bodies by name.
 
 Nothing here is on the path of an evaluation that goes well.
 """
@@ -36,7 +36,7 @@ class Culprits:
         raise IndexError(f"no member at {padded}")
 
     def explain(self, design: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
-        """The status and its culprit, for a motion that ended at `time` in state (2, n)."""
+        """The status, and the member or body to blame in words, for a motion that ended at `time` in state (2, n)."""
         where = f"at t = {time:.6g} s"
         meeting = self._collapsed(design, state[0])
         if meeting >= 0 and status in (Status.STEP_TOO_SMALL, Status.STEP_LIMIT, Status.NEWTON_FAILED):

@@ -16,16 +16,31 @@ from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
 
-#: where energies are looked at: `find_peaks` has been at both ends already
+#: where energies are evaluated: at both ends `find_peaks` has done it already
 AT_START, AT_END, ELSEWHERE = range(3)
 
 
 @part
 def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, used, damped, turning, accuracy, work):
-    """Pull the cotangent mu_q (n,) of the position at fraction c of step w (c < 0: its end) back to the start.
+    """Carry the derivative of a response by the coordinates at one time back over all steps before it.
 
-    stage_q_bar (S, n): explicit cotangents of the stage positions, or no rows. Out: z (S, n) and used (S,), 1 for the
-    stages that the sweep went through.
+    Constant:
+      pair (n_pair, 2): the bodies of each pair.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables: constant arrays of the integrator.
+    In:
+      steps: what the integrator kept.
+      w: number of the step in which that time is.
+      c: fraction of it; negative: its end.
+      mu_q (n,): derivative by the coordinates then.
+      stage_q_bar (S, n): explicit derivatives by the coordinates of the stages, or no rows.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+      accuracy: relative, to which an iteration has to go; 0: to rounding.
+    Out:
+      z (S, n): virtual displacements at the stages that the sweep goes through; other rows are left as they are.
+      used (S,): 1 is written for these stages.
+      work (WORK,): counts of work, added to.
     """
     n = mu_q.shape[0]
     lam_q = np.zeros(n)
@@ -72,11 +87,26 @@ def energy_rows(
 ):
     """Value, time and gradient of the stored energy reduced over time.
 
-    In: motion, strength: the members that the motion was computed with (`carrying`); pose (S, n_pair, POSE): relative
-    poses of the stages; reduction (MAX..FINAL), closeness
-    (how near to the highest a peak competes, relative), gradient (wanted or not), accuracy of `reverse_step`.
-    Out: rows (R, 4) time, value, step, fraction (time NaN for mean and integral); padded (R, M_padded) gradients with
-    respect to alpha^mu. Returns how many rows there are.
+    Constant:
+      model: the compiled scene, with all members.
+      motion: the same with the members that the motion was computed with (`carrying`).
+      tables: constant arrays of the integrator.
+      strength (3, M_padded): of the members of `motion`, times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      pose (S, n_pair, POSE): relative poses of the stages.
+      damped: whether any force depends on velocity.
+      reduction: MAX, MIN, MEAN, INTEGRAL or FINAL.
+      closeness: how near to the highest a peak competes, relative.
+      gradient: whether gradients are wanted.
+      accuracy: relative, to which an iteration of the reverse sweep has to go; 0: to rounding.
+    Out:
+      rows (R, 4): time (s; NaN for mean and integral), value (J; J s for integral), step, fraction of it.
+      padded (R, M_padded): gradients by alpha^mu.
+      work (WORK,): counts of work, added to.
+
+    Returns how many rows there are.
     """
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]

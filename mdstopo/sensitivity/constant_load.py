@@ -31,7 +31,19 @@ DROPPED = 1e-10
 
 @entry
 def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):
-    """Fill stiffness (P, n, n) = -dF/dq at rest and slope (P, n) = dg/dq at the poses states (P, 2, n)."""
+    """Stiffness of the bodies at rest, and slope of the energy, at P poses.
+
+    Constant:
+      ints, floats: the packed model.
+    In:
+      alpha (N,): the design.
+      states (P, 2, n): q of the poses, and v, which is zero.
+    Out:
+      stiffness (P, n, n): -dF/dq at rest, added to.
+      slope (P, n): dg/dq, added to.
+    Room:
+      strength (3, M_padded): overwritten by `scale_members`.
+    """
     model = unpack(ints, floats)
     pair = model.pair
     n_pair = pair.shape[0]
@@ -57,7 +69,20 @@ def _stiffness(ints, floats, alpha, states, strength, stiffness, slope):
 
 @entry
 def _gradient(ints, floats, alpha, weights, states, z, padded, out):
-    """out (N,) = sum over the poses of weight (V_i - f_i b_i . T z)."""
+    """Gradient by alpha of the sum over P poses of weight V_i - f_i (b_i . T z).
+
+    Constant:
+      ints, floats: the packed model.
+    In:
+      alpha (N,): the design.
+      weights (P,): of the energies.
+      states (P, 2, n): q of the poses, and v, which is zero.
+      z (P, n): virtual displacements, with the weights in them.
+    Out:
+      out (N,): overwritten.
+    Room:
+      padded (M_padded,): overwritten.
+    """
     model = unpack(ints, floats)
     used = np.ones(z.shape[0], np.int64)
     work = np.zeros(8, np.int64)

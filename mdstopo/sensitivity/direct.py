@@ -17,13 +17,23 @@ from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.propagation import apply_matrix, step_matrix
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 
-#: the step before one that the motion never takes
+#: in place of the step before, for what is at the start of the motion
 NOWHERE = -2
 
 
 @kernel
 def slope_at(model, strength, q, v, rel, sums, out):
-    """out (n,) = dg/dq at one state."""
+    """dg/dq of the stored energy in one state.
+
+    Constant:
+      model: the compiled scene.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    Out:
+      rel (1, n_pair, POSE), sums (1, n_pair, SUMS): relative poses and sums of the members in that state.
+      out (n,): dg/dq, overwritten.
+    """
     springs = springs_of(model)
     energy_at(model.pair, model.home, springs, strength, q, v, rel, sums)
     pull = np.empty((rel.shape[1], 3))
@@ -36,7 +46,26 @@ def slope_at(model, strength, q, v, rel, sums, out):
 
 @kernel
 def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work):
-    """Step and fraction (-1: its end) of a found row (4,), the state there, and the slope dg/dq into mu_q (n,)."""
+    """Find the state of a row that `look` found, and the slope of the stored energy there.
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the integrator.
+      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      damped: whether any force depends on velocity.
+      row (4,): time, value, step, fraction of it.
+    Out:
+      q, v (n,): the state (m, rad; m/s, rad/s).
+      rel (1, n_pair, POSE), sums (1, n_pair, SUMS): relative poses and sums of the members in that state.
+      mu_q (n,): dg/dq.
+      work (WORK,): counts of work, added to.
+      steps: where the interpolation is a partial step, this is kept behind the others.
+
+    Returns the step that leads there, -1 for the start of the motion, and its fraction, -1 for its end.
+    """
     k = int(row[2])
     c = row[3]
     w = k
@@ -57,7 +86,18 @@ def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, s
 
 @kernel
 def integral_weights(model, tables, steps, count, weight, bar):
-    """weight (S,) of the stages in the integral of g over time, and bar (S, n), that of their positions."""
+    """Weights of the stages in the integral of the stored energy over time.
+
+    Constant:
+      model: the compiled scene.
+      tables: constant arrays of the integrator.
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+    Out:
+      weight (S,): of the energies (s).
+      bar (S, n): derivatives of the integral by the coordinates of the stages, added to.
+    """
     rel = np.empty((model.pair.shape[0], POSE))
     for w in range(count):
         stage_weights(tables, steps, w, weight[steps.index[w, 0] : steps.index[w + 1, 0]])
@@ -68,10 +108,23 @@ def integral_weights(model, tables, steps, count, weight, bar):
 
 @kernel
 def finish_rows(model, alpha, steps, count, reductions, found, weight, states, padded, total, gradients):
-    """Add the explicit parts and turn derivatives by alpha^mu into those by alpha: gradients (n_obj, R, N).
+    """Add the explicit derivatives by alpha^mu to those through the motion, and turn them into gradients by alpha.
 
-    In: states (n_obj, R, 3, n) of the rows, padded (n_obj, R, M_padded) their implicit parts, total (1, M_padded)
-    that of the integral over time with its weights (S,).
+    Constant:
+      model: the compiled scene.
+    In:
+      alpha (N,): the design.
+      steps: what the integrator kept.
+      count: steps that were taken.
+      reductions (n_obj,): codes of the objectives' reductions.
+      found (n_obj,): how many rows each objective has.
+      weight (S,): of the stages in an integral over time (s).
+      states (n_obj, R, 3, n): q and v of the rows, and a vector that is not read.
+      total (1, M_padded): of an integral over time, the derivatives through the motion.
+    In and out:
+      padded (n_obj, R, M_padded): of the rows, the derivatives through the motion; overwritten.
+    Out:
+      gradients (n_obj, R, N): by alpha, for the rows that were found.
     """
     one = np.ones(1)
     scaled = np.empty(weight.shape[0])
@@ -113,8 +166,24 @@ def direct(
 ):
     """Gradients of the rows that `look` found, by one forward sweep over the steps left in room, with tangents.
 
-    Arguments as `look`'s. In: reductions (n_obj,), rows (n_obj, R, 4), found (n_obj,). Out: gradients
-    (n_obj, R, N); history (count + 1, N) = dg/dalpha at the times of the steps, or no rows.
+    Constant:
+      tag: of the integrator (`contract.steps_of`).
+      ints, floats: the packed model.
+      tables: constant arrays of the integrator.
+    In:
+      alpha (N,): the design.
+      damped: whether any force depends on velocity.
+      limits (3,): steps allowed, room for steps, room for stages.
+      count: steps that were taken.
+      reductions (n_obj,): codes of the objectives' reductions.
+      room, room_ints: the steps, with tangents (`steps.carve`).
+      strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
+      rows (n_obj, R, 4): time, value, step, fraction of it, of what `look` found.
+      found (n_obj,): how many rows each objective has.
+    Out:
+      gradients (n_obj, R, N): by alpha, for the rows that were found.
+      history (count + 1, N): dg/dalpha of the stored energy at the times of the steps, or no rows.
+      work (WORK,): counts of work, added to.
     """
     model = unpack(ints, floats)
     turning = model.load_body.shape[0] > 0
@@ -176,7 +245,7 @@ def direct(
             unscale_gradient(model, alpha, total_line, history[k])
         if k == count:
             break
-        # the rows whose look begins where this step does, then the step itself
+        # first the rows in this step, each by a linear map of its own, then the step itself
         for job in range(jobs + 1):
             row = job < jobs
             w = k
@@ -186,7 +255,7 @@ def direct(
                 r = job % n_row
                 if r >= found[j] or spread[j] or before[j, r] != k - 1:
                     continue
-                # again, because one that is kept behind the steps gives way to the next
+                # found again: a partial step behind the others has been overwritten by that of the next row
                 w, c = look_at_row(
                     model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                     rel, sums, mu[j, r], work,
@@ -199,7 +268,7 @@ def direct(
             )  # fmt: skip
             work[5] += 1
             for out in range(2):
-                # out = 0: what the last row of the matrix looks at; out = 1: the changes at the end
+                # out = 0: the last row of the matrix, which is the response's; out = 1: the changes at the end
                 if (row and out == 1) or (not row and out == 0 and not integral):
                     continue
                 target = padded[job // n_row, job % n_row : job % n_row + 1] if row else total

@@ -32,9 +32,15 @@ MOST_SWEEPS = 200
 
 @kernel
 def contraction(pair, inv_mass, k, c, turn, w_q, w_v, damped, turning):
-    """Estimate of the spectral radius of M^-1 (w_q K + w_v C), by power iteration.
+    """Estimate the spectral radius of M^-1 (w_q (K - load tangent) + w_v C) by power iteration.
 
-    k, c: (1, n_pair, 6, 6). turn: (1, n).
+    pair (n_pair, 2): the bodies of each pair.
+    inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+    k, c (1, n_pair, 6, 6): -dF/dq and -dF/dv of each pair; c is read if damped.
+    turn (1, n): derivative of the loads by the angle of their body, read if they turn.
+    w_q, w_v: how q and v follow the acceleration in a step (s^2, s).
+    damped: whether any force depends on velocity.
+    turning: whether loads turn.
     """
     n = inv_mass.shape[0]
     x = np.empty((1, n))
@@ -80,7 +86,19 @@ def _accept(scale, force, guess):
 
 @kernel
 def _balance_rows(pair, k, c, turn, damped, turning, x, y, out, wide):
-    """out -= K x + C y - load tangent x for a strip of members: x, y, out (n, STRIP)."""
+    """out -= K x + C y - load tangent x, for a strip of members.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      k, c (n_pair, 6, 6): -dF/dq and -dF/dv of each pair; c is read if damped.
+      turn (n,): derivative of the loads by the angle of their body, read if they turn.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+      x, y (n, STRIP): derivatives of q and v by each member's alpha^mu.
+      wide: how many members the strip has.
+    Out:
+      out (n, STRIP): added to.
+    """
     for p in range(pair.shape[0]):
         for i in range(6):
             o = out[3 * pair[p, i // 3] + i % 3, :wide]
@@ -101,7 +119,19 @@ def _balance_rows(pair, k, c, turn, damped, turning, x, y, out, wide):
 
 @kernel
 def _member_forces(pair, block, member, k, lo, hi, rel, push, out):
-    """out (n, STRIP) = -T^T b f of the members lo..hi of block k at unit strength; push (STRIP,) is room."""
+    """Forces -T^T b f of the members in places lo to hi of block k on the coordinates, at alpha^mu = 1.
+
+    In:
+      pair (n_pair, 2): the bodies of each pair.
+      block (n_block, BLOCK), member (MEMBER, M_padded): as of `Model`.
+      k: number of the block.
+      lo, hi: places in the padded arrays, at most STRIP of them.
+      rel (n_pair, POSE): relative poses.
+    Out:
+      out (n, STRIP): overwritten (N, N m).
+    Room:
+      push (STRIP,): overwritten.
+    """
     wide = hi - lo
     p = block[k, 0]
     unit = np.eye(3)
@@ -134,7 +164,16 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):
 
 @kernel
 def _look(mu, weight_q, weight_v, sq, sv, lo, hi, out):
-    """out (M_padded,) += mu . (weight_q dq + weight_v dv) for the members lo..hi."""
+    """Add mu . (weight_q dq + weight_v dv) for the members in places lo to hi.
+
+    In:
+      mu (n,): derivative of a response by the coordinates.
+      weight_q, weight_v: of the derivatives of q and v in those of the coordinates.
+      sq, sv (n, M_padded): derivatives of q and v by alpha^mu.
+      lo, hi: places in the padded arrays.
+    Out:
+      out (M_padded,): added to.
+    """
     for d in range(mu.shape[0]):
         a = mu[d] * weight_q
         b = mu[d] * weight_v
@@ -161,7 +200,25 @@ def iterative(
     gradients,
     work,
 ):
-    """Gradients (n_obj, R, N) of the rows that `look` found; arguments as those of `direct.direct`.
+    """Gradients of the rows that `look` found, by fixed-point sweeps of the linearised steps.
+
+    Constant:
+      tag: of the integrator (`contract.steps_of`).
+      ints, floats: the packed model.
+      tables (1,): the spectral radius.
+    In:
+      alpha (N,): the design.
+      damped: whether any force depends on velocity.
+      limits (3,): steps allowed, room for steps, room for stages.
+      count: steps that were taken.
+      reductions (n_obj,): codes of the objectives' reductions.
+      room, room_ints: the steps, with tangents (`steps.carve`).
+      strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
+      rows (n_obj, R, 4): time, value, step, fraction of it, of what `look` found.
+      found (n_obj,): how many rows each objective has.
+    Out:
+      gradients (n_obj, R, N): by alpha, for the rows that were found.
+      work (WORK,): counts of work, added to.
 
     Returns the step at which the sweeps do not contract, or -1: then the gradients hold.
     """
@@ -190,7 +247,7 @@ def iterative(
     states = np.zeros((n_obj, n_row, 3, n))
     place = np.empty((n_obj, n_row), np.int64)
     fraction = np.empty((n_obj, n_row))
-    place[:] = -1  # what is no peak is looked at nowhere
+    place[:] = -1  # integrals over time belong to no step
     integral = False
     for j in range(n_obj):
         if reductions[j] == MEAN or reductions[j] == INTEGRAL:

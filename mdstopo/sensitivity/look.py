@@ -54,8 +54,28 @@ def look(
 ):
     """Every objective of the load case, from the steps that `simulate` left in room.
 
-    In: reductions (n_obj,); room: padded (R, M_padded). Out: rows (n_obj, R, 4) time, value, step, fraction; found
-    (n_obj,); gradients (n_obj, R, N); meeting (3,), see `find_meeting` and `find_unresolved`.
+    Constant:
+      tag: of the integrator (`contract.steps_of`).
+      ints, floats: the packed model.
+      tables: constant arrays of the integrator.
+    In:
+      alpha (N,): the design.
+      damped: whether any force depends on velocity.
+      settings (4,): tolerance, Newton tolerance, fixed step (s) or not above 0, closeness of competing peaks.
+      limits (3,): steps allowed, room for steps, room for stages.
+      count: steps that were taken.
+      reductions (n_obj,): codes of the objectives' reductions.
+      gradient: whether gradients are wanted.
+      room, room_ints: the steps (`steps.carve`), with tangents where gradients are wanted.
+      strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
+    Out:
+      rows (n_obj, R, 4): time (s), value, step, fraction of it.
+      found (n_obj,): how many rows each objective has.
+      gradients (n_obj, R, N): by alpha.
+      meeting (3,): of `find_meeting` and `find_unresolved`.
+      work (WORK,): counts of work, added to.
+    Room:
+      padded (R, M_padded): overwritten.
     """
     model = unpack(ints, floats)
     motion, own, left = carrying(model, strength, np.bool_(False))
@@ -81,15 +101,27 @@ def look(
 
 @part
 def find_meeting(model, strength, steps, count, pose, settings, meeting):
-    """meeting[:2]: padded index of a member whose ends meet while it carries a force, or -1, and the stage before.
+    """Find a member whose ends meet while it carries a force: its direction and its force are lost there.
 
     A pair that moves by some distance shortens no member by more. So lengths are looked at only where the motion since
     they were last known could have used up the shortest, and single members only where it could have done so within
-    one stretch between stages. pose (S, n_pair, POSE): of the stages. `model` is the whole one, whose padding repeats
-    its members: other padding would have a length of its own.
+    one stretch between stages.
 
     Between the last node of a collocation window and the first of the next no force is looked at. A member that turns
-    round there unseen, and by whose force that matters to UNSEEN tolerances (`settings`), counts as one that meets.
+    round there unseen, and by whose force that matters to UNSEEN tolerances, counts as one that meets.
+
+    Constant:
+      model: the compiled scene with all members, whose padding repeats them: other padding would have a length of its
+        own.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      pose (S, n_pair, POSE): relative poses of the stages.
+      settings (4,): of `look`; the tolerance and the fixed step are read.
+    Out:
+      meeting (2 or more,): index of the member in the padded arrays, or -1; where there is one, then the number of
+        the stage before which its ends meet, or the number of stages where they meet after the last one.
     """
     meeting[0] = -1
     pair = model.pair
@@ -153,15 +185,24 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
 
 @part
 def find_unresolved(model, strength, steps, count, pose, collocated, visible, meeting):
-    """meeting[2]: the member by which rounding leaves the largest stored energy no digits to speak of, or -1.
+    """Find the member by which rounding leaves the largest stored energy no digits to speak of.
 
     An elongation is known to u X where bodies have moved by X since the start, u = 2.2e-16; an energy k Delta^2/2 then
     to k Delta u X.
     By Cauchy and Schwarz the sum of these is at most u X sqrt(2 sum(k) E), which needs no pass over the members and
     nearly always is small enough.
 
-    pose (S, n_pair, POSE): of the stages; collocated: whether all stages lie on the motion, as those of windows do, or
-    only the first of each step; visible: share of the energy that is too much.
+    Constant:
+      model: the compiled scene.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
+    In:
+      steps: what the integrator kept.
+      count: steps that were taken.
+      pose (S, n_pair, POSE): relative poses of the stages.
+      collocated: whether all stages lie on the motion, as those of windows do, or only the first of each step.
+      visible: share of the energy that is too much.
+    Out:
+      meeting (3,): of which [2] is written, the member's index in the padded arrays, or -1.
     """
     meeting[2] = -1
     best = steps.index[0, 0]
@@ -240,7 +281,23 @@ def _shortest(m, lo, hi, width, r):
 
 @entry
 def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, strength, times, out, work):
-    """out (3, T, n) = q, v, a at times (T,), a by the equations of motion (right-continuous at kinks)."""
+    """The motion at any times: q, v, and a by the equations of motion, right-continuous at kinks.
+
+    Constant:
+      tag: of the integrator (`contract.steps_of`).
+      ints, floats: the packed model.
+      tables: constant arrays of the integrator.
+    In:
+      damped: whether any force depends on velocity.
+      limits (3,): steps allowed, room for steps, room for stages.
+      count: steps that were taken.
+      room, room_ints: the steps (`steps.carve`).
+      strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
+      times (T,): within what was simulated (s).
+    Out:
+      out (3, T, n): q, v, a (m, rad and their derivatives).
+      work (WORK,): counts of work, added to.
+    """
     model = unpack(ints, floats)
     turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]

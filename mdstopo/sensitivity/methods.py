@@ -17,7 +17,7 @@ from mdstopo.status import Status
 if TYPE_CHECKING:
     from mdstopo.integrators.driver import Driver, Looked
 
-#: nodes at which constant_load looks at a mean or an integral
+#: nodes of the rule by which constant_load forms a mean or an integral over time
 NODES = 201
 
 FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; direct was taken instead"

@@ -23,11 +23,25 @@ STRIP = 128
 
 @kernel
 def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, turning, matrix):
-    """Fill matrix (D + 1, D + 3 n_pair s) of step w, to its end (c < 0) or its fraction c.
+    """The linear map of a step, from its start to its end or to a point in it (D = n (2 + what the method carries)).
 
-    Columns: changes of the start; then for each stage and pair the three entries of b f of a member there. Rows:
-    changes of the end; last the change of mu_q . q at the end plus that of bar_s . q_s at the stages; mu_q (n,),
-    bar (s, n).
+    Columns: changes of the start; then for each stage and pair the three entries of b f of a member there.
+    Rows: changes of the end; last the change of mu_q . q at the end plus that of bar_s . q_s at the stages.
+
+    Constant:
+      pair (n_pair, 2): the bodies of each pair.
+      home (n_body, HOME): where bodies are when q is zero.
+      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
+      tables: constant arrays of the integrator.
+    In:
+      steps: what the integrator kept.
+      w: number of the step.
+      c: fraction of it up to which; negative: to its end.
+      mu_q (n,), bar (s, n): weights of the coordinates in the last row.
+      damped: whether any force depends on velocity.
+      turning: whether loads turn.
+    Out:
+      matrix (D + 1 or more, D + 3 n_pair s or more): overwritten.
     """
     n = inv_mass.shape[0]
     n_pair = pair.shape[0]
@@ -76,16 +90,32 @@ def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, tu
 
 @member_kernel
 def add_three(a, b, c, x, y, z, out):
-    """out (m,) += a x + b y + c z, members along the rows."""
+    """out += a x + b y + c z, members along the rows.
+
+    a, b, c: numbers.
+    x, y, z, out (m,): rows.
+    """
     for i in range(out.shape[0]):
         out[i] += a * x[i] + b * y[i] + c * z[i]
 
 
 @kernel
 def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, adding, S, target):
-    """target (last - first, M_padded) = (adding: +=) rows first..last of matrix times the changes S and member forces.
+    """Carry the derivatives of all design members through the linear map of a step.
 
-    In: stage (s, 3, n) the states of the step's stages, S (D, M_padded). target may be S itself. Only design members.
+    Constant:
+      pair (n_pair, 2): the bodies of each pair.
+      home (n_body, HOME): where bodies are when q is zero.
+      block (n_block, BLOCK), member (MEMBER, M_padded): as of `Model`.
+    In:
+      stage (s, 3, n): of the step's stages, of which q and v are read.
+      s: how many stages.
+      matrix: of `step_matrix`.
+      first, last: its rows from first to before last are multiplied.
+      adding: whether the products are added to what is there.
+      S (D, M_padded): derivatives at the start by alpha^mu.
+    Out:
+      target (last - first, M_padded): rows of matrix times S and the members' forces; it may be S itself.
     """
     n_pair = pair.shape[0]
     width = S.shape[0]

@@ -17,7 +17,7 @@ from mdstopo.mechanics.laws.spring import elongation_of
 
 @kernel
 def _line(par, w, wd):
-    """Arms, unit vector, 1/length (0 at none), relative velocity, rate, and its turn f = e'."""
+    """Arms, unit vector e, 1/length (0 at no length), relative velocity d', and rate of the length."""
     px, py, cx, cy = arms(par, w)
     x = w[3] + cx - w[0] - px
     y = w[4] + cy - w[1] - py
@@ -53,7 +53,7 @@ def distance_rows(par, w, phi, jac):
 
 @kernel
 def distance_gamma(par, w, wd, gamma):
-    """Centripetal part and the turning of the link."""
+    """gamma: the centripetal part, and that of the turning link."""
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     bx = wd[2] ** 2 * px - wd[5] ** 2 * cx
     by = wd[2] ** 2 * py - wd[5] ** 2 * cy
@@ -76,7 +76,16 @@ def distance_velocity_slope(par, w, wd, out):
 
 @kernel
 def distance_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
-    """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
+    """Slopes of Phi_q a + gamma at fixed a.
+
+    In:
+      par (WIDTH,): parameters of the joint.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (1 or more, 6): d(Phi_q a + gamma)/dq.
+      by_v (1 or more, 6): d(gamma)/dv.
+    """
     px, py, cx, cy, ex, ey, inverse, dx, dy, rate = _line(par, w, wd)
     wa = wd[2]
     wb = wd[5]
@@ -130,6 +139,12 @@ def distance_stiffness(par, w, lam, k):
 
 @kernel
 def _across(i, ex, ey, px, py, cx, cy):
+    """How far d moves across the link by one coordinate, (-ey, ex) . dd/dw_i.
+
+    i: the coordinate: x, y, angle of the first body, then of the second.
+    ex, ey: unit vector along the link.
+    px, py, cx, cy: arms of the points on both bodies (m), global axes.
+    """
     if i == 0:
         return ey
     if i == 1:

@@ -43,7 +43,16 @@ def fixed_velocity_slope(par, w, wd, out):
 
 @kernel
 def fixed_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
-    """d(Phi_q a + gamma)/dq and d(gamma)/dv; the angle's rows are zero."""
+    """Slopes of Phi_q a + gamma at fixed a; the angle's rows are zero.
+
+    In:
+      par (WIDTH,): parameters of the joint.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (3, 6): d(Phi_q a + gamma)/dq.
+      by_v (3, 6): d(gamma)/dv.
+    """
     revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v)
     for i in range(6):
         by_q[2, i] = 0.0

@@ -1,4 +1,4 @@
-"""What a joint does: one record of kernels, which `table` makes the dispatch by code of.
+"""What a joint does: one record of kernels; `table` makes the branches by code from these records.
 
 A kernel takes what it needs of the following, in any order, by these names:
 

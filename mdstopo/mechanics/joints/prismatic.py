@@ -50,7 +50,7 @@ def prismatic_rows(par, w, phi, jac):
 
 @kernel
 def prismatic_gamma(par, w, wd, gamma):
-    """What the second derivative has beside Phi_q a."""
+    """gamma: what the second derivative of Phi has beside Phi_q a."""
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     dx = wd[3] - wd[0] - wd[5] * cy
     dy = wd[4] - wd[1] + wd[5] * cx
@@ -77,7 +77,16 @@ def prismatic_velocity_slope(par, w, wd, out):
 
 @kernel
 def prismatic_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
-    """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
+    """Slopes of Phi_q a + gamma at fixed a; the angle's rows are zero.
+
+    In:
+      par (WIDTH,): parameters of the joint.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (2 or more, 6): d(Phi_q a + gamma)/dq.
+      by_v (2 or more, 6): d(gamma)/dv.
+    """
     nx, ny, ex, ey, cx, cy = _frame(par, w)
     wa = wd[2]
     wb = wd[5]
@@ -145,7 +154,7 @@ def prismatic_moment(par, w, lam, by_lam, by_q):
 
 
 def prismatic_at_home(joint: PrismaticJoint, home: AtHome) -> dict[int, float]:
-    """How far the second point is off the axis."""
+    """How far the second point is off the axis at home (m), by its place in the parameters."""
     nx, ny = -joint.axis[1], joint.axis[0]
     return {8: (home.c * nx - home.s * ny) * home.x + (home.s * nx + home.c * ny) * home.y}
 

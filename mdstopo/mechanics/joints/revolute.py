@@ -14,7 +14,16 @@ PLACES = 18
 
 @part
 def place_turned(home, a, b, q, turns_a, turns_b, w):
-    """Fill w (PLACES,) of bodies a and b from q (n,) and what `turned_body` gives of them."""
+    """Tell a joint where its bodies are, with the turns of both given.
+
+    In:
+      home (n_body, HOME): where bodies are when q is zero.
+      a, b: numbers of the first and the second body.
+      q (n,): coordinates (m, rad).
+      turns_a, turns_b (4 numbers): what `turned_body` gives of them.
+    Out:
+      w (PLACES,): overwritten.
+    """
     for side in range(2):
         body = a if side == 0 else b
         c, s, c_since, s_since = turns_a if side == 0 else turns_b
@@ -100,7 +109,16 @@ def revolute_velocity_slope(par, w, wd, out):
 
 @part
 def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
-    """d(Phi_q a + gamma)/dq and d(gamma)/dv."""
+    """Slopes of Phi_q a + gamma at fixed a.
+
+    In:
+      par (WIDTH,): parameters of the joint.
+      w (PLACES,): where both bodies are (`place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (2 or more, 6): d(Phi_q a + gamma)/dq.
+      by_v (2 or more, 6): d(gamma)/dv.
+    """
     px, py, cx, cy = arms(par, w)
     for r in range(2):
         for i in range(6):
@@ -120,10 +138,19 @@ def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
 
 @part
 def revolute_pull(par, w, wd, wdd, lam, y0, y1, z_first, z_second):
-    """What `revolute_acceleration_slopes` and `revolute_stiffness` give with y (2) and a virtual displacement z.
+    """What `revolute_acceleration_slopes` and `revolute_stiffness` give, transposed, times two vectors.
 
     (d(Phi_q a + gamma)/dq)^T y + (d(Phi_q^T lam)/dq)^T z and (d(gamma)/dv)^T y, of which only those by the angles are
-    not zero: those of the first body, of the second, then by their rates. z_first, z_second: z of the angles.
+    not zero.
+
+    par (WIDTH,): parameters of the joint.
+    w (PLACES,): where both bodies are (`place_joint`).
+    wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    lam (2 or more,): multipliers (N).
+    y0, y1: y, one number for each row.
+    z_first, z_second: the virtual displacement z of the angle of the first body and of the second (rad).
+
+    Returns four numbers: by the angle of the first body, by that of the second, then by their rates.
     """
     px, py, cx, cy = arms(par, w)
     wa = wd[2]
@@ -147,7 +174,7 @@ def revolute_stiffness(par, w, lam, k):
 
 
 def point_at_home(_: object, home: AtHome) -> dict[int, float]:
-    """Phi of the points."""
+    """Phi at home, by the places of its entries in the parameters."""
     return {8: home.x, 9: home.y}
 
 

@@ -117,7 +117,17 @@ def joint_velocity_slope(code, par, w, wd, out):
 
 @chosen(LISTED, lambda each: each.acceleration_slopes, part)
 def joint_acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
-    """by_q, by_v (3, 6): slopes of Phi_q a + gamma at fixed a."""
+    """Slopes of Phi_q a + gamma at fixed a; zero for a joint whose rows are linear.
+
+    In:
+      code: of the joint.
+      par (WIDTH,): its parameters.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      wd, wdd (6,): their velocities and accelerations (m/s, rad/s; m/s^2, rad/s^2).
+    Out:
+      by_q (3, 6): d(Phi_q a + gamma)/dq, in the rows that the joint has.
+      by_v (3, 6): d(gamma)/dv, in the rows that the joint has.
+    """
     for r in range(_row_count(code)):
         for i in range(6):
             by_q[r, i] = 0.0
@@ -143,13 +153,32 @@ def joint_force_rows(code):
 
 @chosen(LISTED, lambda each: each.moment, part)
 def _moment(code, par, w, lam, by_lam, by_q):
-    """The moment that is transmitted, by_lam (3,), by_q (6,): its slopes, zero before."""
+    """The moment that a joint transmits (N m), at the first body's joint point; 0 for a joint that transmits none.
+
+    In:
+      code: of the joint.
+      par (WIDTH,): its parameters.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      lam (3,): multipliers (N, N m).
+    Out:
+      by_lam (3,), by_q (6,): slopes of the moment; zero before.
+    """
     return 0.0
 
 
 @kernel
 def joint_reaction(code, rows, par, w, lam, out):
-    """out (3,) = Fx, Fy, M on the first body at its joint point, global axes: -Phi_q^T lam, moved there."""
+    """Force and moment of a joint on its first body at its joint point, global axes: -Phi_q^T lam, moved there.
+
+    In:
+      code: of the joint.
+      rows: how many it has.
+      par (WIDTH,): its parameters.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      lam (3,): multipliers (N, N m).
+    Out:
+      out (3,): F_x, F_y (N), M (N m).
+    """
     phi = np.zeros(3)
     jac = np.zeros((3, 6))
     joint_rows(code, par, w, phi, jac)
@@ -163,10 +192,17 @@ def joint_reaction(code, rows, par, w, lam, out):
 
 @kernel
 def joint_transmitted(code, par, w, lam, which, by_lam, by_q):
-    """Norm of the force (which FORCE) or the moment (MOMENT) that a joint transmits, at the first body's joint point.
+    """Norm of the force or of the moment that a joint transmits, at the first body's joint point (N or N m).
 
-    Out: its slopes by_lam (3,), by_q (6,); zero where the norm is. ACROSS: the norm of the force, with the slopes of
-    the component perpendicular to it, a quarter turn ahead, in global axes; zero where the force has one direction.
+    In:
+      code: of the joint.
+      par (WIDTH,): its parameters.
+      w (PLACES,): where both bodies are (`revolute.place_joint`).
+      lam (3,): multipliers (N, N m).
+      which: FORCE or MOMENT; ACROSS: the norm of the force, with the slopes of the component perpendicular to it, a
+        quarter turn ahead, in global axes; these are zero where the force has one direction.
+    Out:
+      by_lam (3,), by_q (6,): slopes; zero where the norm is zero.
     """
     by_lam[:] = 0.0
     by_q[:] = 0.0

@@ -89,7 +89,7 @@ def actuator_start(p, x, xd):
 
 @inline
 def actuator_next(p, x, xd, mode):
-    """The mode behind the end of this one."""
+    """The mode to go to where this one's margin is negative."""
     if mode != LINEAR:
         return LINEAR
     return UPPER if p[0] * (x - p[2]) + p[1] * xd > 0.0 else LOWER
@@ -103,7 +103,7 @@ def actuator_switches(p):
 
 @inline
 def actuator_unstretched(p):
-    """What steers to the target from no elongation."""
+    """The size of the force at no elongation, which steers to the target."""
     return abs(p[0] * p[2])
 
 

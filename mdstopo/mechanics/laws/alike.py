@@ -26,7 +26,19 @@ def _seen(member, width, i, r):
 
 @kernel
 def alike_sums(member, width, scale, start, stop, p, r, counted, o):
-    """o (SUMS,) += Q, and where they are counted E and E_xi."""
+    """Add force and energy of members with the same parameters to the sums of their pair.
+
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      scale (stop or more,): alpha^mu of each member.
+      start, stop: the members, with padding in between that has a scale of zero.
+      p (3 or more,): k, c, preload (N/m, N s/m, N).
+      r (POSE,): relative pose.
+      counted: whether E and E_xi are wanted.
+    Out:
+      o (SUMS,): Q added to and, where they are counted, E and E_xi.
+    """
     sum_x = zero()
     sum_y = zero()
     sum_t = zero()
@@ -58,9 +70,19 @@ def alike_sums(member, width, scale, start, stop, p, r, counted, o):
 
 @kernel
 def alike_tangent(member, width, scale, start, stop, p, r, o):
-    """o (SUMS,) += the part of K without damping: sum s (k b b^T + f B2), which is symmetric.
+    """Add the tangent of members with the same parameters, without damping: sum s (k b b^T + f B2), which is symmetric.
 
     With w = f/L, f B2 = w (g^T g - b b^T) - f (e . R q) on theta, g = [I, J R q].
+
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      scale (stop or more,): alpha^mu of each member.
+      start, stop: the members, with padding in between that has a scale of zero.
+      p (3 or more,): k, c, preload (N/m, N s/m, N).
+      r (POSE,): relative pose.
+    Out:
+      o (SUMS,): K added to.
     """
     kxx = zero()
     kxy = zero()
@@ -91,7 +113,18 @@ def alike_tangent(member, width, scale, start, stop, p, r, o):
 
 @kernel
 def alike_damping(member, width, scale, start, stop, p, r, o):
-    """o (SUMS,) += what damping adds: sum s c b (B2 xi')^T to K, C = sum s c b b^T."""
+    """Add what damping does to the tangents: sum s c b (B2 xi')^T to K, C = sum s c b b^T.
+
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      scale (stop or more,): alpha^mu of each member.
+      start, stop: the members, with padding in between that has a scale of zero.
+      p (3 or more,): k, c, preload (N/m, N s/m, N).
+      r (POSE,): relative pose.
+    Out:
+      o (SUMS,): K and C added to.
+    """
     kxx = zero()
     kxy = zero()
     kxt = zero()
@@ -157,9 +190,18 @@ def alike_damping(member, width, scale, start, stop, p, r, o):
 
 @kernel
 def alike_design(member, width, start, stop, p, r, u, weight, out):
-    """out (M or more,) += f (b . u) + weight V of each member at s = 1; u (3,): virtual change of the relative pose.
+    """Add f (b . u) + weight V of each member, at alpha^mu = 1.
 
-    Padding in `out` becomes something that nobody reads.
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      start, stop: the members; padding in between becomes something that nobody reads.
+      p (3 or more,): k, c, preload (N/m, N s/m, N).
+      r (POSE,): relative pose.
+      u (3,): virtual change of the relative pose.
+      weight: of the stored energy V.
+    Out:
+      out (M or more,): added to.
     """
     half = 0.5 * weight * p[0]
     for i in range(start, stop, lanes()):
@@ -170,9 +212,18 @@ def alike_design(member, width, start, stop, p, r, u, weight, out):
 
 @kernel
 def elastic_designs(member, width, start, stop, k, rel, u, p, out):
-    """`alike_design` without damping, preload and energy, of stiffness k, summed over the poses of pair p.
+    """Add sum_j f (b . u_j) over S poses of each member, without damping and preload, at alpha^mu = 1.
 
-    rel (S, n_pair, POSE), u (S, n_pair, 3).
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      start, stop: the members; padding in between becomes something that nobody reads.
+      k: stiffness (N/m).
+      rel (S, n_pair, POSE): relative poses.
+      u (S, n_pair, 3): virtual changes of these.
+      p: number of the pair.
+    Out:
+      out (M or more,): added to.
     """
     for i in range(start, stop, lanes()):
         x = load(member, i)
@@ -189,10 +240,22 @@ def elastic_designs(member, width, start, stop, k, rel, u, p, out):
 
 @kernel
 def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):
-    """`alike_design` without energy at S poses, of R rows: members are looked at once for all, and the sums are those
-    of each row by itself.
+    """Add sum_j f (b . u_j) over S poses of each member, at alpha^mu = 1, for R rows.
 
-    rel (S, n_pair, POSE); u (R, S, n_pair, 3); out (R, W), W at least M; room (4 S lanes(),).
+    Members are looked at once for all rows.
+
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      start, stop: the members; padding in between becomes something that nobody reads.
+      p (3 or more,): k, c, preload (N/m, N s/m, N).
+      rel (S, n_pair, POSE): relative poses.
+      u (R, S, n_pair, 3): virtual changes of these, for each row.
+      pair: number of the pair.
+    Out:
+      out (R, M or more): added to, each row as it would be by itself.
+    Room:
+      room (4 S lanes,): f and b of the members at hand, at all poses.
     """
     poses = rel.shape[0]
     flat = out.reshape(out.size)
@@ -217,7 +280,21 @@ def alike_designs(member, width, start, stop, p, rel, u, pair, room, out):
 
 @kernel
 def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, out):
-    """`elastic_designs` of R rows; arguments as of `alike_designs`."""
+    """Do `elastic_designs` for R rows: members are looked at once for all.
+
+    In:
+      member (6 M,): rows of `spring` of all members behind each other.
+      width: of a row, M.
+      start, stop: the members; padding in between becomes something that nobody reads.
+      k: stiffness (N/m).
+      rel (S, n_pair, POSE): relative poses.
+      u (R, S, n_pair, 3): virtual changes of these, for each row.
+      pair: number of the pair.
+    Out:
+      out (R, M or more): added to, each row as it would be by itself.
+    Room:
+      room (4 S lanes,): Delta/L and L b of the members at hand, at all poses.
+    """
     poses = rel.shape[0]
     flat = out.reshape(out.size)
     vector = lanes()
@@ -246,7 +323,13 @@ def elastic_designs_of_rows(member, width, start, stop, k, rel, u, pair, room, o
 
 @kernel
 def far(member, width, start, stop, before, after):
-    """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move."""
+    """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move.
+
+    member (6 M,): rows of `spring` of all members behind each other.
+    width: of a row, M.
+    start, stop: the members.
+    before, after (POSE,): the relative poses.
+    """
     near = zero() - np.inf
     for i in range(start, stop, lanes()):
         px = load(member, i)

@@ -86,7 +86,7 @@ def crush_set_slope(p, place):
 
 @inline
 def crush_next(p, x, mode):
-    """The mode to go to where this one's margin is negative; the force is continuous, so there is no second look."""
+    """The mode to go to where this one's margin is negative; the force is continuous, so rates need not decide."""
     if mode != ELASTIC:
         return ELASTIC
     return CRUSHING if p[3] * x - p[2] > 0.5 * p[1] / p[0] else OPEN
@@ -119,7 +119,10 @@ def crush_first_set(p, x, mode):
 
 @inline
 def crush_grazes(p, x, mode):
-    """As `gap_grazes`: a plateau that is only just reached leaves a set on one side and none on the other (2)."""
+    """What a margin that is only just used up (or not) does to derivatives: nothing 0, the motion 2.
+
+    A plateau that is only just reached leaves a permanent set on one side and none on the other.
+    """
     return 2 if mode == ELASTIC and p[3] * x - p[2] > 0.5 * p[1] / p[0] else 0
 
 

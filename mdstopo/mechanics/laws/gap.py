@@ -137,11 +137,10 @@ def gap_start(p, x, xd, xdd):
 
 @inline
 def gap_grazes(p, mode):
-    """What a touch that only just happens (or not) does: 0 nothing, 1 the force at it is no smooth function, 2 the
-    motion is none.
+    """What a touch that only just happens (or not) does to derivatives: nothing 0, the force 1, the motion 2.
 
     Touching by a depth y lasts sqrt(y). Damping gives a force that begins with the root of y; its impulse c (y - y) is
-    nothing, unless clip takes the returning half away: c y, a kink at no touch.
+    nothing, unless clip takes the returning half away: then it is c y, which has a kink where nothing touches.
     """
     if mode != OPEN or p[1] == 0.0:
         return 0

@@ -1,4 +1,4 @@
-"""What a member law does: one record of kernels, which `table` makes the dispatch by code of.
+"""What a member law does: one record of kernels; `table` makes the branches by code from these records.
 
 A kernel is an `inline` function. It takes what it needs of the following, in any order, by these names:
 

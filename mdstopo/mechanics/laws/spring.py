@@ -42,7 +42,14 @@ def _inverse_length(r2):
 
 @inline
 def _elongation(rx, ry, r2, y, ux, uy, free, excess):
-    """`elongation` in numbers, without a branch."""
+    """`elongation` of one member, in numbers and without a branch (m).
+
+    rx, ry, r2: r and its square (m, m^2).
+    y: 1/L, 0 for no length (1/m).
+    ux, uy: what r has changed by since home (m).
+    free: l0 (m).
+    excess: L0^2 - l0^2 (m^2).
+    """
     x = r2 * y - free
     squares = excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))
     off = 0.5 * y * (x * (r2 * y + free) - squares)
@@ -60,11 +67,17 @@ def hardly_moved(r, near):
 
 @part
 def elongation(rx, ry, r2, y, ux, uy, free, excess):
-    """Delta = L - l0 of members with r, r^2, 1/L and u, what r has changed by since home; excess: L0^2 - l0^2.
+    """Delta = L - l0 of members, in vectors (m).
 
     L^2 - l0^2 = excess + u . (2 r - u) has all digits of u, and one step of Newton's method for
     Delta (Delta + 2 l0) = L^2 - l0^2 leaves of what L - l0 has lost the square. Where u is longer than r, L itself is
     the more accurate.
+
+    rx, ry, r2: r and its square (m, m^2).
+    y: 1/L, 0 for no length (1/m).
+    ux, uy: what r has changed by since home (m).
+    free: l0 (m).
+    excess: L0^2 - l0^2 (m^2).
     """
     x = r2 * y - free
     squares = excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))
@@ -74,7 +87,14 @@ def elongation(rx, ry, r2, y, ux, uy, free, excess):
 
 @inline
 def elongation_of(rx, ry, length, ux, uy, free, excess):
-    """`elongation` of one member."""
+    """`elongation` of one member (m).
+
+    rx, ry: r (m).
+    length: L = |r| (m).
+    ux, uy: what r has changed by since home (m).
+    free: l0 (m).
+    excess: L0^2 - l0^2 (m^2).
+    """
     u2 = ux * ux + uy * uy
     if u2 < length * length:
         return (excess + (ux * (rx + rx - ux) + uy * (ry + ry - uy))) / (length + free)
@@ -83,10 +103,16 @@ def elongation_of(rx, ry, length, ux, uy, free, excess):
 
 @part
 def elastic_force(member, width, scale, start, stop, r, close):
-    """Return Q (3 numbers) and E of the undamped springs from start to stop at the relative pose r (POSE,).
+    """Sum undamped springs to force and energy at one relative pose.
 
-    member (6 width or more,): the rows behind each other, width of each; scale (stop or more,): k; close: whether
-    elongations come from displacements (`hardly_moved`).
+    member (6 width or more,): rows of `Model.member` behind each other.
+    width: of a row.
+    scale (stop or more,): k times alpha^mu (N/m).
+    start, stop: places of the members, a multiple of the vector's width.
+    r (POSE,): relative pose.
+    close: whether elongations come from displacements (`hardly_moved`).
+
+    Returns Q (3 numbers; N, N, N m) and E (J).
     """
     sum_x = zero()
     sum_y = zero()
@@ -126,10 +152,19 @@ def seen_members(member, width, i, r, close):
 
 @part
 def elastic_tangent(member, width, scale, start, stop, r, close):
-    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K; arguments as of `elastic_force`.
+    """Sum undamped springs to force, energy and tangent at one relative pose.
 
     The lengths of the next members are found while these are summed: one chain of operations from coordinates to sums
     would be longer than a processor looks ahead.
+
+    member (6 width or more,): rows of `Model.member` behind each other.
+    width: of a row.
+    scale (stop or more,): k times alpha^mu (N/m).
+    start, stop: places of the members, a multiple of the vector's width.
+    r (POSE,): relative pose.
+    close: whether elongations come from displacements (`hardly_moved`).
+
+    Returns Q (3 numbers; N, N, N m), E (J) and the upper triangle xx, xy, yy, xt, yt, tt of K.
     """
     sum_x = zero()
     sum_y = zero()
@@ -180,7 +215,16 @@ def elastic_tangent(member, width, scale, start, stop, r, close):
 
 @member_kernel
 def viscous_force(px, py, qx, qy, l0, excess, k, damping, preload, r):
-    """Return Q, E and E_xi of a tile of springs with damping or preload."""
+    """Sum a tile of springs with damping or preload to force and energy at one relative pose.
+
+    px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+    l0 (n,): free lengths (m).
+    excess (n,): L0^2 - l0^2 (m^2).
+    k, damping, preload (n,): times alpha^mu (N/m, N s/m, N).
+    r (POSE,): relative pose.
+
+    Returns Q (3 numbers; N, N, N m), E (J) and E_xi (3 numbers).
+    """
     sum_x = 0.0
     sum_y = 0.0
     sum_t = 0.0
@@ -215,7 +259,17 @@ def viscous_force(px, py, qx, qy, l0, excess, k, damping, preload, r):
 
 @member_kernel
 def viscous_tangent(px, py, qx, qy, l0, excess, k, damping, preload, r):
-    """Return Q, E, E_xi, K (nine, by rows) and the upper triangle of C of a tile of general springs."""
+    """Sum a tile of springs with damping or preload to force, energy and tangents at one relative pose.
+
+    px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+    l0 (n,): free lengths (m).
+    excess (n,): L0^2 - l0^2 (m^2).
+    k, damping, preload (n,): times alpha^mu (N/m, N s/m, N).
+    r (POSE,): relative pose.
+
+    Returns Q (3 numbers; N, N, N m), E (J), E_xi (3), K (9, by rows) and the upper triangle xx, xy, yy, xt, yt, tt
+    of C.
+    """
     vx = r[4]
     vy = r[5]
     vt = r[6]
@@ -319,9 +373,17 @@ def viscous_tangent(px, py, qx, qy, l0, excess, k, damping, preload, r):
 
 @kernel
 def elastic_design(px, py, qx, qy, l0, excess, k, pose, u, out):
-    """Add sum_j f_i (b_i . u_j) of each undamped spring at pose (m, POSE) j to out.
+    """Add sum_j f (b . u_j) over m relative poses to each undamped spring.
 
-    u (m, 3): virtual changes of the relative pose.
+    In:
+      px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+      l0 (n,): free lengths (m).
+      excess (n,): L0^2 - l0^2 (m^2).
+      k (n,): stiffness at alpha = 1 (N/m).
+      pose (m, POSE): relative poses.
+      u (m, 3): virtual changes of these.
+    Out:
+      out (n,): added to.
     """
     for i in range(0, k.shape[0], lanes()):
         x = load(px, i)
@@ -338,14 +400,27 @@ def elastic_design(px, py, qx, qy, l0, excess, k, pose, u, out):
 
 @kernel
 def elastic_work(x, y, v, w, free, excess, pose, u):
-    """Delta (b . u) of the members with P = (x, y), Q = (v, w) and these free lengths at one pose."""
+    """Delta (b . u) of some members at one pose, in vectors: the work of their forces at k = 1.
+
+    x, y, v, w: points P = (x, y) and Q = (v, w) (m).
+    free, excess: l0 (m) and L0^2 - l0^2 (m^2).
+    pose (POSE,): relative pose.
+    u (3,): virtual change of it.
+    """
     force, rx, ry, moment = elastic_parts(x, y, v, w, free, excess, pose)
     return force * (rx * u[0] + ry * u[1] + moment * u[2])
 
 
 @kernel
 def elastic_parts(x, y, v, w, free, excess, pose):
-    """Of `elastic_work`: Delta / L, and L b, with which it is Delta / L (L b . u)."""
+    """What `elastic_work` is made of: Delta/L and L b, with which it is Delta/L (L b . u), in vectors.
+
+    x, y, v, w: points P = (x, y) and Q = (v, w) (m).
+    free, excess: l0 (m) and L0^2 - l0^2 (m^2).
+    pose (POSE,): relative pose.
+
+    Returns Delta/L and the three entries of L b.
+    """
     c = pose[2]
     s = pose[3]
     ax = c * v - s * w
@@ -361,7 +436,18 @@ def elastic_parts(x, y, v, w, free, excess, pose):
 
 @member_kernel
 def viscous_design(px, py, qx, qy, l0, excess, k, damping, preload, r, u, out):
-    """Add f_i (b_i . u) of each general spring to out; u is a virtual change of the relative pose."""
+    """Add f (b . u) at one relative pose to each spring with damping or preload.
+
+    In:
+      px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+      l0 (n,): free lengths (m).
+      excess (n,): L0^2 - l0^2 (m^2).
+      k, damping, preload (n,): at alpha = 1 (N/m, N s/m, N).
+      r (POSE,): relative pose.
+      u (3,): virtual change of it.
+    Out:
+      out (n,): added to.
+    """
     dx = r[0]
     dy = r[1]
     c = r[2]
@@ -394,7 +480,18 @@ def viscous_design(px, py, qx, qy, l0, excess, k, damping, preload, r, u, out):
 
 @member_kernel
 def stored_energy(px, py, qx, qy, l0, excess, k, r, weight, out):
-    """Add weight V_i = weight k_i Delta_i^2 / 2 of each spring to out."""
+    """Add weight V, V = k Delta^2/2, at one relative pose to each spring.
+
+    In:
+      px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+      l0 (n,): free lengths (m).
+      excess (n,): L0^2 - l0^2 (m^2).
+      k (n,): stiffness at alpha = 1 (N/m).
+      r (POSE,): relative pose.
+      weight: of the energy.
+    Out:
+      out (n,): added to.
+    """
     dx = r[0]
     dy = r[1]
     c = r[2]
@@ -416,7 +513,12 @@ def stored_energy(px, py, qx, qy, l0, excess, k, r, weight, out):
 
 @kernel
 def shortest_in(px, py, qx, qy, dx, dy, c, s):
-    """Smallest length in the tile, m."""
+    """Smallest length in the tile (m).
+
+    px, py, qx, qy (n,): points P and Q in the frames of their bodies (m), n a multiple of the vector's width.
+    dx, dy: d of the relative pose (m).
+    c, s: cosine and sine of theta.
+    """
     found = zero() - np.inf
     for i in range(0, px.shape[0], lanes()):
         u = load(qx, i)
@@ -429,7 +531,13 @@ def shortest_in(px, py, qx, qy, dx, dy, c, s):
 
 @kernel
 def meeting_in(px, py, qx, qy, l0, k, preload, before, after):
-    """First member that carries a force and whose ends meet between two relative poses; else -1."""
+    """First member that carries a force and whose ends meet between two relative poses; else -1.
+
+    px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+    l0 (n,): free lengths (m).
+    k, preload (n,): times alpha^mu (N/m, N).
+    before, after (POSE,): relative poses, between which ends move along straight lines.
+    """
     for i in range(px.shape[0]):
         if k[i] * l0[i] == preload[i]:
             continue  # at zero length it carries nothing
@@ -451,7 +559,11 @@ def meeting_in(px, py, qx, qy, l0, k, preload, before, after):
 def passing_in(px, py, qx, qy, l0, k, preload, before, after, least):
     """First member whose ends pass between two relative poses, much nearer than they move, under a force; else -1.
 
-    least: of the force at no length, N for each metre that the ends move.
+    px, py, qx, qy (n,): points P and Q in the frames of their bodies (m).
+    l0 (n,): free lengths (m).
+    k, preload (n,): times alpha^mu (N/m, N).
+    before, after (POSE,): relative poses, between which ends move along straight lines.
+    least: what the force at no length has to exceed, for each metre that the ends move (N/m).
     """
     for i in range(px.shape[0]):
         rx = before[0] + before[2] * qx[i] - before[3] * qy[i] - px[i]

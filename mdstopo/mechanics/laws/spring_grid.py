@@ -34,7 +34,15 @@ def _seen(ax, ay, room, j):
 
 @kernel
 def begin_rows(px, py, width, dx, dy, room):
-    """e of each row."""
+    """Find e = d - p of each row of a grid.
+
+    In:
+      px, py (rows width or more,): points P (m), alike in a row.
+      width: places in a row.
+      dx, dy: d of the relative pose (m).
+    Out:
+      room (rows, 2): e (m).
+    """
     for j in range(room.shape[0]):
         room[j, 0] = dx - px[j * width]
         room[j, 1] = dy - py[j * width]
@@ -42,10 +50,21 @@ def begin_rows(px, py, width, dx, dy, room):
 
 @part
 def grid_force(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):
-    """Return Q (3 numbers) and E.
+    """Sum the members of a grid to force and energy at one relative pose.
 
     As in `spring.elastic_tangent`, the lengths of the next row (after the last, of the next columns' first) are found
     while this one is summed.
+
+    px, py, qx, qy (rows width,): points P and Q in the frames of their bodies (m).
+    l0, excess (rows width,): free lengths (m) and L0^2 - l0^2 (m^2).
+    k (rows width,): stiffness times alpha^mu (N/m).
+    width: places in a row.
+    first, last: the columns from first to before last are summed.
+    r (POSE,): relative pose.
+    close: whether elongations come from displacements (`spring.hardly_moved`).
+    room (rows, 2): room for e of the rows.
+
+    Returns Q (3 numbers; N, N, N m) and E (J).
     """
     begin_rows(px, py, width, r[0], r[1], room)
     nothing_moved = zero(), zero(), zero()
@@ -100,7 +119,15 @@ def moved_columns(qx, qy, i, r):
 
 @part
 def _stretch(seen, moved, l0, excess, at, close):
-    """Delta of the members at a place (`spring.elongation`); close: whether bodies have hardly moved, so that u < r."""
+    """Delta of the members from one place on, as `spring.elongation` (m), in vectors.
+
+    seen: r, L^2 and 1/L of the members.
+    moved: 2 u and u^2 of their columns (`moved_columns`).
+    l0: free lengths (m).
+    excess (rows width,): L0^2 - l0^2 (m^2).
+    at: the first place in `excess`.
+    close: whether bodies have hardly moved, so that u < r and elongations come from displacements.
+    """
     rx, ry, r2, y = seen
     x = r2 * y - l0
     if close:
@@ -112,7 +139,19 @@ def _stretch(seen, moved, l0, excess, at, close):
 
 @part
 def _weight(energy, seen, moved, k, l0, excess, at, close):
-    """w of a member, and twice the energy with it."""
+    """w = k Delta/L of the members from one place on, and twice the energy with theirs added, in vectors.
+
+    energy: twice the energy so far (J).
+    seen: r, L^2 and 1/L of the members.
+    moved: 2 u and u^2 of their columns (`moved_columns`).
+    k: stiffness times alpha^mu (N/m).
+    l0: free lengths (m).
+    excess (rows width,): L0^2 - l0^2 (m^2).
+    at: the first place in `excess`.
+    close: whether bodies have hardly moved, so that u < r and elongations come from displacements.
+
+    Returns both.
+    """
     stretch = _stretch(seen, moved, l0, excess, at, close)
     w = k * stretch
     return w * seen[3], energy + w * stretch
@@ -126,7 +165,14 @@ def no_members(nothing):
 
 @part
 def add_member(own, rx, ry, y, w, g):
-    """The sums with a member more; y = 1/L."""
+    """The sums over the members of a column with one more in each, in vectors.
+
+    own: the sums so far, as of `no_members`.
+    rx, ry: r (m).
+    y: 1/L (1/m).
+    w: f/L (N/m).
+    g: k - w (N/m).
+    """
     own_w, own_x, own_y, gxx, gxy, trace = own
     nx = rx * y
     ny = ry * y
@@ -175,9 +221,20 @@ def force_and_tangent(sums):
 
 @part
 def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, room):
-    """Return Q, E and the upper triangle xx, xy, yy, xt, yt, tt of K.
+    """Sum the members of a grid to force, energy and tangent at one relative pose.
 
-    Ahead of its sums as in `grid_force`.
+    The lengths of the next row are found while this one is summed, as in `grid_force`.
+
+    px, py, qx, qy (rows width,): points P and Q in the frames of their bodies (m).
+    l0, excess (rows width,): free lengths (m) and L0^2 - l0^2 (m^2).
+    k (rows width,): stiffness times alpha^mu (N/m).
+    width: places in a row.
+    first, last: the columns from first to before last are summed.
+    r (POSE,): relative pose.
+    close: whether elongations come from displacements (`spring.hardly_moved`).
+    room (rows, 2): room for e of the rows.
+
+    Returns Q (3 numbers; N, N, N m), E (J) and the upper triangle xx, xy, yy, xt, yt, tt of K.
     """
     begin_rows(px, py, width, r[0], r[1], room)
     nothing_moved = zero(), zero(), zero()
@@ -208,7 +265,18 @@ def grid_tangent(px, py, qx, qy, l0, excess, k, width, first, last, r, close, ro
 
 @part
 def _add(own, energy, seen, moved, k, l0, excess, at, close):
-    """The sums of a column, and the energy, with a member more."""
+    """The sums over the members of a column, and twice the energy, with one member more in each, in vectors.
+
+    own: the sums so far, as of `no_members`.
+    energy: twice the energy so far (J).
+    seen: r, L^2 and 1/L of the members.
+    moved: 2 u and u^2 of their columns (`moved_columns`).
+    k: stiffness times alpha^mu (N/m).
+    l0: free lengths (m).
+    excess (rows width,): L0^2 - l0^2 (m^2).
+    at: the first place in `excess`.
+    close: whether bodies have hardly moved, so that u < r and elongations come from displacements.
+    """
     rx, ry, r2, y = seen
     w, energy = _weight(energy, seen, moved, k, l0, excess, at, close)
     # a member without direction has no n: its k must not enter the trace
@@ -232,16 +300,38 @@ def _moved_at(turned, m):
 
 @part
 def _work(seen, moved, along, l0, excess, at, close):
-    """f/k b . u = Delta/L r . (u + e x u_theta), of which the last are `along` (2,); of no length, r is nothing."""
+    """Delta (b . u) = Delta/L r . (u + e x u_theta) of the members from one place on, in vectors; 0 of no length.
+
+    seen: r, L^2 and 1/L of the members.
+    moved: 2 u and u^2 of their columns (`moved_columns`).
+    along (4,): of a row, e and then u + e x u_theta.
+    l0: free lengths (m).
+    excess (rows width,): L0^2 - l0^2 (m^2).
+    at: the first place in `excess`.
+    close: whether bodies have hardly moved, so that u < r and elongations come from displacements.
+    """
     return _stretch(seen, moved, l0, excess, at, close) * seen[3] * (seen[0] * along[2] + seen[1] * along[3])
 
 
 @part
 def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, u, weight, room, turned, out):
-    """Add sum_j f_i (b_i . u_j) and sum_e weight_e V_i of each spring to out: f, b at the first poses, V at the others.
+    """Add sum_j f (b . u_j) and sum_e weight_e V of each member of a grid: f, b at the first poses, V at the others.
 
-    pose (poses, POSE), close (poses,) of `spring.hardly_moved`, u (m, 3), weight (poses - m,). Room: room (rows,
-    poses, 4); turned (poses, 5, lanes) for a, 2 u and u^2 (`moved_columns`).
+    In:
+      px, py, qx, qy (rows width,): points P and Q in the frames of their bodies (m).
+      l0, excess (rows width,): free lengths (m) and L0^2 - l0^2 (m^2).
+      k (rows width,): stiffness at alpha = 1 (N/m).
+      width: places in a row.
+      first, last: the columns from first to before last are meant.
+      pose (poses, POSE): relative poses.
+      close (poses,): whether elongations come from displacements there (`spring.hardly_moved`).
+      u (m, 3): virtual changes of the first poses.
+      weight (poses - m,): of the energies at the others.
+    Out:
+      out (rows width,): added to.
+    Room:
+      room (rows, poses, 4): for e, and u + e x u_theta.
+      turned (poses, 5, lanes): for a, 2 u and u^2 (`moved_columns`).
     """
     rows = room.shape[0]
     many = u.shape[0]
@@ -289,7 +379,14 @@ def grid_design(px, py, qx, qy, l0, excess, k, width, first, last, pose, close, 
 
 @kernel
 def grid_shortest(px, py, qx, qy, width, dx, dy, c, s):
-    """Smallest length in whole rows, m."""
+    """Smallest length in whole rows of a grid (m).
+
+    px, py (rows width,): points P in the frame of the first body (m).
+    qx, qy (width or more,): points Q of the columns in that of the second (m).
+    width: places in a row.
+    dx, dy: d of the relative pose (m).
+    c, s: cosine and sine of theta.
+    """
     found = zero() - np.inf
     for i in range(0, width, lanes()):
         ax, ay = turned_columns(qx, qy, i, c, s)

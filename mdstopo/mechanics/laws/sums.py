@@ -6,7 +6,12 @@ from mdstopo.compiler.vector import total
 
 @part
 def upper_triangle(xx, xy, yy, xt, yt, tt, w, wx, wy):
-    """xx, xy, yy, xt, yt, tt of K from vectors: their own sums, and those of w and w a, alike for all laws."""
+    """xx, xy, yy, xt, yt, tt of K, summed from vectors.
+
+    xx, xy, yy, xt, yt, tt: the entries without what is alike in all laws.
+    w: sum of f/L (N/m).
+    wx, wy: sum of that times a = R q (N).
+    """
     whole = total(w)
     return (
         total(xx) + whole,

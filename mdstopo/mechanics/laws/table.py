@@ -64,18 +64,54 @@ for _law in LAWS.values():
 
 @chosen(LISTED, lambda each: each.force, inline)
 def law(code, p, x, xd, mode, t, value, curves):
-    """f, f_x, f_xd, V, V_x."""
+    """Force of a member by its law, its slopes, and the energy that it stores.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    value: present force of a law whose force is given over time (N).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+
+    Returns f (N), f_x (N/m), f_xd (N s/m), V (J), V_x (N); NaN for inertial laws.
+    """
     return np.nan, np.nan, np.nan, np.nan, np.nan  # inertial laws have no place here
 
 
 @chosen(LISTED, lambda each: each.slopes, inline)
 def _own_slopes(code, p, place, x, xd, mode, t, value, curves):
+    """Slopes of force and energy by a parameter in the row of a law.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    place: of the parameter in p.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    value: present force of a law whose force is given over time (N).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+
+    Returns df/dp, dV/dp; NaN where no parameter may vary.
+    """
     return np.nan, np.nan
 
 
 @inline
 def law_slopes(code, p, place, x, xd, mode, t, value, curves):
-    """df/dp, dV/dp by the parameter at a place of the law's row, or by the free length; not of inertial laws."""
+    """Slopes of force and energy by a parameter of a law, or by the free length; not of inertial laws.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    place: of the parameter in p, or FREE_LENGTH.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    value: present force of a law whose force is given over time (N).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+
+    Returns df/dp, dV/dp.
+    """
     if place == FREE_LENGTH:
         _, f_x, _, _, pull = law(code, p, x, xd, mode, t, value, curves)
         return -f_x, -pull
@@ -111,24 +147,55 @@ def law_has_pieces(code):
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin, inline)
 def law_margin(code, p, x, xd, mode, curves):
-    """How far the mode is from its end; infinite where a law has one mode only."""
+    """How far the mode is from its end; infinite where a law has one mode only.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    """
     return np.inf
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin_slopes, inline)
 def law_margin_slopes(code, p, x, xd, mode, curves):
-    """Slopes of the margin by x and xd."""
+    """Slopes of the margin by x and xd; zero where a law has one mode only.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    """
     return 0.0, 0.0
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin_slope, inline)
 def _own_margin_slope(code, p, place, x, xd, mode, curves):
+    """Slope of the margin by a parameter in the row of a law; zero where it is in no margin.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    place: of the parameter in p.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    """
     return 0.0
 
 
 @inline
 def law_margin_slope(code, p, place, x, xd, mode, curves):
-    """Slope of the margin by the parameter at a place of the law's row, or by the free length."""
+    """Slope of the margin by a parameter of a law, or by the free length.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    place: of the parameter in p, or FREE_LENGTH.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    """
     if place == FREE_LENGTH:
         by_x, _ = law_margin_slopes(code, p, x, xd, mode, curves)
         return -by_x
@@ -137,13 +204,28 @@ def law_margin_slope(code, p, place, x, xd, mode, curves):
 
 @chosen(LISTED, lambda each: each.modes and each.modes.next_mode, inline)
 def law_next(code, p, x, xd, xdd, mode, curves):
-    """The mode to go to where the margin is used up."""
+    """The mode to go to where the margin is used up; the same one where a law has no other.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    xdd: d2Delta/dt2 (m/s^2).
+    mode: that the member is in; 0 for laws that do not switch.
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    """
     return mode
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.first_mode, inline)
 def law_start(code, p, x, xd, xdd, curves):
-    """The mode at the start of the motion."""
+    """The mode at the start of the motion; 0 for laws that do not switch.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    xdd: d2Delta/dt2 (m/s^2).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    """
     return 0
 
 
@@ -198,7 +280,15 @@ def law_set_slope(code, p, place):
 
 @chosen(LISTED, lambda each: each.permanent_set and each.permanent_set.divides, inline)
 def law_divides(code, p, x, xd, mode, near):
-    """Whether a member begins, within `near` m, with a permanent set that depends on parameters on one side only."""
+    """Whether a member begins, within `near`, with a permanent set that depends on parameters on one side only.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+
+    near: how near in elongation (m).
+    """
     return False
 
 
