@@ -162,10 +162,18 @@ def _matrix(rows: Bundle) -> Floats:
 def subproblem(
     bundle: Bundle, x: Floats, space: FeasibleSet, box: tuple[Floats, Floats], penalty: Floats, curvature: Curvature
 ) -> Trial:
-    """Solve the model in the box (lower, upper) of designs around x (N,).
+    """Solve the model of the rows in a box around the iterate.
 
-    penalty (J,): of the constraints' violations; curvature: B. Fixed variables and linear rows without a free one are
-    left out; the trial keeps box and linear rows to rounding.
+    Constant:
+      space: bounds, linear rows and ranges of the designs.
+    In:
+      bundle: the K rows that are known, seen from x.
+      x (N,): the iterate.
+      box: the lower and the upper end of the box, designs (N,).
+      penalty (J,): what a violation of each constraint costs.
+      curvature: B, the matrix of the quadratic term.
+
+    Fixed variables and linear rows without a free one are left out; the trial keeps box and linear rows to rounding.
     """
     lower, upper = box[0] - x, box[1] - x
     free = upper > lower
@@ -265,7 +273,17 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepe
 def residual_of(
     lines: Bundle, multipliers: Floats, linear: Floats, x: Floats, space: FeasibleSet, steepest: float
 ) -> float:
-    """The residual with given multipliers of the rows (K,) and the linear rows (m,); see `residual`."""
+    """The KKT residual with given multipliers; `residual` says what it is.
+
+    Constant:
+      space: bounds and linear rows of the designs.
+    In:
+      lines: the iterate's K rows, as lines.
+      multipliers (K,): of these rows.
+      linear (m,): multipliers of the linear rows.
+      x (N,): the iterate.
+      steepest: the largest gradient entry, which the residual is relative to.
+    """
     gradient = (multipliers @ _matrix(lines) + linear @ space.linear.A) / steepest
     moved = float(np.abs(x - np.clip(x - gradient, space.lower, space.upper)).max(initial=0.0))
     values = lines.values()

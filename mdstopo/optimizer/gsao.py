@@ -195,7 +195,15 @@ class Gsao:
     def _finish(
         self, state: State, sample: Sample, design: Floats, change: float, accepted: bool, began: float
     ) -> State:
-        """Write the history's row and look at the stops."""
+        """Write the evaluated design into the history and say whether the run ends. Returns the state.
+
+        state: after the iteration; changed here.
+        sample: what was found at the design.
+        design (N,): the one that was evaluated.
+        change: its largest |change of alpha| against the iterate that the step started from.
+        accepted: whether it was taken as the iterate.
+        began: when the iteration began, by the driver's clock (s).
+        """
         state.seconds += self.clock() - began
         state.history = state.history.extended(
             sample,

@@ -33,10 +33,20 @@ OBJECTIVE, ELASTIC, LIMIT, EQUAL = 0, 1, 2, 3
 def _terms(
     step: Floats, sign: float, reach: Floats, power: float, value: Floats, first: Floats, second: Floats, room: Ints
 ) -> None:  # fmt: skip
-    """Unit terms whose shifts lie `reach` away, after steps `sign * step` away from them (> -reach).
+    """Unit terms of the approximation after steps away from where it was made.
 
-    Fills the primitive and the first derivative t^(xi-1), t = 1 + sign step/reach, with respect to step, and
-    the size of the second.
+    In:
+      step (n,): steps of the variables, with sign * step > -reach.
+      sign: 1 where the shifts lie below the variables, -1 where they lie above.
+      reach (n,): distances of the shifts.
+      power: the exponent xi.
+    Out:
+      value (n,): the primitive of the first derivative, 0 at no step.
+      first (n,): the derivative by the step, t^(xi-1) with t = 1 + sign step/reach.
+      second (n,): the size of the second derivative.
+      room (3, n): overwritten.
+
+    Arrays that are filled may be longer.
     """
     n = len(step)
     if power == 1.0:
@@ -67,7 +77,18 @@ def _terms(
 def _function_row(
     f: Floats, weight: float, low: Floats, high: Floats, jacobian: Floats, gradient: Floats, diagonal: Floats
 ) -> float:
-    """Add one function row with its multiplier; fills its derivatives and returns its change."""
+    """Add a function row, times its multiplier, to the gradient and the diagonal of the Lagrangian.
+
+    In:
+      f (n,): the row's slopes at the iterate.
+      weight: its multiplier.
+      low, high (3, n): primitive, first and size of the second derivative of the terms with shifts below and above.
+    Out:
+      jacobian (n,): the row's derivatives.
+      gradient, diagonal (n,): weight times its first and second derivatives, added to.
+
+    Only n entries are used where arrays are longer. Returns the change of the row.
+    """
     total = 0.0
     for i in range(len(f)):
         falling = min(f[i], 0.0)
@@ -118,10 +139,23 @@ def expand(
 ) -> tuple[float, float]:
     """Rows, Jacobian, diagonal, Schur complement and the predictor's right side at the current point.
 
-    frame: (4, N) the iterate, the distances of its shifts below and above, kappa. Fills B[:R], work (rho is
-    minus the gradient of the Lagrangian without the bounds' part), S (K, K) = B D^-1 B^T, rhs (K,) = B D^-1
-    rho, values (K,): the change of the function rows and A v. Returns the sum of the bounds' complementarity
-    products and the largest entry of the dual residual.
+    Constant:
+      F (R, N): slopes of the function rows at the iterate.
+      frame (4, N): the iterate, the distances of its shifts below and above, kappa.
+      power: the exponent xi.
+      linear_above: whether terms with shifts above are linear.
+    In:
+      dual (K,): multipliers of the rows.
+      bounds (4, N): distances to the bounds and their multipliers.
+    Out:
+      B (K, N): B[:R], the Jacobian of the function rows; the linear rows in B[R:] are read.
+      work (5, N): D^-1; rho, minus the gradient of the Lagrangian without the bounds' part; the targets of the bounds'
+        complementarity, minus their multipliers. The row of steps is left alone.
+      S (K, K): B D^-1 B^T.
+      rhs (K,): B D^-1 rho.
+      values (K,): the change of the function rows, and A v of the linear ones.
+
+    Returns the sum of the bounds' complementarity products and the largest entry of the dual residual.
     """
     R, N = F.shape
     K = B.shape[0]
@@ -283,7 +317,17 @@ def eliminate(matrix: Floats, right: Floats, solution: Floats) -> bool:
 
 @member_kernel
 def _rows_right(kind: Ints, rhs: Floats, miss: Floats, rows: Floats, aims: Floats, rz: float, right: Floats) -> None:
-    """The right side of the rows' system for the present targets."""
+    """The right side of the system for the steps of the rows' multipliers and of z, for the present targets.
+
+    In:
+      kind (K,): what each row is, OBJECTIVE, ELASTIC, LIMIT or EQUAL.
+      rhs (K,): B D^-1 rho.
+      miss (K,): residuals of the rows, their slacks included.
+      rows (6, K), aims (4, K): as the module has them; of `aims` the first two.
+      rz: residual of the condition that multipliers of the objective's rows add up to 1.
+    Out:
+      right (K + 1,): the right side, that of z last.
+    """
     for a in range(len(kind)):
         right[a] = rhs[a] + miss[a] + aims[0, a]
         if kind[a] == ELASTIC:
@@ -337,14 +381,27 @@ def interior_loop(
     gap: float,
     residual: float,
 ) -> tuple[int, bool]:
-    """Mehrotra's predictor and corrector, from the point in `bounds` and the multipliers in `rows`, which it
-    moves.
+    """Mehrotra's predictor and corrector, from the point in `bounds` and the multipliers in `rows`.
 
-    F: (R, N) slopes of the function rows at the iterate. B: (K, N) with the linear rows in B[R:]; B[:R] is
-    filled here. kind: (K,) what each row is: OBJECTIVE (f - z <= 0), ELASTIC (f - e <= 0), LIMIT or EQUAL.
-    offsets: (K,) the value of a function row at the iterate, -b of a linear one. frame: as for `expand`. mu:
-    complementarity to start the slacks from. Stops when the mean complementarity product is at most `gap` and
-    every residual at most `residual`. Returns the steps taken and whether it stopped so.
+    Constant:
+      F (R, N): slopes of the function rows at the iterate.
+      offsets (K,): the value of a function row at the iterate, -b of a linear one.
+      kind (K,): what each row is: OBJECTIVE (f - z <= 0), ELASTIC (f - e <= 0), LIMIT or EQUAL.
+      frame (4, N): the iterate, the distances of its shifts below and above, kappa.
+      power: the exponent xi.
+      linear_above: whether terms with shifts above are linear.
+    In:
+      mu: complementarity to start the slacks from.
+      max_steps: steps after which it gives up.
+      gap, residual: it stops when the mean complementarity product is at most `gap` and every residual at most
+        `residual`.
+    Out:
+      B (K, N): B[:R], the Jacobian of the function rows; the linear rows in B[R:] are read.
+      bounds (4, N): distances to the bounds and their multipliers, moved to the last point.
+      rows (6, K): multipliers, moved from those given; slacks and elastic variables with their multipliers, which are
+        started here; penalties and sizes are read.
+
+    Returns the steps taken and whether it stopped as it should.
     """
     K, N = B.shape
     work = np.empty((5, N))

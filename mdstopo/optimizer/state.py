@@ -55,8 +55,16 @@ class History:
         kkt: float,
         accepted: bool,
     ) -> "History":
-        """This history and one row more; the receiver stays as it is. Where the sample failed its values are
-        NaN."""
+        """This history and one row more; this one stays as it is. Where the sample failed its values are NaN.
+
+        sample: what was found at the evaluated design.
+        constraints (m,): A x - b of the linear rows there.
+        change: largest |change of alpha| against the iterate that the step started from.
+        evaluations: so far.
+        seconds: wall time so far (s).
+        kkt: projected KKT residual at the iterate, relative to the largest |dU/dalpha|.
+        accepted: whether the design was taken as the iterate.
+        """
         ok = sample.status is Status.OK
         nonlinear = sample.constraint_levels
         if not ok:

@@ -205,7 +205,14 @@ def propose(state: State, chosen: Indices, measures: Measures, settings: Setting
 
 
 def _decides(state: State, chosen: Indices, trial: Floats, lower: Floats, upper: Floats, power: float) -> bool:
-    """Whether no other row is higher than the first of `chosen` at the trial, and no limit is violated there."""
+    """Whether one row decides the step: no other row is higher than it at the trial, and no limit is violated there.
+
+    state: the iterate with its rows, cuts and constraint rows.
+    chosen (k,): places of the competing rows; the first of them is the one that the trial minimises.
+    trial (N,): the design.
+    lower, upper (N,): bounds, or a piece of them where their numbers are all alike.
+    power: the exponent xi of the approximation.
+    """
     n = len(trial)
     if len(chosen) + len(state.cuts) + len(state.constraint_rows) == 1:
         return True

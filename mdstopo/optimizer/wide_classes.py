@@ -28,7 +28,18 @@ INSIDE, BEYOND = 0, 1
 def _boxes(
     x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats, low: Floats, high: Floats, h: Floats
 ) -> None:
-    """The box's ends, relative to x, and h."""
+    """The ends of the box in which the step of each variable has to stay, and its curvature.
+
+    In:
+      x (n,): the iterate.
+      lower, upper, unit (n,): bounds and ranges.
+      limits (5,): trust box in ranges; longest step; h; whether h is over the range's square; the doubt, not used.
+    Out:
+      low, high (n,): ends of the box, relative to x; low <= 0 <= high.
+      h (n,): the curvature.
+
+    Only n entries are used where arrays are longer.
+    """
     trust, longest, own, scaled = limits[TRUST], limits[LONGEST], limits[H], limits[SCALED]
     for i in range(len(x)):
         reach = min(longest, trust * unit[i])
@@ -41,7 +52,17 @@ def _boxes(
 def _weighted(
     pool: Floats, rows: Ints, theta: Floats, spread: Floats, start: int, stop: int, r: Floats, size: Floats
 ) -> None:  # fmt: skip
-    """r = sum_k theta_k Q_k, and the sum of spread_k |Q_k|."""
+    """Two weighted sums of rows over some variables: sum_k theta_k Q_k and sum_k spread_k |Q_k|.
+
+    In:
+      pool (S, N): all rows.
+      rows (R,): which of them are Q.
+      theta, spread (R,): the weights of the two sums.
+      start, stop: the variables from start to stop - 1.
+    Out:
+      r (stop - start,): sum_k theta_k Q_k; may be longer.
+      size (stop - start,): sum_k spread_k |Q_k|; may be longer.
+    """
     for i in range(stop - start):
         r[i] = 0.0
         size[i] = 0.0
@@ -59,11 +80,24 @@ def sort(
     pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
     limits: Floats, threads: int, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
-    """Say of all variables what they do; `classes` (2, N). spread (R,): by how much multipliers are not known, times
-    1/doubt.
+    """Say of each variable whether multipliers send it to an end of its box or into it, or leave that in doubt.
 
-    found (N,): from each piece's place on those in doubt, counts (pieces,) how many. sums (R,): Q d over the variables
-    at an end of their box; products (R, R): Q diag(1/h) Q' over those inside.
+    Constant:
+      pool (S, N): all rows.
+      rows (R,): which of them are Q.
+      lower, upper, unit (N,): bounds and ranges, or the first few of them where all are alike.
+      limits (5,): trust box in ranges; longest step; h; whether h is over the range's square; the doubt.
+    In:
+      theta (R,): multipliers of the rows.
+      spread (R,): by how much they may be wrong, divided by the doubt.
+      x (N,): the iterate.
+      threads: how many work.
+    Out:
+      classes (2, N): what each variable does, as `INSIDE` and `BEYOND` have it.
+      found (N,): from each piece's place on, its variables in doubt.
+      counts (pieces,): how many these are.
+      sums (R,): Q d over the variables at an end of their box, d their steps.
+      products (R, R): Q diag(1/h) Q' over those inside.
     """
     R = len(rows)
     count = pieces(len(x))
@@ -88,6 +122,25 @@ def _sorted(
     counter: Ints, pool: Floats, rows: Ints, theta: Floats, spread: Floats, x: Floats, lower: Floats, upper: Floats,
     unit: Floats, limits: Floats, classes: Bools, found: Ints, counts: Ints, sums: Floats, products: Floats,
 ) -> None:  # fmt: skip
+    """What `sort` does with the pieces of variables that this thread takes.
+
+    Constant:
+      pool (S, N): all rows.
+      rows (R,): which of them are Q.
+      lower, upper, unit (N,): bounds and ranges, or the first few of them where all are alike.
+      limits (5,): trust box in ranges; longest step; h; whether h is over the range's square; the doubt.
+    In:
+      theta (R,): multipliers of the rows.
+      spread (R,): by how much they may be wrong, divided by the doubt.
+      x (N,): the iterate.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      classes (2, N): what each variable does, as `INSIDE` and `BEYOND` have it.
+      found (N,): from each piece's place on, its variables in doubt.
+      counts (pieces,): how many these are.
+      sums (pieces, R): of each piece, Q d over the variables at an end of their box, added to.
+      products (pieces, R, R): of each piece, Q diag(1/h) Q' over those inside, added to.
+    """
     N = len(x)
     low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
     which, columns = np.empty(BLOCK, dtype=np.int64), np.empty((len(rows), BLOCK))
@@ -145,9 +198,25 @@ def finish(
     pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats, limits: Floats,
     threads: int, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
 ) -> float:  # fmt: skip
-    """Where all variables go, into `trial`, which has those in doubt already; sums (R,): Q d.
+    """Move all variables to where the final multipliers send them, and find those that do not do what was assumed.
 
-    found, counts: as of `sort`, of those whose class is another than `classes` say. Returns sum_i h_i d_i^2.
+    Constant:
+      pool (S, N): all rows.
+      rows (R,): which of them are Q.
+      lower, upper, unit (N,): bounds and ranges, or the first few of them where all are alike.
+      limits (5,): trust box in ranges; longest step; h; whether h is over the range's square; the doubt, not used.
+    In:
+      theta (R,): multipliers of the rows.
+      x (N,): the iterate.
+      threads: how many work.
+      classes (2, N): what each variable was assumed to do, as `INSIDE` and `BEYOND` have it.
+    Out:
+      trial (N,): the designs; that of variables in doubt is read, not changed.
+      found (N,): from each piece's place on, its variables that do something else than `classes` say.
+      counts (pieces,): how many these are.
+      sums (R,): Q d, d the steps.
+
+    Returns sum_i h_i d_i^2.
     """
     count = pieces(len(x))
     every = np.zeros((count, len(rows) + 1))
@@ -170,6 +239,24 @@ def _finished(
     counter: Ints, pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: Floats,
     limits: Floats, classes: Bools, trial: Floats, found: Ints, counts: Ints, sums: Floats,
 ) -> None:  # fmt: skip
+    """What `finish` does with the pieces of variables that this thread takes.
+
+    Constant:
+      pool (S, N): all rows.
+      rows (R,): which of them are Q.
+      lower, upper, unit (N,): bounds and ranges, or the first few of them where all are alike.
+      limits (5,): trust box in ranges; longest step; h; whether h is over the range's square; the doubt, not used.
+    In:
+      theta (R,): multipliers of the rows.
+      x (N,): the iterate.
+      classes (2, N): what each variable was assumed to do, as `INSIDE` and `BEYOND` have it.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      trial (N,): the designs; that of variables in doubt is read, not changed.
+      found (N,): from each piece's place on, its variables that do something else than `classes` say.
+      counts (pieces,): how many these are.
+      sums (pieces, R + 1): of each piece, Q d and sum_i h_i d_i^2, added to.
+    """
     N, R = len(x), len(rows)
     low, high, h, r, size = np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK), np.empty(BLOCK)
     spread = np.abs(theta)
@@ -216,7 +303,16 @@ def _finished(
 def projected(
     pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, steepest: float, threads: int
 ) -> float:
-    """max |x - clip(x - Q' theta / steepest)|: what a step along the Lagrangian's negative gradient moves."""
+    """max |x - clip(x - Q' theta / steepest)|: what a step along the Lagrangian's negative gradient moves.
+
+    pool (S, N): all rows.
+    rows (R,): which of them are Q.
+    theta (R,): their multipliers.
+    x (N,): the iterate.
+    lower, upper (N,): bounds, or the first few of them where all are alike.
+    steepest: the largest gradient entry.
+    threads: how many work.
+    """
     most = np.zeros(pieces(len(x)))
     counter = np.zeros(1, np.int64)
     shared(_projected, threads, (counter, pool, rows, theta, x, lower, upper, 1.0 / steepest, most))
@@ -231,6 +327,20 @@ def _projected(
     counter: Ints, pool: Floats, rows: Ints, theta: Floats, x: Floats, lower: Floats, upper: Floats, unit: float,
     most: Floats,
 ) -> None:  # fmt: skip
+    """What `projected` does with the pieces of variables that this thread takes.
+
+    Constant:
+      pool (S, N): all rows.
+      rows (R,): which of them are Q.
+      lower, upper (N,): bounds, or the first few of them where all are alike.
+    In:
+      theta (R,): multipliers of the rows.
+      x (N,): the iterate.
+      unit: what the gradient is multiplied by, 1 over its largest entry.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      most (pieces,): of each piece, the largest |x - clip(x - unit Q' theta)|; 0 before.
+    """
     N = len(x)
     r, size = np.empty(BLOCK), np.empty(BLOCK)
     piece = taken(counter)
@@ -247,7 +357,17 @@ def _projected(
 
 @vector_entry
 def gram(pool: Floats, rows: Ints, unit: Floats, threads: int, plain: Floats, scaled: Floats) -> None:
-    """The products (R, R) of rows: plain, and weighted with the ranges' squares."""
+    """The products of rows with each other, plain and weighted with the ranges' squares.
+
+    In:
+      pool (S, N): all rows.
+      rows (R,): which of them are multiplied.
+      unit (N,): ranges, or the first few of them where all are alike.
+      threads: how many work.
+    Out:
+      plain (R, R): Q Q'.
+      scaled (R, R): Q diag(unit^2) Q'.
+    """
     R = len(rows)
     count = pieces(pool.shape[1])
     every = np.zeros((count, 2, R, R))
@@ -306,7 +426,18 @@ def _combined(counter: Ints, pool: Floats, rows: Ints, theta: Floats, out: Float
 
 @vector_entry
 def lengths(x: Floats, y: Floats, unit: Floats, threads: int, step: Floats, over: Floats) -> tuple[float, float]:
-    """step = y - x and step over the range's square; its largest size in ranges, and its length in ranges."""
+    """A step, the step over the range's square, and how long it is.
+
+    In:
+      x, y (N,): the designs from which and to which it leads.
+      unit (N,): ranges, or the first few of them where all are alike.
+      threads: how many work.
+    Out:
+      step (N,): y - x.
+      over (N,): (y - x) / unit^2.
+
+    Returns the largest size of an entry and the Euclidean length, both in ranges.
+    """
     count = pieces(len(x))
     every = np.zeros((count, 2))
     counter = np.zeros(1, np.int64)
@@ -320,6 +451,17 @@ def lengths(x: Floats, y: Floats, unit: Floats, threads: int, step: Floats, over
 
 @kernel
 def _lengths(counter: Ints, x: Floats, y: Floats, unit: Floats, step: Floats, over: Floats, every: Floats) -> None:
+    """What `lengths` does with the pieces of variables that this thread takes.
+
+    In:
+      x, y (N,): the designs from which and to which the step leads.
+      unit (N,): ranges, or the first few of them where all are alike.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      step (N,): y - x.
+      over (N,): (y - x) / unit^2.
+      every (pieces, 2): of each piece, the largest size of an entry and the sum of squares, in ranges.
+    """
     N = len(x)
     piece = taken(counter)
     while piece < len(every):

@@ -31,9 +31,22 @@ def _expand(
     Q: Floats, theta: Floats, frame: Floats, v: Floats, bounds: Floats, work: Floats, S: Floats, rhs: Floats,
     values: Floats,
 ) -> tuple[float, float]:  # fmt: skip
-    """Rows Q v, the Schur complement Q D^-1 Q', the predictor's right side Q D^-1 rho; rho and D^-1 go into `work`.
+    """Rows Q v, the Schur complement and the predictor's right side at the current point.
 
-    frame: (2, n) c and h. Returns the sum of the bounds' products and the largest entry of the dual residual.
+    Constant:
+      Q (R, n): the rows.
+      frame (2, n): c and h of the quadratic terms.
+    In:
+      theta (R,): multipliers of the rows.
+      v (n,): the variables.
+      bounds (4, n): distances to the bounds and their multipliers.
+    Out:
+      work (5, n): D^-1, rho, and minus the bounds' multipliers, as in `kernels`; the row of steps is left alone.
+      S (R, R): Q D^-1 Q'.
+      rhs (R,): Q D^-1 rho.
+      values (R,): Q v.
+
+    Returns the sum of the bounds' complementarity products and the largest entry of the dual residual.
     """
     R, n = Q.shape
     S.fill(0.0)
@@ -94,7 +107,21 @@ def _refined(matrix: Floats, right: Floats, scale: Floats, out: Floats, room: Fl
 def _rows_direct(
     kind: Ints, group: Ints, change: Floats, rows: Floats, levels: Floats, aims: Floats, level_aims: Floats
 ) -> tuple[float, float, float, float, float]:
-    """The steps of slacks and elastic variables for the steps `change` of multipliers and levels; as `direct`."""
+    """The steps of slacks and of the levels' multipliers, for the steps of the rows' multipliers and of the levels.
+
+    Constant:
+      kind (R,): what each row is, LINE, LIMIT, EQUAL or CURVED.
+      group (R,): whose line each is; not used.
+    In:
+      change (R + J + 1,): steps of the rows' multipliers, then of the levels e.
+      rows (2, R): slacks and multipliers.
+      levels (2, J + 1): the levels e and their multipliers.
+    Out:
+      aims (2, R): targets of the slacks, which are read, and the slacks' steps.
+      level_aims (2, J + 1): targets of the levels' multipliers, which are read, and these multipliers' steps.
+
+    Returns the largest -dw/w and -dz/z (w a slack or a level, z its multiplier), and the sums of z dw, w dz and dw dz.
+    """
     R = len(kind)
     primal, multiplier, zdw, wdz, dwdz = 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(R):
@@ -126,13 +153,26 @@ def interior(
     Q: Floats, f: Floats, kind: Ints, group: Ints, M: Floats, frame: Floats, bounded: int, penalty: Floats,
     size: Floats, v: Floats, bounds: Floats, rows: Floats, levels: Floats, settings: Floats,
 ) -> tuple[int, float, float]:  # fmt: skip
-    """Solve the program from v (n,), whose first `bounded` are in [0, 1], and multipliers rows[1].
+    """Solve the program from a point inside; what moves ends at the best point that was met.
 
-    Q (R, n); f, kind, group (R,); M (R, R), 0 but of rows of the curvature; frame (2, n): c and h; penalty (J + 1,), of
-    the objective 1, or 0 where it has no rows; size (R,): what residuals of rows are relative to. bounds (4, n) as
-    in `kernels`, rows (2, R): slacks and multipliers, levels (2, J + 1): e and its multiplier. settings: mean product
-    and residual to be reached, most steps. Moves v, bounds, rows and levels to the best point. Returns steps, mean
-    product and largest residual.
+    Constant:
+      Q (R, n): the rows.
+      f (R,): what is added to Q v.
+      kind (R,): what each row is, LINE, LIMIT, EQUAL or CURVED.
+      group (R,): the group of each line.
+      M (R, R): 0 but of rows of the curvature.
+      frame (2, n): c and h of the quadratic terms.
+      bounded: how many of the variables, the first ones, are in [0, 1].
+      penalty (J + 1,): of the objective 1, or 0 where it has no rows, then of the constraints.
+      size (R,): what residuals of rows are relative to.
+      settings (3,): mean complementarity product and residual to be reached, most steps.
+    Out, moved from where they start to the best point:
+      v (n,): the variables.
+      bounds (4, n): distances to the bounds and their multipliers, as in `kernels`.
+      rows (2, R): slacks and multipliers.
+      levels (2, J + 1): the levels e and their multipliers.
+
+    Returns steps, mean product and largest residual.
     """
     R, n = Q.shape
     G = levels.shape[1]
