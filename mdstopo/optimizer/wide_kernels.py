@@ -53,10 +53,24 @@ def _estimate(
     gap: float, near: float, guess: float, far: float, stride: int, slots: Floats, place: Ints, x: Floats, room: Floats,
     whole: Ints,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """A bracket within [near, far] that probably holds the multiplier, the likeliest in its middle, from every
-    stride-th variable.
+    """A bracket that probably holds the volume row's multiplier, from a sample of the variables.
 
-    gap: b - a x at the iterate. Of variables that rest for all multipliers in [near, far] nothing more is asked.
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost, lower, upper (N,): coefficients of the volume row and bounds, or the first few of them where all are alike.
+      shift (N,): distances of the shifts, in ranges.
+      limits (5,): exponent xi; longest step; trust box in ranges; share of a shift's distance; kappa times range.
+    In:
+      alpha (N,): the iterate.
+      gap: b - a x there.
+      near, guess, far: the multiplier is in [near, far], likely at guess. Nothing more is asked of variables that rest
+        for all multipliers in between.
+      stride: the sample is every stride-th variable.
+    Out, all overwritten:
+      slots (SLOTS, N), place (N,), x (N,): in the first columns, the variables of the sample that do not rest.
+      room (ROOM, ROW), whole (WHOLE, ROW): numbers and integers to work with.
+
+    Returns the lower end, the likeliest multiplier and the upper end.
     """
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
     N = len(alpha)
@@ -101,12 +115,32 @@ def wide_minimum(
     bound: float, at_iterate: float, equal: bool, steepest: float, stride: int, rounding: float, threads: int,
     out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints, x: Floats,
 ) -> tuple[float, float, float, float, float, float, float, int]:  # fmt: skip
-    """Minimise one row in its box under a x <= bound or = bound.
+    """Minimise the approximation of one row in its box under a x <= bound or a x = bound.
 
-    limits: power, move limit, trust, share of the shifts' distance, convex term over the range's unit. at_iterate: a x
-    of the iterate. steepest: the unit of the residual. out (N,): the minimiser. slots, place, found, x: room for N;
-    counts (2, pieces). Returns the multiplier, what is left of the row, the size of its sums, the change of the model,
-    what `measure` finds, and how many columns of `slots` and `place` hold variables that may still be touched up.
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost (N,): a, or the first few of its numbers where all are alike.
+      shift (N,): distances of the shifts, in ranges.
+      lower, upper (N,): bounds, or the first few of them where all are alike.
+      limits (5,): the exponent xi; the longest step; the trust box in ranges; the share of a shift's distance that a
+        step may go; what over the range gives kappa of the convex term.
+      bound: b of the volume row.
+      equal: whether it is an equality.
+    In:
+      alpha (N,): the iterate.
+      at_iterate: a x there.
+      steepest: the largest gradient entry, unit of the residual.
+      stride: every how many variables one is in the sample.
+      rounding: what may be left of the row.
+      threads: how many work.
+    Out:
+      out (N,): the minimiser.
+      slots (SLOTS, N), place (N,), x (N,): the variables that were not decided at once, in the first columns.
+      found (N,): from each piece's place on, who does not rest, as `measure` tells it.
+      counts (2, pieces): how many of each piece were in doubt, and how many do not rest.
+
+    Returns the multiplier, what is left of the row, the size of its sums, the change of the model, what `measure`
+    finds, and how many columns of `slots` and `place` hold variables that may still be touched up.
     """
     power = limits[0]
     room, whole = np.empty((ROOM, ROW)), np.empty((WHOLE, ROW), dtype=np.int64)
@@ -162,7 +196,17 @@ def wide_minimum(
 def wide_rows(
     slopes: Floats, alpha: Floats, trial: Floats, shift: Floats, lower: Floats, upper: Floats, power: float, out: Floats
 ) -> None:
-    """out (R,): what the approximations of rows with these slopes (R, N) change from alpha to the trial."""
+    """What the approximations of rows change from the iterate to the trial.
+
+    In:
+      slopes (R, N): the rows' gradients at the iterate.
+      alpha, trial (N,): the two designs.
+      shift (N,): distances of the shifts, in ranges.
+      lower, upper (N,): bounds, or the first few of them where all are alike.
+      power: the exponent xi.
+    Out:
+      out (R,): the changes, added to.
+    """
     room, whole = np.empty((4, ROW)), np.empty((3, ROW), dtype=np.int64)
     reach, z, falling, rising = room[0], room[1], room[2], room[3]
     for start in range(0, len(alpha), BLOCK):

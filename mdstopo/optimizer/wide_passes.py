@@ -36,9 +36,16 @@ def wide_shift(
     shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, rule: Floats, threads: int,
     shifts: Floats,
 ) -> None:  # fmt: skip
-    """The new `shifts` after the step from alpha to the trial, which followed the one from `before` to `last`.
+    """Adapt the distances of the shifts after a step: larger where it goes on as the last one, smaller where it turns.
 
-    rule: factors where the steps agree and oppose each other, smallest and largest shift.
+    In:
+      shift (N,): the distances so far, in ranges.
+      last, before (N,): the designs to which and from which the last step led.
+      trial, alpha (N,): those of this step.
+      rule (4,): factors where the steps agree and oppose each other, smallest and largest distance.
+      threads: how many work.
+    Out:
+      shifts (N,): the new distances.
     """
     counter = np.zeros(1, np.int64)
     shared(_shifted, threads, (counter, shift, last, before, trial, alpha, rule, shifts))
@@ -49,6 +56,17 @@ def _shifted(
     counter: Ints, shift: Floats, last: Floats, before: Floats, trial: Floats, alpha: Floats, rule: Floats,
     shifts: Floats,
 ) -> None:  # fmt: skip
+    """What `wide_shift` does with the pieces of variables that this thread takes.
+
+    In:
+      shift (N,): the distances so far, in ranges.
+      last, before (N,): the designs to which and from which the last step led.
+      trial, alpha (N,): those of this step.
+      rule (4,): factors where the steps agree and oppose each other, smallest and largest distance.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      shifts (N,): the new distances.
+    """
     grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
     piece = taken(counter)
     while piece * PIECE < len(shift):
@@ -67,11 +85,19 @@ def wide_shift_few(
     shift: Floats, moves: Ints, counts: Ints, signs_before: Ints, signs: Ints, known: bool, rule: Floats, places: Ints,
     before: Floats, count: Ints,
 ) -> None:  # fmt: skip
-    """As `wide_shift` in place, from who has moved alone, if `known`; and the signs of this step for the next.
+    """Adapt the distances as `wide_shift` does, in place, of those variables alone that have moved.
 
-    moves, counts: who has moved and where to, as `wide_minimum` tells it. signs_before, signs (N/32,): two bits a
-    variable, as in moves, of the last step, if `known`, and of this one. places, before, count: as in
-    `Shifts.following`.
+    In:
+      moves (N,): from each piece's place on, who has moved: four times the variable, and 1 if it rose, 2 if it fell.
+      counts (2, pieces): in the second row, how many entries of `moves` each piece has.
+      signs_before (N/32,): of the last step, two bits a variable as in `moves`; read if `known`.
+      known: whether it is known who moved in the last step; else only `signs` is filled.
+      rule (4,): factors where the steps agree and oppose each other, smallest and largest distance.
+    Out:
+      shift (N,): the distances, in ranges, changed in place if `known`.
+      signs (N/32,): of this step, as `signs_before`.
+      places, before (most,): which distances were changed, and what they were, as `Shifts.following` wants it.
+      count (1,): how many of these there are, which grows.
     """
     grow, shrink, least, most = rule[0], rule[1], rule[2], rule[3]
     signs[:] = 0
@@ -105,6 +131,16 @@ def wide_change(x: Floats, y: Floats, unit: Floats, threads: int) -> tuple[float
 
 @member_kernel
 def _changes(counter: Ints, x: Floats, y: Floats, unit: Floats, plain: Floats, scaled: Floats) -> None:
+    """What `wide_change` does with the pieces of variables that this thread takes.
+
+    In:
+      x, y (N,): the designs.
+      unit (N,): ranges, or the first few of them where all are alike.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      plain (pieces,): of each piece, max |x - y|.
+      scaled (pieces,): of each piece, max |x - y| / unit.
+    """
     room = np.empty(PIECE)
     piece = taken(counter)
     while piece < len(plain):
@@ -165,6 +201,17 @@ def wide_look(gradient: Floats, a: Floats, x: Floats, threads: int) -> tuple[flo
 
 @kernel
 def _looks(counter: Ints, gradient: Floats, a: Floats, x: Floats, most: Floats, sums: Floats) -> None:
+    """What `wide_look` does with the pieces of variables that this thread takes.
+
+    In:
+      gradient (N,): of which the largest size is wanted.
+      a (N,): coefficients, or the first few of them where all are alike.
+      x (N,): the design.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      most (pieces,): of each piece, max |gradient|; NaN where one is NaN.
+      sums (pieces,): of each piece, the sum of a x.
+    """
     piece = taken(counter)
     while piece < len(most):
         start, stop = piece * PIECE, min((piece + 1) * PIECE, len(x))

@@ -312,7 +312,19 @@ def _decided(few: Few, guess: Guess, sums: Floats, inside: Floats, room: Room) -
 def _joined(
     program: WideProgram, few: Few, others: Ints, sums: Floats, inside: Floats, room: Room
 ) -> tuple[Few, Floats, Floats]:
-    """The few and others who were taken for decided, without what these were taken to add."""
+    """Take variables that were wrongly taken for decided into those that are solved for.
+
+    Constant:
+      program: the whole program.
+    In:
+      few: the variables that are solved for.
+      others (n,): which variables join them.
+      sums (R,), inside (R, p): what variables at ends of their boxes, and those inside, add to the rows (`_doubtful`).
+    Out:
+      room: its `classes` put the others in doubt.
+
+    Returns the few with the others, and `sums` and `inside` without these.
+    """
     more = _some(program, others)
     within, beyond = room.classes[0, others], room.classes[1, others]
     d = np.where(within, 0.0, np.where(beyond, more.high, more.low))
@@ -378,7 +390,15 @@ def _solved(program: WideProgram, few: Few, sums: Floats, inside: Floats, wanted
 def _start(
     kind: Ints, group: Ints, Q: Floats, f: Floats, at: Floats, bounded: int, penalty: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """A point inside, as `wide_interior.interior` wants it: v, bounds, rows, levels."""
+    """A point inside the bounds with which `wide_interior.interior` begins: v, bounds, rows, levels.
+
+    kind (R,): what each row is, as `wide_interior` has it.
+    group (R,): the group of each line.
+    Q (R, n), f (R,): the scaled rows Q v + f.
+    at (n,): the variables at the iterate.
+    bounded: how many of them, the first ones, are in [0, 1].
+    penalty (J + 1,): of the objective's level, then of the constraints'.
+    """
     mu, line = 0.1, kind == LINE
     v = at.copy()
     v[:bounded] = np.clip(at[:bounded], 0.1, 0.9)

@@ -38,10 +38,15 @@ TINY = 1e-300
 def box(
     alpha: float, lower: float, upper: float, shift: float, move: float, trust: float, share: float
 ) -> tuple[float, float, float, float]:
-    """Ends of the box, distance of the shifts, range.
+    """Ends of the box of a variable, distance of its shifts, and its range.
 
-    share: of that distance, how far a step may go; infinite where terms are linear. Those do without shifts, which are
-    put out of reach then: nothing is to be divided by what is left to one.
+    alpha: the iterate.
+    lower, upper: its bounds.
+    shift: distance of its shifts, in ranges.
+    move: the longest step.
+    trust: half width of the trust box, in ranges.
+    share: of the distance of the shifts, how far a step may go; infinite where terms are linear. Those do without
+      shifts, which are put out of reach then: nothing is to be divided by what is left to one.
     """
     span = upper - lower if upper > lower else 1.0
     reach = shift * span if share <= 1.0 else 2.0 * span
@@ -74,7 +79,21 @@ def enter_slot(
     slots: Floats, place: Ints, k: int, i: int, alpha: float, slope: float, cost: float, low: float, high: float,
     reach: float, kappa: float,
 ) -> None:  # fmt: skip
-    """Column k is variable i."""
+    """Write a variable into a column of the slots.
+
+    In:
+      k: the column.
+      i: the variable.
+      alpha: the iterate.
+      slope: the row's derivative there.
+      cost: its coefficient in the volume row.
+      low, high: ends of its box.
+      reach: distance of its shifts.
+      kappa: of the convex term.
+    Out:
+      slots (SLOTS, n): column k, but for what the passes below find.
+      place (n,): place[k].
+    """
     place[k] = i
     slots[COST, k], slots[LOW, k], slots[HIGH, k], slots[ITERATE, k] = cost, low, high, alpha
     slots[SLOPE, k], slots[REACH, k], slots[KAPPA, k] = slope, reach, kappa
@@ -85,8 +104,19 @@ def _derivative(
     x: Floats, iterate: Floats, slope: Floats, reach: Floats, kappa: Floats, power: float, first: Floats, z: Floats,
     out: Floats, whole: Ints,
 ) -> None:  # fmt: skip
-    """The model's derivative by each variable. first, z: room, for t^(power - 1) and t - 1, where t is how far it is
-    stretched."""
+    """The model's derivative by each variable.
+
+    In:
+      x, iterate (n,): where the variables are, and where the model was made.
+      slope, reach, kappa (n,): the row's derivatives there, distances of the shifts, coefficients of the convex term.
+      power: the exponent xi.
+    Out:
+      out (n,): the derivatives.
+      first, z (n,): t^(xi-1) and t - 1, where t is how far a variable's term is stretched.
+      whole (3, n): integers to work with.
+
+    Arrays that are filled may be longer.
+    """
     n = len(x)
     for i in range(n):
         step = x[i] - iterate[i]
@@ -147,9 +177,17 @@ def _evenly(slots: Floats, n: int, x: Floats, multiplier: float, room: Floats) -
 def _exactly(
     slots: Floats, n: int, x: Floats, multiplier: float, power: float, enough: float, room: Floats, whole: Ints
 ) -> tuple[float, float]:
-    """Sum of a x over the slots for a multiplier, and its slope, from an x that is near; fills x and the rates.
+    """Sum of a x over the slots for a multiplier, and its slope, where each variable minimises the model.
 
-    enough: as in `_solved`.
+    In:
+      n: how many slots are used.
+      multiplier: of the volume row.
+      power: the exponent xi.
+      enough: the last step of the iteration that leaves a variable good enough, relative to its box.
+    Out:
+      slots (SLOTS, n): the row of rates, how fast variables fall with the multiplier; the others are read.
+      x (n,): where the variables go, from a point that is near.
+      room (ROOM, ROW), whole (WHOLE, ROW): numbers and integers to work with.
     """
     total, slope = 0.0, 0.0
     mark, inside = room[0], whole[3]
@@ -180,12 +218,22 @@ def _solved(
     slots: Floats, start: int, multiplier: float, power: float, enough: float, x: Floats, inside: Ints, count: int,
     room: Floats, whole: Ints,
 ) -> float:  # fmt: skip
-    """Where the multiplier sends those of a block's variables x that are inside their boxes, from where they are, and
-    the rates.
+    """Where the multiplier sends those of a block's variables that are inside their boxes, by Newton's iteration.
 
-    inside: which they are, in whole vectors. enough: the last step that leaves it good enough, in the box. Returns the
-    slope of their sum of a x. The derivative is that of `_derivative`, with its divisions taken out of the iteration;
-    all of the room is free.
+    In:
+      start: the block's first slot.
+      multiplier: of the volume row.
+      power: the exponent xi.
+      enough: the last step of the iteration that leaves a variable good enough, relative to its box.
+      inside (count,): which of the block's variables they are, filled up to whole vectors.
+      count: how many.
+    Out:
+      slots (SLOTS, n): their rates, how fast they fall with the multiplier; the other rows are read.
+      x (m,): where the block's variables are; those inside begin there and are moved.
+      room (ROOM, ROW), whole (3, ROW): numbers and integers to work with; all of `room` is free.
+
+    Returns the slope of their sum of a x. The derivative is that of `_derivative`, with its divisions taken out of the
+    iteration.
     """
     width, bend, z, g, h, a = room[0], room[1], room[2], room[3], room[4], room[5]
     low, high, c, s, unit, k, y = room[6], room[7], room[8], room[9], room[10], room[11], room[12]
@@ -269,9 +317,21 @@ def root(
 ) -> tuple[float, float, int, float]:  # fmt: skip
     """The multiplier in [near, far] for which the sum of a x is `goal`, or an end that comes as near as any.
 
-    ends: what `bracket_slots` found. exact: from an x that is near; otherwise as if variables moved evenly. Returns it
-    with what is left of the difference, whether the root must lie further on (1) or back (-1), and the slope of the
-    sum, which falls with the multiplier; x is filled for it.
+    In:
+      n: how many slots are used.
+      ends: the least and the largest multiplier that moves a variable, as `bracket_slots` finds them.
+      goal: what the sum is to be.
+      near, guess, far: the ends of the bracket, and where to begin.
+      power: the exponent xi.
+      rounding: by how much the sum may differ.
+      exact: whether variables minimise the model, from an x that is near; else they move evenly with the multiplier.
+    Out:
+      slots (SLOTS, n): if `exact`, the row of rates; the others are read.
+      x (n,): the variables for the multiplier.
+      room (ROOM, ROW), whole (WHOLE, ROW): numbers and integers to work with.
+
+    Returns the multiplier, what is left of the difference, whether the root must lie further on (1) or back (-1), and
+    the slope of the sum, which falls with the multiplier.
     """
     first, last = ends
     if first > last:  # no multiplier moves any of them: the least that the others allow
@@ -323,9 +383,17 @@ def root(
 
 @member_kernel
 def settle(slots: Floats, n: int, x: Floats, goal: float, equal: bool, rounding: float) -> float:
-    """Take what is left of the sum's difference from `goal` from the variables inside their boxes; what is left then.
+    """Take what is left of the sum's difference from the goal from the variables inside their boxes.
 
-    Without `equal` it may be negative.
+    In:
+      slots (SLOTS, n): the variables; n: how many are used.
+      goal: what the sum of a x is to be.
+      equal: whether a sum that is too small is to be raised too.
+      rounding: by how much the sum may differ.
+    Out:
+      x (n,): the variables, moved.
+
+    Returns what is left of the difference.
     """
     a, low, high = slots[COST, :n], slots[LOW, :n], slots[HIGH, :n]
     miss = 0.0
@@ -349,7 +417,15 @@ def settle(slots: Floats, n: int, x: Floats, goal: float, equal: bool, rounding:
 
 @member_kernel
 def promise(slots: Floats, n: int, x: Floats, power: float, room: Floats, whole: Ints) -> float:
-    """The model's change over the slots."""
+    """The change of the model over the variables in the slots.
+
+    In:
+      slots (SLOTS, n): the variables; n: how many are used.
+      x (n,): where they are.
+      power: the exponent xi.
+    Out:
+      room (ROOM, ROW), whole (WHOLE, ROW): numbers and integers to work with.
+    """
     change = 0.0
     z, value = room[0], room[1]
     for start in range(0, n, BLOCK):

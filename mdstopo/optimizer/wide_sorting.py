@@ -37,11 +37,25 @@ def sort_out(
     alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats, limits: Floats,
     near: float, far: float, threads: int, out: Floats, slots: Floats, place: Ints, found: Ints, counts: Ints,
 ) -> tuple[int, float, float, float]:  # fmt: skip
-    """Fill `out` with the ends of the box where a multiplier in [near, far] leaves no doubt; slots for the others.
+    """Decide the variables for which all multipliers of a bracket give the same end of the box; slots for the others.
 
-    found, from each piece's place on: those in doubt, then the others that do not rest; counts (2, pieces): of those in
-    doubt and of both. Returns how many slots there are and, over the decided variables, the sums of a x and |a x| and
-    the change of the model.
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost, lower, upper (N,): coefficients of the volume row and bounds, or the first few of them where all are alike.
+      shift (N,): distances of the shifts, in ranges.
+      limits (5,): exponent xi; longest step; trust box in ranges; share of a shift's distance; kappa times range.
+    In:
+      alpha (N,): the iterate.
+      near, far: ends of the bracket.
+      threads: how many work.
+    Out:
+      out (N,): where the decided variables end.
+      slots (SLOTS, n), place (n,): the variables in doubt, as in `wide_slots`; room for N.
+      found (N,): from each piece's place on, its variables in doubt, then the others that do not rest.
+      counts (2, pieces): how many are in doubt, and how many do not rest.
+
+    Returns how many slots there are and, over the decided variables, the sums of a x and |a x| and the change of the
+    model.
     """
     count = pieces(len(alpha))
     sums = np.empty((count, 3))
@@ -72,7 +86,23 @@ def _sort_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
     limits: Floats, near: float, far: float, out: Floats, found: Ints, sums: Floats, counts: Ints,
 ) -> None:  # fmt: skip
-    """What `sort_out` does with the pieces that are taken; sums: (pieces, 3) change, a x, |a x|."""
+    """What `sort_out` does with the pieces of variables that this thread takes, before there are slots.
+
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost, lower, upper (N,): coefficients of the volume row and bounds, or the first few of them where all are alike.
+      shift (N,): distances of the shifts, in ranges.
+      limits (5,): exponent xi; longest step; trust box in ranges; share of a shift's distance; kappa times range.
+    In:
+      alpha (N,): the iterate.
+      near, far: ends of the bracket.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      out (N,): where the decided variables end.
+      found (N,): from each piece's place on, its variables in doubt, then the others that do not rest.
+      sums (pieces, 3): of each piece's decided variables the change of the model, the sum of a x and that of |a x|.
+      counts (2, pieces): how many are in doubt, and how many do not rest.
+    """
     room, whole = np.empty((_ROOM, ROW)), np.empty((WHOLE, ROW), dtype=np.int64)
     which = np.empty(PIECE + BLOCK, dtype=np.int64)
     N = len(alpha)
@@ -97,9 +127,19 @@ def _moving(
     c: Floats, s: Floats, a: Floats, shift: Floats, lower: Floats, upper: Floats, near: float, far: float, y: Floats,
     which: Ints, sums: Floats,
 ) -> int:  # fmt: skip
-    """Which variables of a piece do not rest, and those beyond its last whole vector; how many.
+    """Which variables of a piece do not rest; those beyond its last whole vector are among them.
 
-    shift: fetched for those, because `_sort_block` asks for it next. y: the iterate; sums: of those that rest.
+    In, all (m,) of the piece:
+      c, s, a: the iterate, the row's gradient, the coefficients of the volume row.
+      shift: distances of the shifts; fetched for those that do not rest, because `_sort_block` asks for it next.
+      lower, upper: the bounds.
+      near, far: ends of the bracket of the multiplier.
+    Out:
+      y (m,): the iterate, as far as whole vectors go.
+      which (PIECE + BLOCK,): the variables that do not rest, counted from the piece's first.
+      sums (3,): 0, then the sum of a x and that of |a x| over those that rest.
+
+    Returns how many do not rest.
     """
     n = len(c) // lanes() * lanes()
     count: int = np.int64(0)  # type: ignore[assignment]  # as in `sort_out`
@@ -140,8 +180,24 @@ def _sort_block(
     far: float, which: Ints, moving: int, room: Floats, whole: Ints, y: Floats, start: int, found: Ints, places: Ints,
     sums: Floats,
 ) -> None:  # fmt: skip
-    """A block's worth of a piece's variables that do not rest; places: where in `found` the next that is in doubt goes,
-    and behind the place of the next that is not."""
+    """Decide a block of those variables of a piece that do not rest.
+
+    In, c to upper (m,) of the piece:
+      c, s, a: the iterate, the row's gradient, the coefficients of the volume row.
+      shift: distances of the shifts, in ranges.
+      lower, upper: the bounds.
+      limits (5,): exponent xi; longest step; trust box in ranges; share of a shift's distance; kappa times range.
+      near, far: ends of the bracket of the multiplier.
+      moving: how many variables the block has.
+      start: the piece's first variable.
+    Out:
+      which (BLOCK,): the block's variables, counted from the piece's first; filled up to whole vectors with the last.
+      room (_ROOM, ROW), whole (WHOLE, ROW): numbers and integers to work with.
+      y (m,): the end of the box to which each of them would go.
+      found (m,): the variables in doubt from the front, the decided ones from behind.
+      places (2,): where in `found` the next one in doubt goes, and one more than where the next decided one goes.
+      sums (3,): of the decided ones the change of the model, the sum of a x and that of |a x|, added to.
+    """
     power, move, trust, share, convex = limits[0], limits[1], limits[2], limits[3], limits[4]
     slope, cost, reach, kappa, step = room[0], room[1], room[2], room[3], room[4]
     end, z, value, known = room[5], room[6], room[7], room[8]
@@ -192,7 +248,21 @@ def _slot_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, shift: Floats, lower: Floats, upper: Floats,
     limits: Floats, found: Ints, begin: Ints, slots: Floats, place: Ints,
 ) -> None:  # fmt: skip
-    """Slots for the variables in doubt, of the pieces that are taken; begin (pieces + 1): their first slots."""
+    """Slots for the variables in doubt, of the pieces that this thread takes.
+
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost, lower, upper (N,): coefficients of the volume row and bounds, or the first few of them where all are alike.
+      shift (N,): distances of the shifts, in ranges.
+      limits (5,): exponent xi; longest step; trust box in ranges; share of a shift's distance; kappa times range.
+    In:
+      alpha (N,): the iterate.
+      found (N,): from each piece's place on, its variables in doubt.
+      begin (pieces + 1,): the first slot of each piece, and how many there are in all.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      slots (SLOTS, n), place (n,): the variables in doubt, as in `wide_slots`.
+    """
     move, trust, share, convex = limits[1], limits[2], limits[3], limits[4]
     N = len(alpha)
     piece = taken(counter)
@@ -210,10 +280,24 @@ def measure(
     alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float, steepest: float,
     threads: int, out: Floats, found: Ints, counts: Ints,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Of the variables that do not rest, which are all that can tell: max |x - clip(x - (slope + multiplier
-    cost)/steepest)|, at most what a step along -gradient moves; max |out - alpha|, and the largest in its range.
+    """The KKT residual and the largest changes, of the variables that do not rest, which are all that can tell.
 
-    found: becomes four times who that is, and 1 for one that rises, 2 for one that falls.
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost, lower, upper (N,): coefficients of the volume row and bounds, or the first few of them where all are alike.
+    In:
+      alpha (N,): the iterate.
+      multiplier: of the volume row.
+      steepest: the largest gradient entry.
+      threads: how many work.
+      out (N,): the new design.
+      counts (2, pieces): in the second row, how many variables of each piece do not rest.
+    Out:
+      found (N,): from each piece's place on, these variables; becomes four times each, and 1 if it rises, 2 if it
+        falls.
+
+    Returns max |x - clip(x - (slope + multiplier cost)/steepest)|, at most what a step along -gradient moves, x being
+    the iterate; max |out - alpha|; and the same in ranges.
     """
     count = counts.shape[1]
     most = np.empty((count, 3))
@@ -237,6 +321,23 @@ def _measure_pieces(
     counter: Ints, alpha: Floats, slope: Floats, cost: Floats, lower: Floats, upper: Floats, multiplier: float,
     unit: float, out: Floats, found: Ints, counts: Ints, most: Floats,
 ) -> None:  # fmt: skip
+    """What `measure` does with the pieces of variables that this thread takes.
+
+    Constant:
+      slope (N,): the row's gradient at the iterate.
+      cost, lower, upper (N,): coefficients of the volume row and bounds, or the first few of them where all are alike.
+    In:
+      alpha (N,): the iterate.
+      multiplier: of the volume row.
+      unit: what the gradient is multiplied by, 1 over its largest entry.
+      out (N,): the new design.
+      counts (2, pieces): in the second row, how many variables of each piece do not rest.
+    Out:
+      counter (1,): the next piece that nobody has taken.
+      found (N,): from each piece's place on, these variables; becomes four times each, and 1 if it rises, 2 if it
+        falls.
+      most (pieces, 3): of each piece, the residual, the largest change, and that in ranges.
+    """
     N = len(alpha)
     piece = taken(counter)
     while piece < len(most):
