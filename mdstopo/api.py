@@ -118,11 +118,15 @@ def evaluate(
 ) -> Evaluation:
     """Compute objectives and constraints of one design, and their gradients with respect to alpha.
 
+    case: the design problem.
     alpha (N,): default the case's initial design; any finite alpha >= 0 is evaluated, bounds and rows do not matter.
     variables: values of the case's design variables by name, in the parameters' own units, a number or one for each
-    member; default their initial ones. What they do to objectives is in `Evaluation.variable_gradients`.
-    method: adjoint, direct, iterative or constant_load; auto takes the case's `solver.sensitivity`. error_estimate:
-    compute it once more, much finer, and say in `Evaluation.errors` how far off the objectives and gradients are.
+      member; default their initial ones. What they do to objectives is in `Evaluation.variable_gradients`.
+    method: adjoint, direct, iterative or constant_load; auto takes the case's `solver.sensitivity`.
+    gradient: whether gradients are computed too.
+    error_estimate: compute it once more, much finer, and say in `Evaluation.errors` how far off the objectives and
+      gradients are.
+
     Raises CaseError where the case asks for what the engine cannot do, ValueError for an unusable alpha or method.
     """
     if method not in METHODS:
@@ -146,12 +150,19 @@ def optimize(
     on_iteration: Callable[[Progress], None] | None = None,
     stop_requested: Callable[[], bool] | None = None,
 ) -> Result:
-    """Optimise a case, and keep a result file up to date where `path` is given.
+    """Optimise a case, and keep a result file up to date.
 
-    starts, workers: how many starts (default: the case's) on how many processes (default 1); no result depends on
-    the latter. initial (N,): the design to begin with; variables: values to begin with, as of `evaluate`.
-    on_iteration, stop_requested: called after each iteration.
-    resume: go on where the unfinished run in the file stopped; overwrite: replace it.
+    case: the design problem.
+    path: the result file; None keeps everything in memory.
+    resume, overwrite: go on where the unfinished run in the file stopped, or replace it.
+    starts, workers: how many starts (default: the case's) on how many processes (default 1); no result depends on the
+      latter.
+    initial (N,): the design to begin with; default the case's.
+    variables: values of the case's design variables to begin with, by name, in the parameters' own units; default their
+      initial ones.
+    on_iteration: called after each iteration with how far the run is.
+    stop_requested: asked after each iteration whether to stop.
+
     Raises CaseError where the case is no optimisation that the engine can do, StoreError for an unusable file.
     """
     from mdstopo.session.run_session import run_session

@@ -186,6 +186,15 @@ def _volume_row(
     variables: tuple[Variable, ...],
     reading: Reading,
 ) -> VolumeRow | None:
+    """The volume row of a constraint; None where it cannot be made, with the mistakes noted.
+
+    fields: the constraint in the file.
+    sense: its key with the bound: limit, equals, at_least or fraction; None where there is none that can be read.
+    top: the whole file.
+    groups: by name; None where members could not be read.
+    variables: the case's design variables, of which some have a cost.
+    reading: takes the mistakes.
+    """
     stated, path = fields["volume"], inside(fields.path, "volume")
     named = [stated] if isinstance(stated, str) else stated
     good = sense is not None and not any(name is BAD for name in named)

@@ -88,6 +88,16 @@ def _build_group(
     reading: Reading,
     left: int,
 ) -> MemberGroup | None:
+    """A group of members; None where it cannot be made, with the mistakes noted.
+
+    name: the group's.
+    fields: the group in the file.
+    laws: of its members; None where they could not be read.
+    points: the point grids by name.
+    frames: where the bodies stand at the start.
+    reading: takes the mistakes.
+    left: for how many members there is memory.
+    """
     path = fields.path
     first = _end(fields, "from", points, frames, reading)
     second = _end(fields, "to", points, frames, reading)
@@ -168,6 +178,15 @@ def _connect(
     reading: Reading,
     left: int,
 ) -> _Pairs | None:
+    """Join points to members and apply the filters; None where that gives too many, with the mistake noted.
+
+    first, second: the points at the two ends.
+    connect: `pairs` joins points of equal number, `all` each to each.
+    low, high: the lengths that the filters let pass (m); high may be None.
+    path: where the group stands in the file.
+    reading: takes the mistakes.
+    left: for how many members there is memory.
+    """
     n_p, n_q = len(first.world), len(second.world)
     if connect == "pairs" and n_p != n_q:
         message = f"{first.text} has {n_p:,} points and {second.text} {n_q:,}; pairs need equal counts"
@@ -237,7 +256,15 @@ def _in_range(
     path: str,
     reading: Reading,
 ) -> bool:
-    """Whether forces, energies and accelerations of the whole group stay finite."""
+    """Whether forces, energies and accelerations of the whole group stay finite; notes parameters that are too large.
+
+    laws: of the members.
+    length (n,): of the members at the start (m).
+    bodies: names of the two that they join.
+    frames: the bodies, with their masses (kg) and inertias (kg m²).
+    path: where the group stands in the file.
+    reading: takes the mistakes.
+    """
     longest = max(float(length.max()), 1.0)
     masses = [min(b.mass, b.inertia) for n in bodies if n != GROUND for b in [frames.bodies[n]]]
     worst = len(length) * longest * longest / min([1.0, *masses])

@@ -63,7 +63,15 @@ def build_load_cases(
     frames: Frames,
     reading: Reading,
 ) -> tuple[LoadCase, ...]:
-    """The load cases that can be made. motions, starts: as `mdstopo.case.motions` resolves them."""
+    """The load cases that can be made.
+
+    top: the whole file.
+    times: when each load case runs, by its name.
+    motions: prescribed motions, by load case.
+    starts: what these prescribe at the start, by load case and body.
+    frames: the bodies.
+    reading: takes the mistakes.
+    """
     common = build_loads(top["loads"], frames, reading)
     cases = top["load_cases"] or {DEFAULT: None}
     built = []

@@ -158,6 +158,15 @@ def _start(motion: Fields, body: Fields, window: Window, reading: Reading) -> St
 
 
 def _agree(value: float, stated: float, scale: float, what: str, path: str, reading: Reading) -> None:
+    """Note a mistake where a body does not start as its prescribed motion does.
+
+    value: of the motion at the start.
+    stated: by the body.
+    scale: what the difference may be relative to, beside these two.
+    what: the body's key, in words.
+    path: where the motion stands in the file.
+    reading: takes the mistake.
+    """
     if not abs(value - stated) <= AGREE * max(abs(value), abs(stated), scale):
         now, then = number_text(value), number_text(stated)
         reading.mistake(path, f"found {now} at the start, but {what} states {then}; they must agree")

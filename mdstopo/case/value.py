@@ -85,7 +85,15 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def stated(kind: Any, doc: str, *, unit: str = "", default: Any = MISSING, otherwise: str = "", **roles: Any) -> Any:
-    """A field that is a key of the case file: what it may be, described as `records.Key` is, and its roles by name."""
+    """A field of a class that is a key of the case file, described as `records.Key` is.
+
+    kind: what the value may be.
+    doc: what it means.
+    unit: what its numbers are in.
+    default: the value where the key is left out; without one the key is required.
+    otherwise: what is taken then, in words, where no constant is.
+    roles: what else the key is for, by name.
+    """
     metadata = {"kind": kind, "doc": doc, "unit": unit, "otherwise": otherwise, **roles}
     return field(default=default, metadata=metadata)
 

@@ -178,6 +178,16 @@ def _limit_direction(
     limits: Limits,
     found: Restrictions,
 ) -> None:
+    """Add the row that members which only pull, or only push, exert forces within a cone; where that is certain.
+
+    system: the bodies as the linear program sees them.
+    name: the body's.
+    groups: of members that are tied to it.
+    force: E F over the body's mass, of the members' forces F (m/s²).
+    directions (r, 2): E, in which only members and known loads act on the body.
+    limits: how far bodies travel (m) and turn (rad).
+    found: takes the row and a sentence.
+    """
     middles, halves = [], []
     for group in groups:
         sign = _side(system.case, group)
@@ -292,6 +302,15 @@ def _box(strips: list[tuple[Floats, float, float]]) -> float:
 def _wait_for_slack(
     system: System, name: str, groups: list[MemberGroup], force: Bounded, directions: Floats, found: Restrictions
 ) -> None:
+    """Add the row that no member acts on a body before the first slack is used up, where all its members have slack.
+
+    system: the bodies as the linear program sees them.
+    name: the body's.
+    groups: of members that are tied to it.
+    force: E F over the body's mass, of the members' forces F (m/s²).
+    directions (r, 2): E, in which only members and known loads act on the body.
+    found: takes the row, a sentence, and the time when it ends (s).
+    """
     others = {group.body_to if group.body_from == name else group.body_from for group in groups}
     slacks = []
     for group in groups:
