@@ -40,6 +40,16 @@ def command(
     against error, over integrators, tolerances and sensitivity methods, of CASE or the paper's scene; with --peers
     beside JAX, diffrax, CasADi and SciPy, those of them that are installed. skip: what is left out where nothing asks
     for it, and what that is worth.
+    \f
+    Arguments, which --help leaves out:
+
+    what: scaling, work-precision or skip.
+    case_path: the case of work-precision; None takes the paper's scene.
+    overrides: values of the case's keys.
+    members, bodies: the largest numbers of scaling; None takes all.
+    picture: the file for the picture of work-precision; None draws none.
+    peers: whether other programs are measured too.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     if case_path is not None and what != "work-precision":
         raise click.UsageError(f"bench {what} takes no case")
@@ -72,6 +82,15 @@ def _tables(
     picture: Path | None,
     output: Output,
 ) -> "Iterator[Table]":
+    """The tables of a measurement of the program alone, each as it is done.
+
+    what: scaling, work-precision or skip.
+    case_path: the case of work-precision; None takes the paper's scene.
+    overrides: values of the case's keys.
+    members, bodies: the largest numbers of scaling; None takes all.
+    picture: the file for the picture of work-precision; None draws none.
+    output: is told how far it is.
+    """
     if what == "scaling":
         from mdstopo.bench.scaling import BODIES, MEMBERS, scaling
 

@@ -44,6 +44,16 @@ def command(
     are parameters of laws that vary; the outcome is computed with a hundredth of the solver's tolerance. In the case
     that is written each member is a group of its own with its size and its parameters in its law: `mdstopo simulate`
     computes its motion without any design.
+    \f
+    Arguments, which --help leaves out:
+
+    result_path: the result file of `run`.
+    keep: how many members with the largest alpha are kept.
+    threshold: or from which alpha on.
+    out: where the case is written; None takes the result's name with .final.yaml.
+    overwrite: whether a file that is there is replaced.
+    overrides: values of the case's keys.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     if (keep is None) == (threshold is None):
         raise click.UsageError("say --keep or --threshold, one of them")

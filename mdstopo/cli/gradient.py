@@ -86,6 +86,20 @@ def command(
     """Compute the gradient of one design by several methods and compare them.
 
     The first method is the reference; differences are relative to its largest entry.
+    \f
+    Arguments, which --help leaves out:
+
+    case_path: the case file.
+    methods: the sensitivity methods; none takes adjoint and direct.
+    differencing: whether differences are taken too.
+    count: for how many members.
+    estimating: whether errors are estimated by finer steps.
+    history: whether histories of the direct method are stored.
+    alpha_path: the file of the design; None takes the case's.
+    out: the result file; None takes a name after the case's.
+    overwrite: whether what the file holds is replaced.
+    overrides: values of the case's keys.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     from mdstopo.store.output_file import output_file
 
@@ -261,6 +275,15 @@ def _say(
     failure: str,
     path: Path,
 ) -> None:
+    """Print what the methods have found as tables, and their warnings.
+
+    output: where to.
+    case: the case.
+    engine: its evaluator, which knows the integrator.
+    results: by method, what it has found, by name.
+    failure: why it ended early; empty where it did not.
+    path: the result file.
+    """
     output.say(f"{case.title or case.name}: {failure or 'done'}")
     head = ["method", "objective", "value", "largest |dG/dalpha|", "differs by", "from differences by", "time"]
     estimated = any("errors" in result for result in results.values())

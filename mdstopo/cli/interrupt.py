@@ -48,8 +48,13 @@ def saying_how_to_go_on(
 ) -> Iterator[None]:
     """Where what is done here is interrupted, say by which command it goes on, if anything of it has been saved.
 
-    command, case: their names; path: the result file; resume: whether it is one of before that is continued; again: the
-    command that goes on. Raises click's Exit with the status of an interruption then, else KeyboardInterrupt.
+    output: where it is said.
+    command, case: their names.
+    path: the result file.
+    resume: whether one of before is continued.
+    again: the command that goes on.
+
+    Raises click's Exit with the status of an interruption then, else KeyboardInterrupt.
     """
     before = _stamp(path)
     try:

@@ -71,6 +71,20 @@ def command(
 
     --weights 0:1:0.05 varies the weight of the first of two objectives, the second takes the rest. --method nbi
     spreads the points evenly. Ctrl-C keeps what is finished, and tells how to resume.
+    \f
+    Arguments, which --help leaves out:
+
+    case_path: the case file.
+    weights: of the first of two objectives, as text; excludes `points`.
+    points: how many points; None takes 21.
+    method: how the objectives are combined; None takes the case's.
+    out: the result file; None takes a name after the case's.
+    resume, overwrite: whether the front in the file is continued, or replaced.
+    overrides: values of the case's keys.
+    starts: of every solve; None takes the case's.
+    workers: processes at most; None takes all cores.
+    cluster: address of a Dask cluster in their place.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")
@@ -122,7 +136,15 @@ def resumed(line: str) -> str:
 def _asked(
     case: "Case", earlier: Path | None, weights: str | None, points: int | None, method: str | None, starts: int | None
 ) -> "Ask":
-    """What is to be computed; what is not said is as in the file that is resumed, else as in the case."""
+    """What is to be computed; what is not said is as in the file that is resumed, else as in the case.
+
+    case: the case.
+    earlier: the file that is resumed; None where none is.
+    weights: of the first of two objectives, as text.
+    points: how many points.
+    method: how the objectives are combined.
+    starts: of every solve.
+    """
     from mdstopo.front.run_front import Ask
     from mdstopo.store.result_reader import read_result
 

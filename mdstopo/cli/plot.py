@@ -42,6 +42,18 @@ def command(
 
     WHAT is one of layout, convergence, design, sensitivities, histories, sensitivity-histories, front; without it,
     everything that the file has is drawn.
+    \f
+    Arguments, which --help leaves out:
+
+    result_path: the result file.
+    what: the picture; None draws all.
+    out: the file for one picture; None takes one beside the result.
+    ending: png, svg or pdf, where `out` does not say.
+    times: at which a layout is drawn (s).
+    load_case: of a layout at a time, and of histories.
+    point: of a front, whose design is drawn.
+    members: how many have their sensitivities drawn.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     from mdstopo.plots.plot_table import PLOTS, fitting
     from mdstopo.plots.source import Source

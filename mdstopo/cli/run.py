@@ -58,6 +58,17 @@ def command(
     """Optimise a case and keep its result file up to date.
 
     Ctrl-C finishes the iteration, saves, and tells how to resume.
+    \f
+    Arguments, which --help leaves out:
+
+    case_path: the case file.
+    out: the result file; None takes a name after the case's.
+    resume, overwrite: whether the run in the file is continued, or replaced.
+    overrides: values of the case's keys.
+    alpha_path: the file of the design to begin with; None takes the case's.
+    starts: how many; None takes the case's.
+    workers: processes for starts or a sample's points; None takes one.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")
@@ -105,7 +116,14 @@ def resume_command(
     starts: int | None,
     workers: int | None,
 ) -> str:
-    """The exact command that continues this run."""
+    """The exact command that continues this run.
+
+    case_path: the case file.
+    out: the result file, if it was given.
+    overrides: values of the case's keys.
+    alpha_path: the file of the design to begin with, if it was given.
+    starts, workers: how many, if they were given.
+    """
     words = ["mdstopo", "run", str(case_path), "--resume"]
     if out is not None:
         words += ["--out", str(out)]

@@ -47,7 +47,18 @@ def command(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Compute the motion of one design in every load case and write it to a file."""
+    """Compute the motion of one design in every load case and write it to a file.
+    \f
+    Arguments, which --help leaves out:
+
+    case_path: the case file.
+    alpha_path: the file of the design; None takes the case's.
+    names: of the load cases; none takes all.
+    out: the result file; None takes a name after the case's.
+    overwrite: whether what the file holds is replaced.
+    overrides: values of the case's keys.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
+    """
     output = Output(json=as_json, quiet=quiet)
     case = open_case(case_path, overrides)
     alpha = open_design(alpha_path, case)

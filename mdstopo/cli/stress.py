@@ -27,6 +27,14 @@ def command(names: tuple[str, ...], long: bool, folder: Path | None, markdown: b
 
     NAME is a family of scenes, a scene, or what names of scenes begin with; default: all. Ends with 1 where a scene
     does not end as it has to.
+    \f
+    Arguments, which --help leaves out:
+
+    names: the NAMEs; none takes all.
+    long: whether scenes that take minutes are computed too.
+    folder: where the cases of the scenes are written, instead of computing them.
+    markdown: whether tables are printed as the documentation has them.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     from mdstopo.stress.registry import FAMILIES, chosen, scenes
 

@@ -57,6 +57,16 @@ def set_values(
     """Run a case with every combination of values: a:b:step (both ends included) or x,y,z; one value sets a key.
 
     For example: mdstopo sweep set cases/fig6.yaml members.belts.law.stiffness=225:2250:675 optimizer.starts=1,4
+    \f
+    Arguments, which --help leaves out:
+
+    case_path: the case file.
+    sets: the keys and their values, KEY=VALUES.
+    out: the result file; None takes a name after the case's.
+    resume, overwrite: whether the sweep in the file is continued, or replaced.
+    workers: processes at most; None takes all cores.
+    cluster: address of a Dask cluster in their place.
+    as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     if resume and overwrite:
         raise click.UsageError("--resume and --overwrite exclude each other")

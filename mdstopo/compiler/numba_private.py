@@ -1181,6 +1181,16 @@ def _probe() -> Any:
     enter_threads(_probe_shared, _probe_taken)
 
     def probe(tag, x, table, yes, counter, done, how):  # type: ignore[no-untyped-def]
+        """What is compiled and then called to see whether machine code does what is written.
+
+        tag: two integers; the second says how many copies a list gets.
+        x (n,): numbers that another compiled function is called with.
+        table (2, 2): its second entry is written.
+        yes: a truth, a part of what comes back.
+        counter (1,): what threads take pieces of work from.
+        done (9,): what they write.
+        how: 1 raises ValueError.
+        """
         row = _probe_chosen(x, 2)
         if how == 1:
             raise ValueError("asked for")
