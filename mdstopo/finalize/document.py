@@ -246,6 +246,15 @@ def _constraints(
     design: FloatArray,
     told: list[str],
 ) -> list[Plain]:
+    """The constraints of the final case, in those members that it has.
+
+    stated: the constraints as the file has them.
+    case: the one of the file, with only the members kept.
+    groups: by name of a group there, those that its members have become, of groups that do not stay as they are.
+    sized: the same of groups with design members alone.
+    design (K + P,): sizes of the members kept, and values of variables.
+    told: takes a sentence for each constraint that is left out.
+    """
     found: list[Plain] = []
     for i, (entry, row) in enumerate(zip(stated, case.constraints, strict=True)):
         if not isinstance(row, VolumeRow):

@@ -151,9 +151,19 @@ def finalize(
 ) -> Finalized:
     """Re-optimise the members kept, verify them, and make the text of the final case.
 
-    Their sizes and the parameters of laws that vary are optimised together. case, reduced, kept: as `ready` gave them;
-    design (N,) or (N + P,): the design. place: where the text is going to stand. head: its first lines, comments. The
-    text is empty where the run was interrupted or its design cannot be computed.
+    Their sizes and the parameters of laws that vary are optimised together.
+
+    case: the one of the result.
+    design (N,) or (N + P,): the design of the result.
+    kept (n,): which of its members are kept, as `ready` gave them.
+    reduced: the case with only these, as `ready` gave it.
+    place: where the text is going to stand.
+    head: its first lines, comments.
+    on_iteration: called after each iteration of the optimiser.
+    stop_requested: asked after each iteration whether to stop.
+    notify: is given sentences for the user.
+
+    The text is empty where the run was interrupted, or where its design or its equilibrium cannot be computed.
     """
     design = case.whole(design)
     joined = apart(case, unlike(case, kept))

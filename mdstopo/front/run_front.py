@@ -112,8 +112,18 @@ def run_front(
 ) -> FrontOutcome:
     """Compute a front and keep its result file up to date.
 
-    workers: processes at most (default: one a core); they are started where there is work for more than `worth`
-    seconds. cluster: the address of a Dask scheduler instead. No result depends on either.
+    case: the design problem, with several objectives.
+    ask: the points, the method, and how many starts.
+    path: the result file; None keeps everything in memory.
+    resume, overwrite: continue the unfinished front in the file, or replace it.
+    workers: processes at most (default: one a core).
+    cluster: the address of a Dask scheduler in their place. No result depends on either.
+    on_progress: called with the front in the making as it goes on.
+    stop_requested: asked again and again whether to stop.
+    notify: is given sentences for the user.
+    command: the command line, for the record.
+    worth: seconds of work from which on workers are started.
+
     Raises CaseError where the case is no front that can be computed, StoreError for an unusable file, ValueError for a
     direction that is given twice.
     """
@@ -158,6 +168,15 @@ class _FrontRun:
         notify: Callable[[str], None],
         command: str,
     ) -> None:
+        """Begin with nothing solved.
+
+        case: the design problem, with several objectives.
+        ask: the points, the method, and how many starts.
+        on_progress: called with the front in the making as it goes on.
+        stop: asked again and again whether to stop.
+        notify: is given sentences for the user.
+        command: the command line, for the record.
+        """
         assert case.combine is not None
         self.case = case
         self.ask = ask

@@ -81,9 +81,23 @@ def run_sweep(
     command: str = "",
     worth: float = WORTH,
 ) -> SweepOutcome:
-    """Run a case with every combination of the values in `sets`, {key: "a:b:step" or "x,y,z"}.
+    """Run a case with every combination of values of some keys, and keep the result file up to date.
 
-    Other arguments as `run_front`'s. Raises CaseError where a combination is no case (all their mistakes at once).
+    case_path: the case file.
+    overrides: values of other keys, the same in all runs.
+    sets: by key, its values "a:b:step" or "x,y,z".
+    path: the result file.
+    resume, overwrite: continue the unfinished sweep in the file, or replace it.
+    workers: processes at most (default: one a core).
+    cluster: the address of a Dask scheduler in their place. No result depends on either.
+    on_progress: called with how far it is after each run.
+    stop_requested: asked again and again whether to stop.
+    notify: is given sentences for the user.
+    command: the command line, for the record.
+    worth: seconds of work from which on workers are started.
+
+    Raises CaseError where a combination is no case (all their mistakes at once), ValueError where `sets` cannot be read
+    or has too many combinations, StoreError for an unusable file.
     """
     values = combinations(sets)
     base = load_case(case_path, dict(overrides))

@@ -134,10 +134,17 @@ def solve(
     stop: Callable[[], bool] | None = None,
     keep: Callable[[State], None] | None = None,
 ) -> Result:
-    """Run the task to its end, or a part of it. Never raises because of a design: a failure is a status.
+    """Run a task to its end, or a part of it. Never raises because of a design: a failure is a status.
 
-    keep: is given every state, from which the task could go on. Returns the state with which a part ends. Raises
-    StoppedError where `stop` says so before the end.
+    engine: the case's evaluator.
+    case: the design problem.
+    task: what is optimised, from where, and how far.
+    key: the task's hash, which its result carries.
+    stop: asked after each iteration whether to stop; None never stops.
+    keep: is given every state, from which the task could go on.
+
+    Returns what was found, or of a part the state with which it ends. Raises StoppedError where `stop` says so before
+    the end.
     """
     began = time.perf_counter()
     problem = engine.problem(task.scalarisation)

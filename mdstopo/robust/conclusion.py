@@ -126,7 +126,17 @@ def _robust(
     fresh: FloatArray | None,
     sample: Sample,
 ) -> Robust:
-    """One result; values (S,) at the points of the sample, fresh (V,) at those of the other, None where not enough."""
+    """What an objective or a constraint comes to over the sample, and what a fresh sample says of that.
+
+    name: the result's.
+    of: the objective or the constraint.
+    measure: what is taken of the sample.
+    nominal: the value of the case as it is written.
+    value: the measure over the design's sample.
+    values (S,): at the points of that sample.
+    fresh (V,): at the points of the fresh one; None where there are not enough.
+    sample: the design's.
+    """
     sign = sign_of(of) if isinstance(of, Objective) else (-1.0 if of.sense == "at_least" else 1.0)
     if fresh is None or measure.name == "nominal":
         return Robust(name, measure.words, nominal, value, None, None, None, sign)
