@@ -75,23 +75,17 @@ def run_session(
 ) -> Outcome:
     """Optimise a case and keep its result file up to date.
 
-    Parameters
-    ----------
-    path
-        the result file; None keeps everything in memory.
-    resume, overwrite
-        continue the unfinished run in the file, or replace it.
-    starts, workers
-        how many starts (default: the case's) on how many processes (default 1); no result depends on the
-        latter.
-    initial
-        (N,) design to begin with in place of the case's; with the values of variables (P,) behind it, or without.
-    on_iteration, stop_requested, notify
-        called after each iteration; asked after each iteration whether to stop; given sentences for the user.
-    command
-        the command line, for the record.
-    engine
-        makes the engine.
+    case: the design problem.
+    path: the result file; None keeps everything in memory.
+    resume, overwrite: continue the unfinished run in the file, or replace it.
+    starts, workers: how many starts (default: the case's) on how many processes (default 1); no result depends on the
+      latter.
+    initial (N,) or (N + P,): the design to begin with in place of the case's; with the values of variables or without.
+    on_iteration: called after each iteration.
+    stop_requested: asked after each iteration whether to stop.
+    notify: is given sentences for the user.
+    command: the command line, for the record.
+    engine: makes the case's evaluator.
 
     Raises
     ------
@@ -145,6 +139,15 @@ class _Run:
         notify: Notify,
         command: str,
     ) -> None:
+        """Begin with no state of any start.
+
+        case: the design problem.
+        initial (N + P,): the design to begin with in place of the case's; None takes that.
+        on_iteration: called after each iteration.
+        stop_requested: asked after each iteration whether to stop.
+        notify: is given sentences for the user.
+        command: the command line, for the record.
+        """
         self.case = case
         self.initial = initial
         self.on_iteration = on_iteration
@@ -433,7 +436,15 @@ class _Run:
         seconds: float,
         compile_seconds: float,
     ) -> Outcome:
-        """What the caller learns."""
+        """The run as its caller gets it.
+
+        engine: the case's evaluator, which knows the integrator.
+        path: the result file; None where there is none.
+        best: which start has the best design.
+        status, reason: how the run ended, and why in words.
+        seconds: that the iterations took (s).
+        compile_seconds: that it took to get ready (s).
+        """
         state = self.states[best]
         assert state is not None
         before = self.combining.evaluations

@@ -65,9 +65,18 @@ def run_stages(
     keep: Callable[[int, State], None],
     stop: Callable[[], bool],
 ) -> State | None:
-    """As `single_start.run_start`, through all stages of the case.
+    """Go through all stages of a case with one start, each from the best design of the one before.
 
-    problem: that of the last one; make: makes engines.
+    case: the design problem, with its stages.
+    make: makes the evaluator of a stage's case.
+    problem: that of the last stage.
+    task: which start, where it begins and how far it goes.
+    state: where it goes on; None begins.
+    initial (N,) or (N + P,): a design to begin the first start with.
+    keep: is given the start's number and every state.
+    stop: asked after each iteration whether to stop.
+
+    Returns the last state; None where the start was stopped before it had one.
     """
     count = stage_count(case)
     if count == 1:

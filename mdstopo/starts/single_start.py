@@ -101,10 +101,17 @@ class StartTask:
 def run_start(
     case: Case, problem: Problem, task: StartTask, state: State | None, initial: Floats | None, keep: Keep, stop: Stop
 ) -> State | None:
-    """Step until the optimiser ends, the quota is used or `stop` says so; `keep` gets every state.
+    """Step until the optimiser ends, the start's quota is used or it is to stop.
 
-    initial: a design to begin the first start with. Returns the last state; None where the start was stopped before
-    it had one.
+    case: the design problem.
+    problem: what the optimiser sees of it.
+    task: which start, where it begins and how far it goes.
+    state: where it goes on; None begins.
+    initial (N,) or (N + P,): a design to begin the first start with.
+    keep: is given the start's number and every state.
+    stop: asked after each iteration whether to stop.
+
+    Returns the last state; None where the start was stopped before it had one.
     """
     optimizer = make_optimizer(case, problem, task.family)
     if state is None:

@@ -106,10 +106,16 @@ def result_image(
     settings: Mapping[str, Attribute],
     warnings: tuple[str, ...] = (),
 ) -> bytes:
-    """A whole result file.
+    """A whole result file, as bytes.
 
-    kind: the command that made it. status: a word of `RunStatus`. reason: a sentence. settings: what was
-    chosen and why (integrator, sensitivity method, seed), as attributes of the group `settings`.
+    case: the design problem.
+    kind: the command that made it.
+    status: a word of `RunStatus`.
+    reason: a sentence on it.
+    datasets: what stands in the file, by its path.
+    provenance: what made it: versions, command, machine.
+    settings: what was chosen and why (integrator, sensitivity method, seed), attributes of the group `settings`.
+    warnings: sentences.
     """
     root: dict[str, Attribute] = {
         "format": FORMAT,

@@ -84,7 +84,15 @@ def _trajectory(case: Case, group: str, datasets: Mapping[str, Value], found: La
 
 
 def _rows(case: Case, group: str, scale: str, first: str, datasets: Mapping[str, Value], found: Labels) -> None:
-    """Columns of a group that all have one row for each iterate, or point."""
+    """Label the columns of a group that all have one row for each iterate, or point.
+
+    case: the design problem.
+    group: the group's path.
+    scale: the name of the rows' scale.
+    first: the name of the dataset that has as many rows as there are.
+    datasets: the file's, by path.
+    found: takes the scales.
+    """
     leader = datasets.get(f"{group}/{first}")
     if not isinstance(leader, np.ndarray):
         return

@@ -49,7 +49,14 @@ class OutputFile:
 def output_file(
     path: Path, case: Case, kind: str, *, overwrite: bool, notify: Callable[[str], None], command: str = ""
 ) -> Iterator[OutputFile]:
-    """Claim a place for the result of the command `kind`, before the work is done.
+    """Claim a place for the result of a command, before the work is done.
+
+    path: the file.
+    case: the design problem.
+    kind: the command.
+    overwrite: whether another result there may be replaced.
+    notify: is given sentences for the user.
+    command: the command line, for the record.
 
     Raises StoreError where it must not or cannot be written or is in use.
     """

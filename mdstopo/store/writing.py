@@ -30,7 +30,17 @@ def write_result(
     settings: Mapping[str, Attribute],
     warnings: tuple[str, ...] = (),
 ) -> None:
-    """Replace a result file; arguments as of `contents.result_image`.
+    """Replace a result file.
+
+    path: the file.
+    case: the design problem.
+    kind: the command that made it.
+    status: a word of `RunStatus`.
+    reason: a sentence on it.
+    datasets: what stands in the file, by its path.
+    provenance: what made it: versions, command, machine.
+    settings: what was chosen and why, attributes of the group `settings`.
+    warnings: sentences.
 
     Raises WriteError where the file system refuses, UnreadableError where what was written cannot be read again; the
     file is then as it was.

@@ -102,11 +102,7 @@ def _ignore(_words: str) -> None:
 
 
 class WorkerPool:
-    """At most so many worker processes, started when there is something to do; a context manager.
-
-    setup, common: see `Setup`. sharing: how many processes share the machine's cores (default: the workers).
-    attempts: how often a task is given to a worker. notify: is given a sentence for each worker that is lost.
-    """
+    """At most so many worker processes, started when there is something to do; a context manager."""
 
     def __init__(
         self,
@@ -118,6 +114,15 @@ class WorkerPool:
         attempts: int = 2,
         notify: Callable[[str], None] = _ignore,
     ) -> None:
+        """Start no process yet.
+
+        setup: a function of a module, called once in each worker with `common`; it returns what does a task.
+        common: what all tasks have in common.
+        workers: how many processes at most.
+        sharing: how many processes share the machine's cores; 0: the workers.
+        attempts: how often a task is given to a worker.
+        notify: is given a sentence for each worker that is lost.
+        """
         self._first = pickle.dumps((setup, common))
         self._threads = max(1, cores() // (sharing or workers))
         self._attempts = attempts
@@ -145,10 +150,16 @@ class WorkerPool:
     ) -> Iterator[tuple[int, Any]]:
         """(place, result) of the tasks 0 to count - 1 as they are done; work begins at once.
 
-        A result is `Lost` where no worker finished the task, and `TooLong` where it took more than `limit` seconds.
-        keep: is given (place, what a task has kept). stop: is asked again and again; then tasks that have begun end
-        when they can, others do not begin, and what has no result is left out. pinned: task k is for worker k alone,
-        which may remember what it did before. What a task raises is raised here.
+        count: how many tasks there are.
+        task: gives what a worker is sent for task k; called whenever it is given to one.
+        keep: is given (place, what a task has kept).
+        stop: is asked again and again; then tasks that have begun end when they can, others do not begin, and what has
+          no result is left out.
+        limit: seconds after which a task is ended.
+        pinned: task k is for worker k alone, which may remember what it did before.
+
+        A result is `Lost` where no worker finished the task, and `TooLong` where it took longer than it may. What a
+        task raises is raised here.
         """
         self._leave()
         if stop():
