@@ -212,7 +212,7 @@ class Cones(NamedTuple):
 
     @classmethod
     def of(cls, rows: Sequence[tuple[Peak, float, float]], pull: Callable[[Floats], Floats]) -> "Cones":
-        """Those of rows (peak, scale, offset): scale |w| - offset, or of none of them (scale NaN)."""
+        """The cones of rows (peak, scale, offset): scale |w| - offset; scale NaN where a row is no norm."""
         shaped = [peak.gradient is not None and peak.shape != "plain" and scale == scale for peak, scale, _ in rows]
         if not any(shaped):
             return cls.none()
@@ -226,7 +226,7 @@ class Cones(NamedTuple):
         return cls(offset, np.array([nothing if each is None else each for each in found]))
 
     def extended(self, more: int) -> "Cones":
-        """With so many more rows that are no norms."""
+        """These cones and so many more rows that are no norms."""
         if not len(self.offset):
             return self
         width = self.across.shape[1]

@@ -294,7 +294,7 @@ class Evaluator:
 
     @cached_property
     def _seen(self) -> "list[tuple[str, tuple[str, ...], AnyDriver]]":
-        """Load cases that somebody looks at: name, names of what is looked at, driver."""
+        """The load cases that objectives or constraints look at: name, the names of these, driver."""
         return [(name, tuple(looked), self.driver(name)) for name, looked in self._by_load_case.items() if looked]
 
     def _without_slope(self, design: FloatArray) -> str:
@@ -356,7 +356,7 @@ class Evaluator:
         return status, driver.message
 
     def _verdict(self, name: str, design: FloatArray, result: Looked) -> tuple[Status, str]:
-        """Why the motion of a load case cannot be trusted, and who is to blame."""
+        """Why the motion of a load case cannot be trusted, and which member or joint is the cause."""
         if result.status.ok and result.meeting >= 0:
             return Status.ZERO_LENGTH, self._member(name, result.meeting)
         if result.status.ok:

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Reference:
-    """G and dG/dalpha (N,)."""
+    """An objective's value G and its gradient dG/dalpha (N,)."""
 
     value: float
     gradient: Floats

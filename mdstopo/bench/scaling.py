@@ -174,7 +174,7 @@ def _member_table(found: Sequence[Size]) -> Table:
 
 
 def _bars(found: Sequence[Size]) -> list[str]:
-    """What was to be met, and whether it is."""
+    """The limits that were set, and a verdict on each."""
     notes = []
     sizes, times = [float(each.members) for each in found], [each.iteration for each in found]
     large = [i for i, each in enumerate(found) if each.members >= 0.9 * _LARGE]

@@ -236,7 +236,7 @@ def no_joints() -> Omission:
 
 
 def _unknowns(made: Scene) -> Side:
-    """As `side`; its work is accelerations and multipliers to be solved for in each balance."""
+    """As `side`, where the work is the accelerations and multipliers that each balance solves for."""
     case = read_case(json.dumps(made))
     (load_case,) = case.load_cases
     driven = sum(each is not None for motion in load_case.motions for each in (motion.x, motion.y, motion.angle))

@@ -97,7 +97,7 @@ def references(case: Case, alpha: Floats) -> dict[str, Reference]:
 
 
 def table(case: Case, points: Sequence[Point]) -> Table:
-    """What was found, in the order of measuring."""
+    """The measured points as a table, in the order of measuring."""
     rows = [
         [
             each.integrator,

@@ -30,7 +30,7 @@ def read_only(array: FloatArray) -> FloatArray:
 
 
 def read_only_index(array: IndexArray) -> IndexArray:
-    """As `read_only`, for indices."""
+    """The same numbers as a contiguous array of indices that refuses assignment."""
     frozen = np.ascontiguousarray(array, dtype=np.intp)
     if frozen.flags.writeable:
         frozen = frozen.view()

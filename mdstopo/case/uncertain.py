@@ -47,7 +47,7 @@ class Lognormal(Value):
     deviation: float
 
     def quantile(self, u: float) -> float:
-        """As of `Normal`."""
+        """The value that a share u, in (0, 1), of all lies below."""
         from statistics import NormalDist
 
         square = math.log1p((self.deviation / self.mean) ** 2)
@@ -64,7 +64,7 @@ class Uniform(Value):
     high: float
 
     def quantile(self, u: float) -> float:
-        """As of `Normal`."""
+        """The value that a share u, in (0, 1), of all lies below."""
         return (1.0 - u) * self.low + u * self.high
 
 

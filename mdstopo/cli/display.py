@@ -29,7 +29,7 @@ class Silent(Generic[T]):
         return None
 
     def __call__(self, progress: T) -> None:
-        """Nothing."""
+        """Draw nothing."""
 
 
 class Plain(Silent[T]):

@@ -29,14 +29,14 @@ class Live(displays.Live["Snapshot"]):
 
 
 def front_display(quiet: bool) -> "displays.Silent[Snapshot]":
-    """The one that suits where standard error goes."""
+    """The display that suits standard error: a table on a terminal, else lines; none where the user wants quiet."""
     if quiet:
         return displays.Silent()
     return Live() if sys.stderr.isatty() else Plain()
 
 
 def line(snapshot: "Snapshot") -> str:
-    """All of it in a line."""
+    """How far a front is, in one line."""
     total = len(snapshot.directions)
     return (
         f"{len(snapshot.best)} of {total} points have a design, {len(snapshot.running)} are worked on; "

@@ -194,7 +194,7 @@ def _all_methods(
 
 
 def _in_words(evaluation: "Evaluation") -> str:
-    """The status, and whose it is."""
+    """The status in words, with the part of the case that it concerns."""
     sentence = f"{evaluation.status.value}"
     return f"{sentence} ({evaluation.message})" if evaluation.message else sentence
 

@@ -32,7 +32,7 @@ class Output:
             self.say(line)
 
     def notice(self, sentence: str) -> None:
-        """Something worth knowing that is no result."""
+        """A remark for the user that is no part of the result."""
         if not self.quiet:
             write(sys.stderr, sentence)
 

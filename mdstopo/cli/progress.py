@@ -17,7 +17,7 @@ Silent = displays.Silent
 
 
 def display(quiet: bool) -> "displays.Silent[Progress]":
-    """The one that suits where standard error goes."""
+    """The display that suits standard error: a line that changes on a terminal, else lines; none with --quiet."""
     if quiet:
         return Silent()
     return Live() if sys.stderr.isatty() else Plain()

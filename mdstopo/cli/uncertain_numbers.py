@@ -29,7 +29,7 @@ def lines_of(conclusion: "Conclusion | None", name: str) -> list[list[str]]:
 
 
 def document_of(conclusion: "Conclusion | None") -> dict[str, Any] | None:
-    """The same for machines, by name."""
+    """The results as values for JSON, by name."""
     if conclusion is None:
         return None
     return {

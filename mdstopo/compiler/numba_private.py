@@ -444,7 +444,7 @@ class Optimised(JITCodeLibrary):
         return self
 
     def set_env(self, name: str, held: Any) -> None:
-        """Tell nobody."""
+        """Do nothing: there are no Python objects here to be told of."""
 
     def serialize_using_object_code(self) -> tuple[str, str, bytes]:
         """What the disk keeps; of these libraries that is no machine code."""
@@ -600,7 +600,7 @@ class Cache(_Cache):
         return (*key, _source(inspect.getfile(self._py_func)))
 
     def enable(self) -> None:
-        """It always is."""
+        """Do nothing: this cache is always enabled."""
 
     def disable(self) -> None:
         """Not needed."""
@@ -760,7 +760,7 @@ def spare() -> None:
 
 
 def unspare() -> None:
-    """Have Numba as it was."""
+    """Put Numba back as it was."""
     while _UNSPARE:
         _UNSPARE.pop()()
 

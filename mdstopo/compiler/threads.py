@@ -56,7 +56,7 @@ def taken(counter: NDArray[np.int64]) -> int:
 
 @when_compiling
 def _register() -> None:
-    """Have Numba know them."""
+    """Make `shared` and `taken` known to Numba."""
     from mdstopo.compiler.tried import way
 
     way().enter_threads()

@@ -104,5 +104,5 @@ def negative(vector: Floats) -> int:
 
 @when_compiling
 def _register() -> None:
-    """Have Numba know them."""
+    """Make the functions of this module known to Numba."""
     import mdstopo.compiler.vector_lowering  # noqa: F401

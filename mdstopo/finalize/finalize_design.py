@@ -50,7 +50,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Finalized:
-    """What became of a result.
+    """A result whose members were kept, sized anew and verified, and the text of the final case.
 
     case: the full one; reduced: with only the members kept. kept (K,): their places among the design members, places:
     in their groups. before, alpha (K,): their alphas in the result and now; values: the same of parameters of laws.

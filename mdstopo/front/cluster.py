@@ -30,7 +30,7 @@ def perform_alone(setting: Setting, job: Job) -> Any:
 
 
 def _version() -> str:
-    """Of mdstopo where this runs."""
+    """The version of mdstopo in the process that this runs in."""
     try:
         from mdstopo._version import __version__ as found
     except ImportError:
@@ -67,7 +67,7 @@ class Cluster:
         self._setting = setting
 
     def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
-        """As they are done, nothing of what is not. Raises WorkerError where the scheduler is gone."""
+        """Results as they are done; missing ones are left out. Raises WorkerError where the scheduler is gone."""
         done: queue.Queue[Any] = queue.Queue()
         futures = {
             self._client.submit(perform_alone, self._setting, job, pure=False, retries=2): place

@@ -59,7 +59,7 @@ class Here:
             yield place, result
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Do nothing: no processes are held."""
 
 
 class Processes:
@@ -73,7 +73,7 @@ class Processes:
         self.at_once = workers
 
     def results(self, jobs: Sequence[Job], keep: Keep = ignore_both) -> Iterator[tuple[int, Any]]:
-        """As they are done."""
+        """Results as they are done."""
         reached: dict[int, State] = {}
 
         def job(place: int) -> Job:

@@ -326,7 +326,7 @@ class _FrontRun:
             self.saver.offer(urgent=found.seconds > INTERVAL)
 
     def tell(self, running: dict[int, int]) -> None:
-        """Progress."""
+        """Tell `on_progress` how far the front is."""
         done = list(self.solved.values())
         mean = sum(each.seconds for each in done) / len(done) if done else float("nan")
         best: dict[int, Found] = dict(self.planner.best)

@@ -80,7 +80,7 @@ class System:
         return matrix
 
     def mass(self, body: str) -> float:
-        """Of a body, kg."""
+        """The mass of a body (kg)."""
         return self.case.body(body).mass
 
     @cached_property

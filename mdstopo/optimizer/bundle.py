@@ -119,7 +119,7 @@ class Bundle:
         return largest_of_groups(self.values(), self.group, groups)
 
     def moved(self, d: Floats, length: float) -> "Bundle":
-        """The same rows seen from another iterate: d (N,) away, way in ranges (2-norm); none is its own."""
+        """The same rows seen from another iterate, d (N,) away, `way` in ranges (2-norm); none is marked as its own."""
         return self._with(
             vector=self.vectors_at(d), own=np.zeros(len(self), dtype=np.bool_), distance=self.distance + length
         )
@@ -177,7 +177,7 @@ class Bundle:
         return self.subset(np.sort(order[: max(most, int(self.own.sum()))]))
 
     def aged(self, multipliers: Floats, enough: Floats) -> "Bundle":
-        """The same after a subproblem with multipliers (K,); enough (groups,): the least that counts."""
+        """The rows after a subproblem with multipliers (K,), with new ages; enough (groups,): the least that counts."""
         return self._with(age=np.where(multipliers > enough[self.group], 0, self.age + 1))
 
     def lines(self) -> tuple[Ints, Lines]:

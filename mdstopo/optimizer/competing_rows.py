@@ -67,7 +67,7 @@ class Around(Protocol):
     """The subproblems around one iterate, in its box."""
 
     def solve(self, rows: Bundle, penalty: Floats) -> Trial:
-        """That of rows, where violations of the constraints cost penalty (J,)."""
+        """Solve the subproblem of these rows, where violations of the constraints cost penalty (J,)."""
 
     def least_violation(self, rows: Bundle, constraints: int) -> Trial:
         """The step to the least sum of violations of so many constraints."""
@@ -76,7 +76,7 @@ class Around(Protocol):
         """By how much rows can change in the box, at most, (K,)."""
 
     def flat(self, curvature: float) -> "Around":
-        """The same with one curvature of all variables, in ranges, and none that was learnt."""
+        """The same subproblems with one curvature for all variables, in ranges, in place of what was learnt."""
 
 
 class RowModel(Protocol):
@@ -86,10 +86,10 @@ class RowModel(Protocol):
         """The subproblems at x (N,), in a box of so many ranges and so far; steps, changes: as of `State`."""
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
-        """As `residual`."""
+        """The projected KKT residual, as the function `residual` has it."""
 
     def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
-        """As `gradient_change`."""
+        """How the Lagrangian's gradient has changed over a step, as the function `gradient_change` has it."""
 
     def lengths(self, d: Floats) -> tuple[float, float]:
         """The largest change of a variable and the length of a step d (N,), in ranges."""
@@ -99,13 +99,13 @@ class RowModel(Protocol):
 
 
 class DenseModel:
-    """Problems whose rows are matrices: everything is computed of all variables."""
+    """The model of problems whose rows are matrices: everything is computed for all variables."""
 
     def __init__(self, space: FeasibleSet) -> None:
         self.space = space
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """As of `RowModel`."""
+        """The subproblems at x, as of `RowModel`."""
         assert isinstance(steps, np.ndarray)
         assert isinstance(changes, np.ndarray)
         space = self.space
@@ -114,26 +114,26 @@ class DenseModel:
         return _DenseAround(x, space, box, curvature_of(steps, changes, steepest, space.range))
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
-        """As of `RowModel`."""
+        """The projected KKT residual, as of `RowModel`."""
         return residual(own, x, self.space, penalty, steepest)
 
     def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
-        """As of `RowModel`."""
+        """How the Lagrangian's gradient has changed over a step, as of `RowModel`."""
         return gradient_change(bundle, new, d, multipliers)
 
     def lengths(self, d: Floats) -> tuple[float, float]:
-        """As of `RowModel`."""
+        """The largest entry and the length of a step, as of `RowModel`."""
         scaled = d / self.space.range
         return float(np.abs(scaled).max(initial=0.0)), float(np.sqrt(np.einsum("i,i->", scaled, scaled)))
 
     def learnt(self, known: Slopes, more: Floats) -> Slopes:
-        """As of `RowModel`."""
+        """The steps, or changes, that curvature is learnt from, as of `RowModel`."""
         return joined(known, more[None])[-(STEPS if len(more) <= FEW else FEW_STEPS) :]
 
 
 @dataclass(frozen=True, slots=True)
 class _DenseAround:
-    """As `Around`: the iterate x, the box's ends (N,), B."""
+    """The subproblems around an iterate x in a box (its ends (N,)), with the curvature B."""
 
     x: Floats
     space: FeasibleSet

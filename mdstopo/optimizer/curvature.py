@@ -47,13 +47,13 @@ class Curvature:
         return np.asarray(np.diag(self.diagonal) + (self.factor * self.weight) @ self.factor.T)
 
     def scaled(self, width: Floats, by: float) -> "Curvature":
-        """That in variables of another width (N,), divided by a number."""
+        """This curvature in variables of another width (N,), divided by a number."""
         if self.matrix is not None:
             return replace(self, matrix=self.matrix * np.outer(width, width) / by)
         return Curvature(self.diagonal * width**2 / by, self.factor * width[:, None], self.weight / by)
 
     def restricted(self, some: Bools) -> "Curvature":
-        """That of some of the variables, by a mask (N,)."""
+        """This curvature of some of the variables, chosen by a mask (N,)."""
         if self.matrix is not None:
             return replace(self, matrix=self.matrix[np.ix_(some, some)])
         return Curvature(self.diagonal[some], self.factor[some], self.weight)

@@ -71,7 +71,7 @@ class Gsao:
         self.bundle = self._bundle_method(space) if settings.flag("bundle") else None
 
     def _bundle_method(self, space: FeasibleSet) -> BundleMethod | None:
-        """That of the problem's size; of very many variables only where rows compete from the start."""
+        """The bundle method for the problem's size; of very many variables only where rows compete from the start."""
         if len(self.lower) < WIDE:
             return BundleMethod(DenseModel(space), self.settings)
         return BundleMethod(WideModel(space, self._measures), self.settings) if self.competes else None
@@ -137,7 +137,7 @@ class Gsao:
         )
 
     def _judge(self, state: State, sample: Sample) -> bool:
-        """Keep the evaluated trial where it is the best so far; whether the method at work accepts it."""
+        """Keep the evaluated trial where it is the best so far; whether the method in use accepts it."""
         violation, plain = scaled_violation(sample), plain_violation(sample)
         if better(sample.objective, violation, plain, state, self.settings.tolerance):
             state.best_alpha, state.best_objective = state.trial, sample.objective
@@ -146,20 +146,20 @@ class Gsao:
         return self._method(state).judge(state, sample)
 
     def _propose(self, state: State) -> None:
-        """The next trial; where the method at work gets no further, that of another one, or of the same begun anew."""
+        """Set the next trial; where the method in use gets no further, another one sets it, or the same begun anew."""
         self._method(state).propose(state)
         if self.bundle is not None and state.running and self._change_method(state, self.bundle):
             self._method(state).propose(state)
 
     def _method(self, state: State) -> Method:
-        """The one at work."""
+        """The method that makes the steps now."""
         if not state.uses_bundle:
             return self.separable
         assert self.bundle is not None
         return self.bundle
 
     def _change_method(self, state: State, bundle: BundleMethod) -> bool:
-        """Whether the bundle method takes over or begins anew, because the method at work gets no further."""
+        """Whether the bundle method takes over or begins anew, because the method in use gets no further."""
         stuck = self._is_stuck(state)
         if state.uses_bundle:
             return bundle.begin_anew(state, stuck)

@@ -114,7 +114,7 @@ class Sample:
 
 
 class Problem(Protocol):
-    """The duties of a problem.
+    """What an optimiser asks of a problem.
 
     1. `initial`, `lower`, `upper` (N,) and `linear` never change; lower <= upper; `initial` may be infeasible.
     2. `evaluate` is a pure function of x: the same bits in, the same bits out, or resumed runs differ.

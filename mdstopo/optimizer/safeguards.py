@@ -106,7 +106,7 @@ def cuts_from(state: State, trial: Floats, objective: float) -> tuple[Floats, Fl
 
 
 def no_cuts(n: int) -> tuple[Floats, Floats]:
-    """None, of n variables."""
+    """No cuts, of n variables."""
     return np.zeros(0), np.zeros((0, n))
 
 

@@ -44,7 +44,7 @@ class Stack:
         return np.array([total(row, x) for row in self.rows])
 
     def __array__(self, dtype: object = None, copy: bool | None = None) -> NDArray[np.float64]:
-        """All in one array, as files have it."""
+        """All rows in one array, as files have them."""
         return np.array(self.rows).reshape(self.shape)
 
 
@@ -53,7 +53,7 @@ Slopes: TypeAlias = Floats | Stack
 
 
 def slopes_of(matrix: Slopes) -> Slopes:
-    """As rows are kept: of very many variables a stack."""
+    """Gradients in the form in which they are kept: a stack where the variables are very many."""
     return Stack.of(matrix) if isinstance(matrix, np.ndarray) and matrix.shape[1] >= WIDE else matrix
 
 

@@ -126,7 +126,7 @@ class Step:
     origin: Floats
 
     def __eq__(self, other: object) -> bool:
-        """Whether it lies between the same arrays."""
+        """Whether two steps lie between the same arrays."""
         return isinstance(other, Step) and self.to is other.to and self.origin is other.origin
 
     __hash__ = None  # type: ignore[assignment]  # arrays have none
@@ -148,7 +148,7 @@ class RowDetails:
 
     @classmethod
     def of(cls, sample: Sample) -> "RowDetails":
-        """That of a sample."""
+        """The details of a sample's rows."""
         return cls(*(getattr(sample, f.name) for f in fields(cls)))
 
 
@@ -243,7 +243,7 @@ class State:
         )
 
     def take(self, sample: Sample, violation: float) -> None:
-        """The trial, whose sample and violation (`safeguards.scaled_violation`) these are, becomes the iterate."""
+        """Make the trial the iterate; sample and violation (`safeguards.scaled_violation`) are what was found there."""
         self.alpha = self.trial
         self.objective, self.violation = sample.objective, violation
         self.rows, self.gradients = sample.rows, sample.gradients

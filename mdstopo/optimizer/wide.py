@@ -37,7 +37,7 @@ T = TypeVar("T")
 #: variables from which on this way is taken
 MANY = 256
 _LEAST_SAMPLE = 256
-#: the part of the slots from which on their memory is not kept
+#: where more than one in so many variables had a slot, the memory of the slots is not kept
 MUCH = 16
 
 
@@ -60,7 +60,7 @@ class Space(NamedTuple):
 
     @classmethod
     def of(cls, lower: Floats, upper: Floats, linear: LinearRows) -> "Space":
-        """That of bounds and rows."""
+        """The space of designs within bounds and rows."""
         unit = short(ranges(lower, upper))
         return cls(short(lower), short(upper), linear, tuple(short(row) for row in linear.A), unit)
 
@@ -239,13 +239,13 @@ class ShiftRule(NamedTuple):
 
     @classmethod
     def of(cls, settings: Settings) -> "ShiftRule":
-        """That of settings."""
+        """The rule that the settings state."""
         numbers = [settings.number(f"shift_{name}") for name in ("grow", "shrink", "minimum", "maximum")]
         return cls(np.array(numbers), (numbers[2], numbers[3]))
 
 
 def next_wide_shift(shift: Shifts, last: Step, step: Step, rule: ShiftRule, room: Room) -> Shifts:
-    """As `safeguards.next_shift`. Of a step that was made in the room, and of the one before, it is known who moved."""
+    """The next distances of the shifts, as `safeguards.next_shift`, from those that moved where these are known."""
     made, n = room.made == step, len(step.to)
     known = made and room.signed == last and shift.within == rule.within
     _, _, moves, counts, _ = room.of(n)  # what was found has become what moves in `measure`
@@ -293,7 +293,7 @@ def _touched_up(trial: Floats, slots: Floats, place: Ints, measures: Measures, r
         square = float(np.einsum("i,i->", push, push))
         if square == 0.0:
             break
-        trial = trial.copy()  # what is known of the other stays true
+        trial = trial.copy()  # `Measures` keeps what it knows of the other array
         trial[place] = np.clip(at - left / square * push, low, high)
         left = float(measures.excess(trial)[0])
     lower, upper = (np.resize(end, len(trial)) for end in (space.lower, space.upper))

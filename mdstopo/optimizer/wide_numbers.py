@@ -11,11 +11,11 @@ from mdstopo.optimizer.wide_passes import wide_largest, wide_sum
 #: variables from which on memory counts: single passes are compiled too, no cuts are kept, what is alike is not read
 #: again
 WIDE = 10_000
-#: and from which on threads share them
+#: variables from which on threads share a pass
 SHARED = 200_000
-#: where a pass does little, so that making threads would cost as much
+#: the same of a pass that does so little that making threads would cost as much
 LIGHT = 400_000
-#: up to which Python is faster with numbers than NumPy
+#: numbers up to which Python is faster than NumPy
 FEW = 8
 
 
@@ -27,7 +27,7 @@ def steepest(gradients: Floats) -> Floats:
 
 
 def finite(numbers: Floats) -> bool:
-    """Whether all are."""
+    """Whether all numbers are finite."""
     if numbers.size <= FEW:
         return all(map(isfinite, numbers.ravel().tolist()))
     if numbers.size < WIDE or not numbers.flags.c_contiguous:

@@ -90,12 +90,12 @@ class Room(NamedTuple):
 
     @classmethod
     def of(cls, n: int) -> "Room":
-        """That of n variables."""
+        """Memory for n variables."""
         pieces = -(-n // PIECE)
         return cls(np.zeros((2, n), dtype=np.bool_), np.zeros(n, dtype=np.int64), np.zeros(pieces, dtype=np.int64))
 
     def listed(self) -> Ints:
-        """Those that the last pass has found, in order."""
+        """The variables that the last pass has found, in order."""
         counts = self.counts.tolist()
         return np.concatenate([self.found[k * PIECE : k * PIECE + count] for k, count in enumerate(counts)])
 
@@ -126,7 +126,7 @@ class WideProgram:
         )
 
     def with_products(self, products: Floats) -> "WideProgram":
-        """The same with the curvature that these products tell; that of a sample is positive only by its own."""
+        """The same program with the curvature of these products; that of a sample is positive only by its own."""
         found = compact(products, len(products) // 2, float(self.region.limits[H]))
         if found is None:
             return self.without_curvature()
@@ -135,7 +135,7 @@ class WideProgram:
         return replace(self, M=M)
 
     def without_curvature(self) -> "WideProgram":
-        """The same with rows of the curvature that weigh next to nothing."""
+        """The same program with rows of the curvature that weigh next to nothing."""
         return replace(self, M=np.diag(np.where(self.kind == CURVED, -WEIGHTLESS, 0.0)))
 
 
@@ -150,12 +150,12 @@ class Few(NamedTuple):
     weight: float = 1.0
 
     def some(self, part: slice | Bools, weight: float = 1.0) -> "Few":
-        """Some of them."""
+        """A part of these variables."""
         Q = np.ascontiguousarray(self.Q[:, part])
         return Few(self.which[part], Q, self.low[part], self.high[part], self.h[part], weight)
 
     def joined(self, other: "Few") -> "Few":
-        """These and others."""
+        """These variables, then the others."""
         one, two = (np.stack([each.low, each.high, each.h]) for each in (self, other))
         which, Q = np.concatenate([self.which, other.which]), np.concatenate([self.Q, other.Q], axis=1)
         return Few(which, Q, *np.concatenate([one, two], axis=1))
@@ -169,7 +169,7 @@ class Guess(NamedTuple):
     doubt: float
 
     def moved(self, theta: Floats, doubt: float) -> "Guess":
-        """That of other multipliers, where they are known to be no larger than the largest that were met."""
+        """The guess of other multipliers, where they are known to be no larger than the largest that were met."""
         return Guess(theta, np.maximum(self.spread, np.abs(theta)), doubt)
 
 
@@ -297,7 +297,7 @@ def _doubtful(program: WideProgram, guess: Guess, room: Room) -> tuple[Few, Floa
 
 
 def _decided(few: Few, guess: Guess, sums: Floats, inside: Floats, room: Room) -> tuple[Few, Floats, Floats]:
-    """As `_doubtful`, of a few, beside what others add."""
+    """Decide some of a few variables by a better guess; returns as `_doubtful`, sums with what others add."""
     r, doubt = guess.theta @ few.Q, guess.doubt * (guess.spread @ np.abs(few.Q))
     least, most = r + few.h * few.low, r + few.h * few.high
     low, high = least > doubt, most < -doubt

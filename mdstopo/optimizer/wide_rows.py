@@ -28,7 +28,7 @@ PAIRS = 3
 REPAIRS = 5
 #: curvature of the subproblem of least violation, of the steepest limit
 NEXT_TO_NONE = 1e-6
-#: of no steps
+#: products and M where no steps are known
 NOTHING = np.zeros((0, 0))
 #: of how many variables one tells how far a row reaches, where only rounding depends on it
 SPARSE = 64
@@ -47,7 +47,7 @@ class Pool:
         """Where arrays (N,) are, (R,), those with True over the square of the ranges; others may go for them."""
         keys = [(id(array), over) for array, over in arrays]
         for key in keys:
-            if key in self._where:  # not to be taken for another
+            if key in self._where:  # it becomes the newest, so that none of those asked for now takes its place
                 self._held[self._where[key]] = self._held.pop(self._where[key])
         known = {self._where[key] for key in keys if key in self._where}
         oldest = [k for k in self._held if k not in known]
@@ -75,7 +75,7 @@ class Pool:
 
 
 class WideModel:
-    """The duties of `competing_rows.RowModel` for very many variables.
+    """What `competing_rows.RowModel` asks for, with very many variables.
 
     space: the problem's; measures: those of the driver.
     """
@@ -89,7 +89,7 @@ class WideModel:
         self.linear = [(np.ascontiguousarray(row), False) for row in space.linear.A]
 
     def around(self, x: Floats, reach: tuple[float, float], steps: Slopes, changes: Slopes, steepest: float) -> Around:
-        """As of `RowModel`."""
+        """The subproblems at x, as of `RowModel`."""
         s, y = _stack(steps), _stack(changes)
         pairs = [*((row, True) for row in s.rows), *((row, False) for row in y.rows)]
         while pairs:
@@ -104,7 +104,7 @@ class WideModel:
         return _WideAround(self, x, reach, FLOOR * steepest, [], NOTHING, NOTHING, scaled=True)
 
     def residual(self, own: Bundle, x: Floats, penalty: Floats, steepest: float) -> float:
-        """As of `RowModel`."""
+        """The projected KKT residual, as of `RowModel`."""
         if steepest == 0.0:
             return 0.0
         anywhere = _WideAround(self, x, (np.inf, np.inf), steepest, [], NOTHING, NOTHING, scaled=False)
@@ -125,7 +125,7 @@ class WideModel:
         return max(moved, float(gaps.sum() + slack.sum()) / steepest, missing)
 
     def gradient_change(self, bundle: Bundle, new: Bundle, d: Floats, multipliers: Floats) -> Floats | None:
-        """As of `RowModel`."""
+        """How the Lagrangian's gradient has changed over a step, as of `RowModel`."""
         groups = int(max(bundle.group.max(initial=0), new.group.max(initial=0))) + 1
         own = np.flatnonzero(bundle.own & (multipliers > 0.0))
         total_ = np.bincount(bundle.group, weights=multipliers, minlength=groups)
@@ -153,7 +153,7 @@ class WideModel:
         return change
 
     def lengths(self, d: Floats) -> tuple[float, float]:
-        """As of `RowModel`."""
+        """The largest entry and the length of a step, as of `RowModel`."""
         if len(self.unit) == 1:  # all ranges are alike
             unit = float(self.unit[0])
             return float(self.measures.steepest(d[None])[0]) / unit, float(np.sqrt(total(d, d))) / unit
@@ -161,11 +161,11 @@ class WideModel:
         return float(self.measures.steepest(scaled[None])[0]), float(np.sqrt(total(scaled, scaled)))
 
     def learnt(self, known: Slopes, more: Floats) -> Slopes:
-        """As of `RowModel`."""
+        """The steps, or changes, that curvature is learnt from, as of `RowModel`."""
         return _stack(joined(known, more[None]))[-PAIRS:]
 
     def _products(self, places: Ints) -> tuple[Floats, Floats]:
-        """Of rows of the pool: their products, and those with the ranges' squares."""
+        """Products of rows of the pool with each other: plain, and weighted with the ranges' squares."""
         plain, scaled = np.empty((2, len(places), len(places)))
         threads = threads_for(self.pool.rows.shape[1], LIGHT)
         gram(self.pool.rows, places, self.measures.space.unit, threads, plain, scaled)
@@ -174,7 +174,7 @@ class WideModel:
 
 @dataclass(frozen=True, slots=True)
 class _WideAround:
-    """As `competing_rows.Around`.
+    """The subproblems around an iterate, as `competing_rows.Around`.
 
     curvature: that of all variables, in ranges if `scaled`; learnt: steps and changes (2 m rows), with their products
     and M (2 m, 2 m) of B = curvature - Z' M^-1 Z.
@@ -249,7 +249,7 @@ class _WideAround:
                 break
             push = np.linalg.lstsq(A @ A.T, left[broken], rcond=1e-12)[0] @ A
             which = few.which[inside]
-            trial = trial.copy()  # what is known of the other stays true
+            trial = trial.copy()  # `Measures` keeps what it knows of the other array
             trial[which] = np.clip(at[inside] - push, low[inside], high[inside])
             change = change + few.Q[:, inside] @ (trial[which] - at[inside])
         low, high, _ = program.region.box(slice(None))

@@ -264,7 +264,7 @@ class Planner:
             yield from self._exchange()
 
     def _further(self) -> Generator[list[Task], list[Result], tuple[Found, ...]]:
-        """What was visited and belongs to the front."""
+        """The designs that were only visited and belong to the front."""
         points = [self._signed(each) for each in self.best.values() if each.usable and not _beyond(each)]
         front = np.array(points).reshape(-1, self.m)
         spacing = even_spacing(self.count, self.m)
@@ -400,7 +400,7 @@ class Planner:
         return Task(j, self.scalarisation(j), start, self.request.iterations)
 
     def _new(self, tasks: list[Task], again: bool = False) -> list[Task]:
-        """Those tasks whose point has not begun there before, each once."""
+        """The tasks that were not begun yet for their point from their start, each once."""
         if again:
             self.solved = {mark for mark in self.solved if mark[0] < 0}
         new = []

@@ -69,7 +69,7 @@ def race(
 
 
 def _pairs(tasks: Sequence[Task], results: Sequence[Result]) -> Solved:
-    """The first results, which are their tasks' ends."""
+    """Each task with its result, which is the task's end; results behind those of the tasks are left out."""
     pairs: Solved = []
     for task, result in zip(tasks, results, strict=False):
         assert isinstance(result, Found)

@@ -113,7 +113,7 @@ def case_key(case: Case) -> str:
 
 
 def front_key(case: Case) -> str:
-    """As `case_key`, but for the number of starts, on which no single solve depends."""
+    """The hash of `case_key` without the number of starts, on which no single solve depends."""
     return case_key(replace(case, optimizer=replace(case.optimizer, starts=1)))
 
 

@@ -46,7 +46,7 @@ def tasks_part(found: Iterable[Found], case: Case, place: str = "pareto/tasks") 
 
 
 def _violations(found: Found) -> Floats:
-    """Of every design that was visited; NaN where they are not known, as of the runs of a sweep."""
+    """The violation of every design that was visited; NaN where it is not known, as of the runs of a sweep."""
     if len(found.violations) == len(found.visited):
         return found.violations
     return np.full(len(found.visited), np.nan)

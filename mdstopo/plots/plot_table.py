@@ -18,7 +18,7 @@ class Plot:
 
     @property
     def draw(self):  # type: ignore[no-untyped-def]
-        """The function."""
+        """The function that draws the picture."""
         return getattr(import_module(f"mdstopo.plots.{self.place[0]}_plot"), self.place[1])
 
 

@@ -47,7 +47,7 @@ class Source:
 
     @property
     def title(self) -> str:
-        """Of the case, or its name."""
+        """The title of the case, or its name."""
         return self.view.title or self.view.name
 
     @property
@@ -95,7 +95,7 @@ class Source:
 
     @property
     def load_cases(self) -> tuple[str, ...]:
-        """Their names."""
+        """Names of the load cases."""
         return tuple(each.name for each in self.case.load_cases)
 
     def motion(self, load_case: str, times: Floats | None = None) -> Motion:

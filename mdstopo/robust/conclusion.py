@@ -60,7 +60,7 @@ class Conclusion:
     warnings: tuple[str, ...]
 
     def of(self, name: str) -> Robust | None:
-        """That of an objective or a constraint; None where there is none."""
+        """The result of an objective or a constraint; None where there is none."""
         return next((each for each in self.results if each.name == name), None)
 
 

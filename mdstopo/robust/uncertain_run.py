@@ -33,7 +33,7 @@ def spread(engine: Engine, case: Case, workers: int, helpers: ExitStack, notify:
 
 
 def concluded(engine: Engine, alpha: NDArray[np.float64]) -> Conclusion:
-    """What became of the final design alpha (N,)."""
+    """What the final design alpha (N,) comes to on the nominal case, its sample and a fresh one."""
     ensemble = _ensemble(engine)
     return conclude(ensemble, alpha, ensemble.evaluate(alpha, gradient=False), ensemble.workers)
 

@@ -139,7 +139,7 @@ class Combining:
 
 
 def _sentence(case: Case, task: Task, found: Found) -> str:
-    """How an objective alone fared."""
+    """How the optimisation of one objective alone ended."""
     place = -1 - task.point
     name, ended = case.objectives[place].name, str(found.status).replace("_", " ")
     return f"{name} alone: {found.objectives[place]:.6g} after {found.evaluations} evaluations, {ended}"

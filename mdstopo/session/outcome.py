@@ -40,7 +40,7 @@ class Progress:
 
     @classmethod
     def of(cls, state: State, start: int, starts: int, max_iterations: int) -> "Progress":
-        """That of a state which has just been reached."""
+        """The progress of a start whose state has just been reached."""
         history = state.history
         rows = np.concatenate([np.atleast_1d(history.constraints[-1]), np.atleast_1d(history.nonlinear[-1])])
         return cls(

@@ -166,7 +166,7 @@ class _Run:
         self.helpers = ExitStack()
 
     def go(self, make: MakeEngine, path: Path | None, previous: ResultView | None, workers: int) -> Outcome:
-        """The whole run."""
+        """Go through the whole run."""
         if previous is not None:
             self.restore(previous)
         began = time.perf_counter()

@@ -96,7 +96,7 @@ def run_stages(
 
 
 def _next(before: State, fresh: State) -> State:
-    """The first state of a stage, behind all that came before it."""
+    """The first state of a stage, with the history of all that came before it."""
     old, new = before.history, fresh.history
     info = {name: [*rows, *_like(rows[0], new.info.get(name, [None]))] for name, rows in old.info.items()}
     history = History(

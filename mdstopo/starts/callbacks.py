@@ -2,13 +2,13 @@
 
 
 def ignore(_: object) -> None:
-    """Nobody listens."""
+    """Take something and do nothing with it."""
 
 
 def ignore_state(_index: int, _state: object) -> None:
-    """Nobody keeps it."""
+    """Take a state and do nothing with it."""
 
 
 def never() -> bool:
-    """Nobody asks for a stop."""
+    """Never ask for a stop."""
     return False

@@ -25,7 +25,7 @@ class Provenance:
 
     @classmethod
     def collect(cls, command: str = "") -> "Provenance":
-        """That of this process. `command`: the command line, where there is one."""
+        """The provenance of this process. `command`: the command line, where there is one."""
         import h5py
         import numpy as np
 
@@ -43,5 +43,5 @@ class Provenance:
         )
 
     def attributes(self) -> dict[str, str]:
-        """By name, as the file holds them."""
+        """The values by name, as the file holds them."""
         return {f.name: getattr(self, f.name) for f in fields(self)}

@@ -48,7 +48,7 @@ def read_seal(stream: BinaryIO) -> Seal:
 
 
 def _checksum(stream: BinaryIO, length: int) -> int:
-    """Of so many bytes from the start."""
+    """The checksum of so many bytes from the start."""
     stream.seek(0)
     found = 0
     while length > 0:

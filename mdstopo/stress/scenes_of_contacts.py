@@ -105,7 +105,7 @@ def _bounces(case: "Case") -> float:
 
 
 def settling(**solver: Any) -> dict[str, Any]:
-    """The same with a floor that takes most of the speed: ever shorter bounces, then rest on the spring."""
+    """As `dropped`, with a floor that takes most of the speed: ever shorter bounces, then rest on the spring."""
     return dropped(True, **solver)
 
 

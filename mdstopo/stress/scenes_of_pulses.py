@@ -55,7 +55,7 @@ def _speed(rate: float, when: tuple[float, ...], case: "Case") -> float:
 
 
 def struck(rate: float, **solver: Any) -> dict[str, Any]:
-    """The same on a spring of 400 N/m beside the pulse; looked at: the largest acceleration."""
+    """As `pulled`, with a spring of 400 N/m beside the pulse; looked at: the largest acceleration."""
     scene = pulled(rate, **solver)
     scene["members"]["spring"] = spring([6.0, 0.0], "ball", [3.0, 0.0], stiffness=400.0)
     scene["objectives"] = {

@@ -90,7 +90,7 @@ class _Round:
 
 
 def _nothing_kept(_place: int, _state: object) -> None:
-    """Nobody keeps it."""
+    """Take what a task has kept and do nothing with it."""
 
 
 def _never() -> bool:
@@ -98,7 +98,7 @@ def _never() -> bool:
 
 
 def _ignore(_words: str) -> None:
-    """Nobody listens."""
+    """Take a sentence and do nothing with it."""
 
 
 class WorkerPool:
@@ -176,7 +176,7 @@ class WorkerPool:
         self._workers = [None] * len(self._workers)
 
     def _leave(self) -> None:
-        """End workers that are still at what nobody waits for any more."""
+        """End workers whose results are not wanted any more."""
         for slot, worker in enumerate(self._workers):
             if worker is not None and (worker.place is not None or worker.has_ended):
                 worker.close()
@@ -236,7 +236,7 @@ class WorkerPool:
             yield place, what
 
     def _lost(self, work: _Round, worker: "_Worker", stopping: bool) -> Iterator[tuple[int, Any]]:
-        """What follows where a worker has ended by itself."""
+        """Have another worker do the task of one that has ended by itself, or give the task up."""
         place = worker.place
         status = self._drop(worker)
         if place is None:
@@ -289,7 +289,7 @@ class _Worker:
         return self._process.poll() is not None
 
     def give(self, place: int, task: object) -> None:
-        """Have it do a task."""
+        """Send it a task."""
         self.place, self.began = place, time.perf_counter()
         self.send(("task", task))
 

@@ -47,10 +47,10 @@ class CrushLaw(Law):
         return largest(ranges("force"))
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """That in which it is crushed."""
+        """The side on which it is crushed."""
         del ranges
         return int(sign_of(self.side))
 
     def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray:
-        """Until the gap is used up."""
+        """By how much the length has to change until the gap is used up, (M,) m."""
         return slack_before(self.side, self.free_length, ranges, length)

@@ -58,7 +58,7 @@ class GapLaw(Law):
         return 0 if largest(ranges("damping")) > 0.0 and not self.clip else int(sign_of(self.side))
 
     def slack(self, ranges: Ranges, length: FloatArray) -> FloatArray:
-        """Until the gap is used up."""
+        """By how much the length has to change until the gap is used up, (M,) m."""
         return slack_before(self.side, self.free_length, ranges, length)
 
     def force_at(self, stretch: FloatArray, rate: FloatArray) -> FloatArray:

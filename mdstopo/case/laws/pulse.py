@@ -27,5 +27,5 @@ class PulseLaw(Law):
         return largest(ranges("peak"))
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """That of the peak."""
+        """The sign of the peak; 0 where it may have both."""
         return side_between(ranges("peak"))

@@ -27,6 +27,6 @@ class TableLaw(Law):
         return float(abs(self.table.values).max())
 
     def side_of_force(self, ranges: Ranges) -> int:
-        """That of its values."""
+        """The sign of the values; 0 where they have both."""
         del ranges
         return side_between((float(self.table.values.min()), float(self.table.values.max())))
