@@ -47,7 +47,7 @@ class Pool:
         """Where arrays (N,) are, (R,), those with True over the square of the ranges; others may go for them."""
         keys = [(id(array), over) for array, over in arrays]
         for key in keys:
-            if key in self._where:  # it becomes the newest, so that none of those asked for now takes its place
+            if key in self._where:  # it becomes the one last asked for
                 self._held[self._where[key]] = self._held.pop(self._where[key])
         known = {self._where[key] for key in keys if key in self._where}
         oldest = [k for k in self._held if k not in known]
