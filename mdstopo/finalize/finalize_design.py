@@ -163,7 +163,8 @@ def finalize(
     stop_requested: asked after each iteration whether to stop.
     notify: is given sentences for the user.
 
-    The text is empty where the run was interrupted, or where its design or its equilibrium cannot be computed.
+    The text is empty where the run was interrupted, or its design cannot be computed, or does not rest at the
+    equilibrium of the full one.
     """
     design = case.whole(design)
     joined = apart(case, unlike(case, kept))
