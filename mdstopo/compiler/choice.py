@@ -1,6 +1,8 @@
 """Kernels that are chosen by a code: a chain of branches made from a list, so that nobody writes it.
 
     LISTED: Listed[Kernels] = Listed()
+    ...
+    LISTED.is_filled = True
 
     @chosen(LISTED, lambda each: each.force, inline)
     def law(code, p, x):
@@ -30,10 +32,15 @@ T = TypeVar("T")
 
 
 class Listed(Generic[T]):
-    """Things by their codes, from 0."""
+    """Things by their codes, from 0.
+
+    While a module is imported it fills its list, and nothing can have been compiled with it. `is_filled` says that it
+    has, and that from then on one more thing makes what was compiled anew.
+    """
 
     def __init__(self) -> None:
         self._things: list[T] = []
+        self.is_filled = False
 
     def __len__(self) -> int:
         return len(self._things)
@@ -47,7 +54,8 @@ class Listed(Generic[T]):
     def add(self, thing: T) -> int:
         """Append one; returns its code."""
         self._things.append(thing)
-        compile_anew()
+        if self.is_filled:
+            compile_anew()
         return len(self._things) - 1
 
 

@@ -18,6 +18,8 @@ from mdstopo.compiler import tried
 _PLAIN = "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING"
 
 _PENDING: list[Callable[[], None]] = []
+#: Numba's objects that are used no more: its tables hold them weakly, and it fails where it meets one that is gone
+_FORGOTTEN: list[Any] = []
 #: all kernels of this process
 _MADE: "weakref.WeakSet[Kernel]" = weakref.WeakSet()
 
@@ -96,6 +98,8 @@ class Kernel:
 
     def forget(self) -> None:
         """Make Numba's object anew when it is next asked for."""
+        if self._dispatcher is not None:
+            _FORGOTTEN.append(self._dispatcher)
         self._dispatcher = self._way = None
 
     @property

@@ -734,3 +734,4 @@ def code_of(kind: ResponseKind) -> int:
 for _kind in RESPONSES.values():
     if _kind.kernels.startswith("mdstopo."):
         code_of(_kind)
+LISTED.is_filled = True

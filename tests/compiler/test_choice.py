@@ -1,6 +1,8 @@
 """Branches by code made from a list: which kernel is called with what, and what happens when the list grows."""
 
+import gc
 import sys
+import weakref
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -26,6 +28,7 @@ def table(*things: Any) -> Listed[Any]:
     listed: Listed[Any] = Listed()
     for thing in things:
         listed.add(thing)
+    listed.is_filled = True
     return listed
 
 
@@ -74,6 +77,25 @@ def test_what_was_compiled_before_the_list_grew_is_made_anew(tmp_path: Path, mon
     assert call_growing(1, 3.0, 5.0) == 515.0
     assert call_growing(0, 3.0, 5.0) == 6.0
     assert prepared() == 6.0
+
+
+def test_a_list_that_a_module_fills_makes_nothing_anew() -> None:
+    before = few.dispatcher  # type: ignore[attr-defined]
+    filling: Listed[Any] = Listed()
+    filling.add(twice)
+    assert few.dispatcher is before  # type: ignore[attr-defined]
+    filling.is_filled = True
+    filling.add(product)
+    assert few.dispatcher is not before  # type: ignore[attr-defined]
+
+
+def test_what_was_compiled_outlives_a_list_that_grows() -> None:
+    """Numba's tables hold functions weakly, and looking anything up there fails where it meets one that is gone."""
+    kept = weakref.ref(few.dispatcher)  # type: ignore[attr-defined]
+    FEW.add(None)
+    _ = few.dispatcher  # type: ignore[attr-defined]
+    gc.collect()
+    assert kept() is not None
 
 
 @chosen(table(product), lambda each: each, inline)

@@ -51,6 +51,7 @@ def enter(joint: type[Joint]) -> None:
 for _joint in JOINTS.values():
     if _joint.kernels.startswith("mdstopo."):
         enter(_joint)
+LISTED.is_filled = True
 
 
 def parameters(joint: Joint, home: FloatArray, first: int, second: int) -> list[float]:

@@ -60,6 +60,7 @@ def enter(law: type[Law]) -> None:
 for _law in LAWS.values():
     if _law.kernels.startswith("mdstopo."):
         enter(_law)
+LISTED.is_filled = True
 
 
 @chosen(LISTED, lambda each: each.force, inline)
