@@ -145,6 +145,9 @@ def _gradients(own: Scene, found: Found) -> None:
         found.undecided += len(own.result.objectives)
         return
     for name in own.result.gradients:
+        if own.sizes[name] <= SMALLEST:  # zero to rounding at every time, and rounding has no slope
+            found.undecided += 1
+            continue
         candidates = [(abs(a[name] - b[name]), b[name]) for a, b in pairwise(slopes)]
         doubt, slope = min(candidates)
         along = own.slopes(name, direction)

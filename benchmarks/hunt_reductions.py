@@ -33,8 +33,14 @@ def kinks(look: Look, grid: Vector, seen: Vector, led: bool) -> list[float]:
         found = [t for k in range(len(grid) - 1) for t in _between(look, grid[k], grid[k + 1], seen[k], seen[k + 1])]
         return found + [t for k in inside for t in _brief(look, grid[k - 1 : k + 2], seen[k - 1 : k + 2])]
     size = np.linalg.norm(seen, axis=1)
-    low = [k for k in range(1, len(grid) - 1) if size[k] <= min(size[k - 1], size[k + 1], LOW * size.max())]
-    return [_lowest(lambda t: length(look(t), False) ** 2, grid[k - 1], grid[k + 1]) for k in low]
+    last = len(grid) - 1
+    found = []
+    for k in range(last + 1):
+        before, after = max(k - 1, 0), min(k + 1, last)
+        if size[k] <= min(size[before], size[after], LOW * size.max()):
+            t = _lowest(lambda t: length(look(t), False) ** 2, grid[before], grid[after])
+            found += [t] if grid[0] < t < grid[-1] else []
+    return found
 
 
 def _between(look: Look, a: float, b: float, left: Vector, right: Vector, depth: int = 0) -> list[float]:
