@@ -66,7 +66,7 @@ def test_the_worked_examples_do_what_the_page_says(tmp_path: Path) -> None:
     for words in JOINED:
         command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *words]
         done = subprocess.run(
-            command, cwd=copy, env=environment, capture_output=True, text=True, timeout=600, check=False
+            command, cwd=copy, env=environment, capture_output=True, text=True, timeout=1800, check=False
         )
         assert done.returncode == 0, done.stdout + done.stderr
     for block in EXAMPLES:
