@@ -208,22 +208,24 @@ def _numbers(arrays: object) -> dict[str, bytes]:
 
 
 def _commands(folder: Path, count: int, rng: np.random.Generator) -> "Counter[str]":
-    """Whole commands, ended by every signal that ends one."""
+    """Whole commands, ended by every signal that ends one. One that got to its end is begun anew."""
     found: Counter[str] = Counter()
     signals = (signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT)
     words = ["--set", "optimizer.max_iterations=100000", "--resume", "--quiet"]
+    starts = {"run": ["--starts", "100"], "pareto": []}
     k = 0
     while found["kills"] < count:
         what = ("run", "pareto")[k % 2]
         path = folder / f"command-{what}.h5"
-        line = [sys.executable, "-m", "mdstopo", what, str(folder / "case.yaml"), "--out", str(path), *words]
-        process = subprocess.Popen(line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        line = [sys.executable, "-m", "mdstopo", what, str(folder / "case.yaml"), "--out", str(path)]
+        process = subprocess.Popen(
+            [*line, *words, *starts[what]], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        )
         until = time.monotonic() + LIMIT
         while not path.exists() and process.poll() is None and time.monotonic() < until:
             time.sleep(0.01)
         time.sleep(float(rng.uniform(0.0, 1.0)))
-        ended = process.poll() is not None
-        if not ended:
+        if process.poll() is None:
             process.send_signal(signals[(k // 2) % len(signals)])
             found["kills"] += 1
         try:
@@ -234,17 +236,21 @@ def _commands(folder: Path, count: int, rng: np.random.Generator) -> "Counter[st
             found["tracebacks"] += 1
         # a signal may come while Python itself begins, before anything of this package is imported
         found["tracebacks"] += "Traceback" in said and "Fatal Python error: init_" not in said
-        done = _evaluations(path, found)
+        done, finished = _evaluations(path, found)
         found["lost"] += done < found[f"reached {what}"]
-        found[f"reached {what}"] = 0 if ended else done
-        found["ends"] += ended
-        if ended:
-            path.unlink(missing_ok=True)
+        found[f"reached {what}"] = 0 if finished else done
+        found["ends"] += finished
+        if finished:
+            path.unlink()
         k += 1
     return found
 
 
-def _evaluations(path: Path, found: "Counter[str]") -> int:
+def _evaluations(path: Path, found: "Counter[str]") -> tuple[int, bool]:
+    """How many evaluations a file knows of, of solves that have ended and of those that go on; whether it has ended.
+
+    A file that cannot be read counts as such, and knows of none.
+    """
     from mdstopo.store.result_reader import read_result
     from mdstopo.store.store_errors import StoreError
 
@@ -252,10 +258,14 @@ def _evaluations(path: Path, found: "Counter[str]") -> int:
         view = read_result(path)
     except StoreError:
         found["unreadable"] += 1
-        return 0
-    return sum(
-        int(np.sum(array)) for name, array in view.arrays.items() if name.endswith("/evaluations") and "tasks" in name
-    )
+        return 0, False
+    counts = [
+        int(np.sum(array))
+        for name, array in view.arrays.items()
+        if name.endswith("/evaluations") and ("tasks/" in name or name.startswith("optimizer/"))
+        if "/history/" not in name  # which counts up to the same
+    ]
+    return sum(counts), view.finished
 
 
 # damages

@@ -18,10 +18,10 @@ def folder(tmp_path: Path) -> Path:
 
 def test_a_few_kills_and_damages_lose_nothing(folder: Path) -> None:
     killed = damage.kills(folder, 6, 2)
-    assert killed.rows[-1][-1] == "yes"
+    assert killed.rows[-1][-1] == "yes", killed.rows
     assert [int(row[2]) for row in killed.rows[:-1]] == [3, 3, 2]
     found = damage.damages(folder, 12, 12, 12, 0)
-    assert found.rows[-1][-1] == "yes"
+    assert found.rows[-1][-1] == "yes", found.rows
     assert [int(row[1]) for row in found.rows[:-1]] == [12, 12, 12, 0]
 
 
