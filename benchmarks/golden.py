@@ -13,8 +13,6 @@ import hashlib
 import json
 import os
 import platform
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -49,7 +47,11 @@ ITERATES = 1e-3
 
 @dataclass(frozen=True)
 class Finding:
-    """An item, compared. same: to the bit; error: the largest difference relative to the size, in what may differ."""
+    """An item, compared.
+
+    same: whether it is the same to the bit. error: the largest difference, relative to the array's size and in units of
+    what may differ on another machine. what: the arrays that differ.
+    """
 
     name: str
     same: bool
@@ -169,24 +171,10 @@ def compare(name: str, kept: Item) -> Finding:
     return Finding(name, not different, error, ", ".join(different))
 
 
-def compare_afresh(file: Path, chosen: Sequence[str]) -> list[Finding]:
-    """Compare items in another process: code that a process has just compiled may differ in the last bits from the
-    same code loaded (`mdstopo.starts.getting_ready`)."""
-    script = (
-        "import json, sys; from dataclasses import astuple; from pathlib import Path; "
-        "from benchmarks.golden import compare, read; items = read(Path(sys.argv[1]))[1]; "
-        "print(json.dumps([astuple(compare(name, items[name])) for name in sys.argv[2:]]))"
-    )
-    command = [sys.executable, "-c", script, str(file), *chosen]
-    done = subprocess.run(command, cwd=Path(__file__).parent.parent, capture_output=True, text=True, check=True)
-    return [Finding(*each) for each in json.loads(done.stdout.splitlines()[-1])]
-
-
 def differing(file: Path, chosen: Sequence[str]) -> list[Finding]:
-    """What differs of these items, in this process and in another."""
+    """What differs of these items."""
     items = read(file)[1]
-    first = [each for each in (compare(name, items[name]) for name in chosen) if not each.same]
-    return [each for each in compare_afresh(file, [each.name for each in first]) if not each.same] if first else []
+    return [each for each in (compare(name, items[name]) for name in chosen) if not each.same]
 
 
 def _allowed(name: str, key: str) -> float:

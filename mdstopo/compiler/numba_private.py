@@ -391,11 +391,12 @@ def _is_array_arithmetic(inst: Any, typemap: Any) -> bool:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Closures(InlineClosureLikes):
-    """Only where a function holds another."""
+    """Only where a function holds another. The first pass of ours: here a function gets the number in its symbol."""
 
     _name = "mdstopo_closures"
 
     def run_pass(self, state: Any) -> bool:
+        state.func_id.unique_id = number_of(state.func_id.func)
         held = state.func_id.code.co_consts
         return any(isinstance(each, CodeType) for each in held) and super().run_pass(state)
 
@@ -409,6 +410,25 @@ class _Unannotated(AnnotateTypes):
     def run_pass(self, state: Any) -> bool:
         state.type_annotation = ""
         return False
+
+
+#: functions by the numbers in their symbols
+_NUMBERED: dict[int, Callable[..., Any]] = {}
+
+
+def number_of(function: Callable[..., Any]) -> int:
+    """The number in a function's symbol, the same in every process; Numba's own counts what was compiled before.
+
+    Two processes that compile side by side hand each other functions by the disk, and what several of these hold is
+    one function only where its symbol is the same.
+    """
+    code = function.__code__
+    constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
+    told = f"{function.__module__} {function.__qualname__} {code.co_firstlineno} {code.co_names} {constants!r}"
+    number = int.from_bytes(hashlib.sha256(told.encode() + code.co_code).digest()[:4], "little")
+    while _NUMBERED.setdefault(number, function) is not function:
+        number += 1
+    return number
 
 
 #: ours, by the pass of Numba's that it takes the place of; none where they do not fit
@@ -434,6 +454,12 @@ class Optimised(JITCodeLibrary):
     """Intermediate code of a function with all that it calls, optimised."""
 
     def _finalize_final_module(self) -> None:
+        # read back as from the disk: there it is in another order in memory, on which LLVM's choices may depend
+        self._take(llvm.parse_bitcode(self._final_module.as_bitcode()))
+
+    def _take(self, module: Any) -> None:
+        """Have this module, to which nothing is added any more."""
+        self._final_module = module
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
         self._finalized = True
@@ -520,8 +546,15 @@ def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
 def _made(function: Callable[..., Any], pipeline: type[Compiler], fastmath: frozenset[str], part: bool) -> Any:
     # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
     options: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "pipeline_class": pipeline}
-    options |= {"error_model": "numpy", "fastmath": set(fastmath) or False, "forceinline": part}
+    options |= {"error_model": "numpy", "fastmath": _Sorted(fastmath) or False, "forceinline": part}
     return numba.njit(**options)(function)
+
+
+class _Sorted(set[str]):
+    """A set that is written in one order, whatever the process hashes texts by: symbols have it in them."""
+
+    def __str__(self) -> str:
+        return str(sorted(self))
 
 
 class _Reader:
@@ -538,8 +571,7 @@ class _Reader:
 
     def unserialize_library(self, kept: tuple[str, str, bytes]) -> Optimised:
         library = Optimised(self._target.codegen(), kept[0])
-        library._final_module = llvm.parse_bitcode(kept[2])
-        library._finalize_final_module()
+        library._take(llvm.parse_bitcode(kept[2]))
         return library
 
 

@@ -1,9 +1,8 @@
-"""Getting ready: every kernel loaded, always in one order.
+"""Getting ready: every kernel loaded before the first iteration, in one order.
 
-Machine code that a process has just compiled can differ in the last bits from the same kernels loaded from the cache
-(functions inside it exist in several copies, and which one is linked depends on who came first). A run that is resumed,
-or spread over workers, must not depend on that. So nothing that counts is computed by freshly compiled code: another
-process compiles first (`session.compiling_apart`), and every process then loads kernels alike.
+So iterations are timed for themselves, and a kernel that cannot be compiled is found before work is lost. Where kernels
+are not known to be on the disk, another process compiles them first (`session.compiling_apart`): what the compiler
+leaves in memory ends with it.
 """
 
 import numpy as np

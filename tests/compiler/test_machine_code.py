@@ -1,6 +1,7 @@
 """Machine code that is kept on the disk: the same results as through Numba, errors that arrive, no Numba when warm."""
 
 import os
+import shutil
 import subprocess
 import sys
 import threading
@@ -315,6 +316,7 @@ def test_types_of_general_scenes_are_found_by_processes_that_have_springs_only()
 
 
 INSIDE = """
+import sys
 import numpy as np
 from mdstopo.compiler.jit import entry, kernel, member_kernel
 
@@ -333,8 +335,22 @@ def mean(x):
 def twice(x):
     return 2.0 * mean(x)
 
+@kernel
+def spread(x, middle):
+    s = 0.0
+    for i in range(x.shape[0]):
+        s += abs(x[i] - middle)
+    return s / total(x)
+
+@entry
+def mean_and_spread(x):
+    return mean(x), spread(x, mean(x))
+
 if __name__ == "__main__":
+    if "spread first" in sys.argv:
+        mean_and_spread(np.arange(100.0))
     found = twice(np.arange(100.0))
+    mean_and_spread(np.arange(100.0))
     inside = [total.dispatcher, mean.dispatcher]
     hits = [sum(each._cache_hits.values()) for each in inside]
     kept = [next(iter(each.overloads.values())).library for each in inside if each.overloads]
@@ -355,3 +371,24 @@ def test_functions_inside_entries_are_kept_without_machine_code_and_found_by_oth
     for code in (tmp_path / "cache").rglob("*.code"):
         code.unlink()
     assert run()[:3] == ["99.0", "0", "1"]  # what a function calls comes with it
+
+
+def test_machine_code_does_not_depend_on_what_was_compiled_before(tmp_path):
+    script = tmp_path / "inside.py"
+    script.write_text(INSIDE)
+
+    def codes(number, *order, before=None):
+        """The files of a process with a cache of its own, by name; of functions inside entries those of `before`."""
+        cache = tmp_path / f"cache-{number}"
+        if before is not None:
+            shutil.copytree(before, cache)
+            for code in cache.rglob("*.code"):
+                code.unlink()
+        env = os.environ | {"PYTHONPATH": str(ROOT), "MDSTOPO_CACHE_DIR": str(cache), "PYTHONHASHSEED": str(number)}
+        subprocess.run([sys.executable, str(script), *order], check=True, env=env, stdout=subprocess.DEVNULL)
+        return {file.name: file.read_bytes() for file in cache.rglob("*.code")}
+
+    first = codes(1)
+    assert len(first) == 2
+    assert codes(2, "spread first") == first
+    assert codes(3, "spread first", before=tmp_path / "cache-1") == first
