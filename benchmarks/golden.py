@@ -27,14 +27,13 @@ from mdstopo.api import METHODS as SENSITIVITIES
 from mdstopo.bench.tables import Table, verdict
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import INTEGRATORS
+from mdstopo.compiler.store import SETTINGS
 from mdstopo.installed import version_of
 
 Floats = NDArray[np.float64]
 #: what is kept of one item: arrays by name, each as `_kept` has it
 Item = dict[str, dict[str, Any]]
 
-#: what says for which processor kernels are compiled
-SETTINGS = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_OPT")
 #: steps of `generalized_alpha`
 STEPS = 100
 #: cases whose iterates are kept, and how many

@@ -51,16 +51,12 @@ def inline(function: F) -> F:
     return cast(F, Kernel(function, _VECTOR))
 
 
-def by_type(stub: Callable[..., Any]) -> Callable[[F], F]:
-    """What kernels that call `stub` get: the kernel that the decorated one returns for the types of the arguments."""
+def by_type(stub: Callable[..., Any], argument: str, choose: Callable[[Any], Any]) -> None:
+    """Have kernels that call `stub` call the kernel that `choose` returns for the type of one of the arguments."""
+    place = stub.__code__.co_varnames.index(argument)
 
-    def enter(choose: F) -> F:
-        @when_compiling
-        def register() -> None:
-            from mdstopo.compiler.tried import way
+    @when_compiling
+    def register() -> None:
+        from mdstopo.compiler.tried import way
 
-            way().offer(stub, choose)
-
-        return choose
-
-    return enter
+        way().offer(stub, lambda *asked: choose(asked[place]))

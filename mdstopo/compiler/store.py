@@ -19,7 +19,8 @@ from mdstopo.installed import version_of
 #: folders of the package that hold no kernels and that no kernel takes a number from; `tests/compiler` looks after that
 WITHOUT_KERNELS = ("bench", "cli", "finalize", "front", "plots", "report", "session", "store")
 _COMPILER = ("numba", "llvmlite", "numpy")
-_SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
+#: what decides for which processor, and how, kernels are compiled
+SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
 _MAGIC = b"mdstopo code 3\n"
 #: folders of other sources and versions: how many are kept, and how long after their last use, in seconds
 _KEPT, _LASTING = 12, 30 * 86400.0
@@ -134,7 +135,7 @@ def _key() -> str:
         digest.update(get_host_cpu_features().flatten().encode())
     for name in _COMPILER:
         digest.update(f"{name} {version_of(name)}".encode())
-    for setting in _SETTINGS:
+    for setting in SETTINGS:
         digest.update(f"{setting}={os.environ.get(setting)}".encode())
     for source in _sources(package):
         digest.update(source.encode())

@@ -10,6 +10,7 @@ The tag is a tuple of zeros whose length says which method is meant. A method ha
 """
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from mdstopo.compiler.jit import by_type
@@ -131,51 +132,5 @@ def _of(name: str, tag: Any) -> Any:
     return DUTIES[name][len(tag)]
 
 
-@by_type(point_of)
-def _point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
-    """The integrator's own `point_of`, chosen by the type of tag when a kernel is compiled.
-
-    Types that make no difference: model, tables, strength, track, count, k, c, keep, desk, q, v, work.
-    """
-    return _of("point_of", tag)
-
-
-@by_type(step_back)
-def _step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
-    """The integrator's own `step_back`, chosen by the type of tag when a kernel is compiled.
-
-    Types that make no difference: model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work.
-    """
-    return _of("step_back", tag)
-
-
-@by_type(step_forward)
-def _step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
-    """The integrator's own `step_forward`, chosen by the type of tag when a kernel is compiled.
-
-    Types that make no difference: model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk.
-    """
-    return _of("step_forward", tag)
-
-
-@by_type(beside)
-def _beside(tag, track, k, c, e, q, v, a, q_out, v_out):
-    """The integrator's own `beside`, chosen by the type of tag when a kernel is compiled.
-
-    Types that make no difference: track, k, c, e, q, v, a, q_out, v_out.
-    """
-    return _of("beside", tag)
-
-
-@by_type(derivatives)
-def _derivatives(tag):
-    return _of("derivatives", tag)
-
-
-@by_type(weights_of)
-def _weights_of(tag, model, tables, track, w, out):
-    """The integrator's own `weights_of`, chosen by the type of tag when a kernel is compiled.
-
-    Types that make no difference: model, tables, track, w, out.
-    """
-    return _of("weights_of", tag)
+for _stub in (point_of, step_back, step_forward, beside, derivatives, weights_of):
+    by_type(_stub, "tag", partial(_of, _stub.__name__))

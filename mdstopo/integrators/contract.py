@@ -26,6 +26,7 @@ An integrator is a NamedTuple of steps and these compiled functions; `implement`
    without the first and the last state. May be left out where the stages are ordered and exact.
 """
 
+from functools import partial
 from typing import Any
 
 from mdstopo.compiler.jit import by_type, kernel
@@ -212,137 +213,6 @@ def sample_stages(steps, count, damped, t, g, d):
     return m
 
 
-@by_type(point_of)
-def _point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """Choose the kernel of `point_of` by the type of steps, which is all that is known here of the arguments:
-
-    Constant:
-      model: the compiled scene.
-      tables: constant arrays of the method.
-      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-      damped: whether any force depends on velocity.
-    Out:
-      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
-      work (WORK,): counts of work, added to.
-
-    Returns the step w and its fraction c_w (-1: its end) from which a reverse sweep starts for it.
-    """
-    return _implementation("point_of", steps)
-
-
-@by_type(parent_of)
-def _parent_of(steps, w):
-    return _implementation("parent_of", steps)
-
-
-@by_type(stage_weights)
-def _stage_weights(tables, steps, w, out):
-    return _implementation("stage_weights", steps)
-
-
-@by_type(reverse_step)
-def _reverse_step(
-    pair, inv_mass, tables, steps, w, c_point, mu_q, mu_v, stage_q_bar, lam_q, lam_v, lam_x, z, damped, turning,
-    accuracy, work,
-):  # fmt: skip
-    """Choose the kernel of `reverse_step` by the type of steps, which is all that is known here of the arguments:
-
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables: constant arrays of the method.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step at which the response is evaluated; negative: none.
-      mu_q, mu_v (n,): derivatives of the response by q and v there; zero where c_point < 0.
-      stage_q_bar (s, n): explicit derivatives by the coordinates of the stages; no rows: none.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-      accuracy: relative, to which an iteration has to go; 0: to rounding.
-    In and out:
-      lam_q, lam_v (n,): derivatives by q and v at the end of the step; become those at its start.
-      lam_x (n_carried, n): the same for what else the method carries from step to step.
-    Out:
-      z (s, n): virtual displacement of each stage's force balance.
-      work (WORK,): counts of work, added to.
-    """
-    return _implementation("reverse_step", steps)
-
-
-@by_type(tangent_step)
-def _tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, dq_stage, damped, turning):
-    """Choose the kernel of `tangent_step` by the type of steps, which is all that is known here of the arguments:
-
-    In:
-      pair (n_pair, 2): the bodies of each pair.
-      inv_mass (n,): inverse masses and inertias (1/kg, 1/(kg m^2)).
-      tables: constant arrays of the method.
-      steps: what the integrator kept.
-      w: number of the step.
-      c_point: fraction of the step up to which; negative: to its end.
-      force (s, n): changes of the forces at the stages (N, N m), beside those that come from the motion.
-      damped: whether any force depends on velocity.
-      turning: whether loads turn.
-    In and out:
-      dq, dv (n,): changes of q and v at the start of the step; become those at its end or point.
-      dx (n_carried, n): the same of what else the method carries from step to step.
-    Out:
-      dq_stage (s, n): changes of the coordinates of the stages (m, rad).
-    """
-    return _implementation("tangent_step", steps)
-
-
-@by_type(carried)
-def _carried(steps):
-    return _implementation("carried", steps)
-
-
-@by_type(reach)
-def _reach(model, tables, strength, steps, count, k, c, damped, q, v, work):
-    """Choose the kernel of `reach` by the type of steps, which is all that is known here of the arguments:
-
-    Constant:
-      model: the compiled scene.
-      tables: constant arrays of the method.
-      strength (3, M_padded): stiffness, damping and preload times alpha^mu (N/m, N s/m, N).
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-      damped: whether any force depends on velocity.
-    Out:
-      q, v (n,): coordinates and velocities there (m, rad; m/s, rad/s).
-      work (WORK,): counts of work, added to.
-
-    Returns the step w and its fraction c_w (-1: its end) from which a reverse sweep starts for it.
-    """
-    return _implementation("reach", steps)
-
-
-@by_type(sample)
-def _sample(steps, count, damped, t, g, d):
-    """Choose the kernel of `sample` by the type of steps, which is all that is known here of the arguments:
-
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      damped: whether any force depends on velocity.
-    Out:
-      t (S or more,): times (s), rising; S is the number of stages.
-      g (S or more,): energies then (J).
-      d (S or more,): their rates (W); NaN where unknown.
-
-    Returns how many samples there are.
-    """
-    return _implementation("sample", steps)
-
-
-@by_type(steps_of)
-def _steps_of(tag, arrays):
-    return _MAKERS[len(tag)]
+for _stub in (point_of, reach, sample, parent_of, stage_weights, reverse_step, tangent_step, carried):
+    by_type(_stub, "steps", partial(_implementation, _stub.__name__))
+by_type(steps_of, "tag", lambda tag: _MAKERS[len(tag)])

@@ -1,4 +1,4 @@
-"""What is called where nobody wants to be called."""
+"""Callbacks that do nothing, for callers who want none."""
 
 
 def ignore(_: object) -> None:

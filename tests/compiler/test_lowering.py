@@ -145,11 +145,13 @@ def _of_array(x):
     return x[0]
 
 
-@by_type(chosen)
 def _choose(x):
     from numba import types
 
     return {types.float64: _of_float}.get(x, _of_array)
+
+
+by_type(chosen, "x", _choose)
 
 
 @entry
