@@ -125,13 +125,13 @@ def integral(f: Callable[[float], float], edges: list[float]) -> float:
 
     cuts = [t for a, b in pairwise(edges) for t in np.linspace(a, b, PANELS + 1)[:-1].tolist()] + [edges[-1]]
     left = [(a, b, panel(a, b), 0) for a, b in pairwise(cuts)]
-    whole = sum(abs(rough) for _, _, rough, _ in left)
+    whole = sum(abs(single_precision) for _, _, single_precision, _ in left)
     total = 0.0
     while left:
-        a, b, rough, depth = left.pop()
+        a, b, single_precision, depth = left.pop()
         middle = 0.5 * (a + b)
         one, two = panel(a, middle), panel(middle, b)
-        if abs(one + two - rough) <= AGREE * max(whole, 1e-300) or depth == DEPTH or b - a <= 1e-13:
+        if abs(one + two - single_precision) <= AGREE * max(whole, 1e-300) or depth == DEPTH or b - a <= 1e-13:
             total += one + two
         else:
             left += [(a, middle, one, depth + 1), (middle, b, two, depth + 1)]

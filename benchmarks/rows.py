@@ -16,7 +16,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
 from mdstopo.general.driver import GeneralDriver
 from mdstopo.general.extremes import FRACTION, STEP
-from mdstopo.general.landings import INTEGRALS
+from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.optimizer.problem import Floats, Problem, Sample
 from mdstopo.starts.single_start import make_optimizer
 
@@ -148,7 +148,7 @@ def _sweeps(evaluator: Evaluator, load_case: str) -> list[str]:
     evaluator.evaluate(evaluator.case.start, rows=EVERY)
     driver = evaluator.driver(load_case)
     assert isinstance(driver, GeneralDriver)
-    _, count, _ = driver.run(evaluator.design(evaluator.case.start), True, driver.landings)
+    _, count, _ = driver.run(evaluator.design(evaluator.case.start), True, driver.quadrature_breakpoints)
     known = [
         (j, *driver.rows[j, r])
         for j, reduction in enumerate(driver.scene.reductions)
@@ -169,7 +169,7 @@ def _sweep(driver: GeneralDriver, count: int, known: list[tuple[float, ...]], ro
     which = np.array([(int(row[0]), 0) for row in chosen])
     table = np.array([row[1:] for row in chosen])
     padded, out = np.zeros((rows, len(driver.padded))), np.zeros((rows, driver.gradients.shape[2]))
-    return lambda: driver.entry.pull_rows(
+    return lambda: driver.entry.rows_vjp(
         *driver.steps_arguments(count), which, table, driver.room, driver.room_ints, driver.strength, padded, out,
         np.zeros((rows, 0)), driver.work,
     )  # fmt: skip

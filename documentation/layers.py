@@ -73,7 +73,7 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
     (
         "an evaluation",
         (
-            Box(("compile_looking",), "run in another process", 0.0, 0.3),
+            Box(("compile_responses",), "run in another process", 0.0, 0.3),
             Box(("engine",), "the evaluator of a case", 0.3, 0.4),
             Box(("warm",), "the first compilation", 0.7, 0.3),
         ),

@@ -160,7 +160,7 @@ class DesignProblem:
         return design if self._factor is None else design * self._factor
 
     def _pull(self, gradient: Floats) -> Floats:
-        return self.space.pull(gradient if self._factor is None else gradient * self._factor)
+        return self.space.vjp(gradient if self._factor is None else gradient * self._factor)
 
     def _part(self, objective: Objective, sign: float, evaluation: Evaluation) -> Part:
         peaks = evaluation.peaks[objective.name]

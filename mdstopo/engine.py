@@ -18,12 +18,12 @@ from mdstopo.case.integrators import AUTO
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
-from mdstopo.integrators.driver import Driver, Looked
+from mdstopo.integrators.driver import Driver, ResponseResult
 from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
-from mdstopo.scene.culprit import Culprits
 from mdstopo.scene.design import Design, checked
+from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.origin import extent_of, origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
@@ -82,7 +82,7 @@ class Evaluator:
             self._near = rounded_otherwise(case, self._origin, extent_of(case), sample)
         self.scenes: Mapping[str, AnyScene] = _compile(self._near, bool(self.beyond))
         self._drivers: dict[str, AnyDriver] = {}
-        self._culprits: dict[str, Culprits] = {}
+        self._diagnoses: dict[str, Diagnosis] = {}
         self._coarse: dict[str, str] = {}
         self._n = case.n_design
         self._design = Design(case)
@@ -154,15 +154,15 @@ class Evaluator:
                 status, message = Status.STEP_TOO_LARGE, too_coarse
                 break
             result = driver.evaluate(design, exact, rows)
-            status, culprit = result.status, ""
+            status, diagnosis = result.status, ""
             if not status.ok or result.meeting >= 0 or result.unresolved >= 0:
-                status, culprit = self._verdict(name, design, result)
+                status, diagnosis = self._verdict(name, design, result)
             gradients, across = (result.gradients, result.across) if exact else (None, None)
             if status.ok and gradient and not exact:
                 found = _differentiate(method, driver, design, result, rows.cones)
-                status, culprit, gradients, across = found.status, found.message, found.gradients, found.across
+                status, diagnosis, gradients, across = found.status, found.message, found.gradients, found.across
             work.append(driver.work.tolist())
-            message = culprit or message
+            message = diagnosis or message
             if not status.ok:
                 break
             if result.grazing >= 0:
@@ -316,7 +316,7 @@ class Evaluator:
                 alpha = self._design.values
                 integrated = any(each.over_time in INTEGRALS for each in looked)
                 driver = Driver(
-                    scene, self._method, _looks, tolerance, step, reductions, alpha, self._beside, integrated
+                    scene, self._method, _response_entries, tolerance, step, reductions, alpha, self._beside, integrated
                 )
             else:
                 from mdstopo.general.driver import GeneralDriver
@@ -339,23 +339,23 @@ class Evaluator:
             self._coarse[name] = coarse(self.driver(name), design)
         return self._coarse[name]
 
-    def _culprit(self, name: str) -> Culprits:
-        if name not in self._culprits:
+    def _diagnosis(self, name: str) -> Diagnosis:
+        if name not in self._diagnoses:
             scene = self.scenes[name]
             assert isinstance(scene, Scene)
-            self._culprits[name] = Culprits(self._near, scene)
-        return self._culprits[name]
+            self._diagnoses[name] = Diagnosis(self._near, scene)
+        return self._diagnoses[name]
 
     def _explain(
         self, name: str, design: FloatArray, status: Status, time: float, state: FloatArray
     ) -> tuple[Status, str]:
-        """The status and its culprit, for a motion that ended at `time` in a state (2, n)."""
+        """The status and its message, for a motion that ended at `time` in a state (2, n)."""
         driver = self.driver(name)
         if isinstance(driver, Driver):
-            return self._culprit(name).explain(design, status, time, state)
+            return self._diagnosis(name).explain(design, status, time, state)
         return status, driver.message
 
-    def _verdict(self, name: str, design: FloatArray, result: Looked) -> tuple[Status, str]:
+    def _verdict(self, name: str, design: FloatArray, result: ResponseResult) -> tuple[Status, str]:
         """Why the motion of a load case cannot be trusted, and which member or joint is the cause."""
         if result.status.ok and result.meeting >= 0:
             return Status.ZERO_LENGTH, self._member(name, result.meeting)
@@ -367,7 +367,7 @@ class Evaluator:
     def _member(self, name: str, padded: int) -> str:
         """A member of a load case's scene in words."""
         driver = self.driver(name)
-        return (self._culprit(name) if isinstance(driver, Driver) else driver).member(padded)
+        return (self._diagnosis(name) if isinstance(driver, Driver) else driver).member(padded)
 
     def _evaluation(
         self,
@@ -423,11 +423,11 @@ def _of_motion(tolerance: float) -> float:
     return min(tolerance, max(LOOSEST, 0.5 * tolerance))
 
 
-def _looks() -> ModuleType:
-    """The compiled entries that look at the steps of springs between free bodies."""
-    from mdstopo.sensitivity import look
+def _response_entries() -> ModuleType:
+    """The compiled entries that evaluate responses of springs between free bodies from their steps."""
+    from mdstopo.sensitivity import energy_responses
 
-    return look
+    return energy_responses
 
 
 def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
@@ -442,7 +442,7 @@ def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
 
 
 def _differentiate(
-    method: str, driver: "AnyDriver", design: FloatArray, looked: Looked, cones: bool
+    method: str, driver: "AnyDriver", design: FloatArray, looked: ResponseResult, cones: bool
 ) -> "Differentiated":
     """Gradients by another method than the adjoint one."""
     from mdstopo.sensitivity.methods import Differentiated, differentiate
@@ -457,7 +457,7 @@ def _differentiate(
 
 
 def _peaks(
-    result: Looked, j: int, gradients: FloatArray | None, across: FloatArray | None, shape: Shape
+    result: ResponseResult, j: int, gradients: FloatArray | None, across: FloatArray | None, shape: Shape
 ) -> tuple[Peak, ...]:
     """What was found of objective j; gradients (n_obj, R, N) and across of all rows, of which copies are kept."""
     peaks: tuple[Peak, ...] = ()

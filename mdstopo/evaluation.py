@@ -66,9 +66,10 @@ class Evaluation(NamedTuple):
     objectives: raw G; gradients: dG/dalpha (N,), at tied peaks the highest's, the earliest if equal; peak_times: t_n in
     s (NaN for mean and integral); peaks: all that compete, highest first; constraints (n_con,): h_j - h_0j in the
     case's order; constraint_gradients (n_con, N); work: counts of what was done; status: what is not `usable`
-    leaves values NaN, and message names the culprit. constraint_peaks: by the place of a constraint on a response, all
-    that compete. all_compete: whether all peaks are rows whatever the reduction over time, because they are those of a
-    measure over a sample. errors: estimates of the errors of objectives and gradients, where they were asked for.
+    leaves values NaN, and message says which part is to blame. constraint_peaks: by the place of a constraint on a
+    response, all that compete. all_compete: whether all peaks are rows whatever the reduction over time, because they
+    are those of a measure over a sample. errors: estimates of the errors of objectives and gradients, where they were
+    asked for.
     variables: the values that parameters of laws had, by the name of the design variable; variable_gradients: dG by
     them, by objective, then by variable; constraint_variable_gradients: (n_con, values), by variable. All in the
     parameters' own units.

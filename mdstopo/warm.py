@@ -19,7 +19,7 @@ from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 
 #: what the other process runs: it stands above the engine, which begins it
-PROGRAM = "mdstopo.compile_looking"
+PROGRAM = "mdstopo.compile_responses"
 
 _CASE = """
 format: 1

@@ -88,7 +88,7 @@ def rows_of(case: Case, design: Floats, found: Evaluation, driven: bool = False)
         own = _members(case, design, each, found.peaks[each.name]) if driven else found.peaks[each.name]
         own = competing(each, sign, own)
         peaks += [weight * sign * peak.value for peak in own]
-        slopes += [weight * sign * space.pull(gradient_of(peak)) for peak in own]
+        slopes += [weight * sign * space.vjp(gradient_of(peak)) for peak in own]
         objective += [0 if together else k] * len(own)
     owners, values = np.array(objective), np.array(peaks)
     for k in set(objective):
@@ -141,7 +141,7 @@ def _constraints(case: Case, design: Floats, found: Evaluation, driven: bool) ->
             peaks = found.constraint_peaks[i]
             for peak in competing(row, sign, _members(case, design, row, peaks) if driven else peaks):
                 c.append(sign * (peak.value - row.bound) / scale)
-                c_slopes.append(sign * case.space.pull(gradient_of(peak)) / scale)
+                c_slopes.append(sign * case.space.vjp(gradient_of(peak)) / scale)
     return np.array(c), np.array(c_slopes).reshape(len(c), case.space.size)
 
 

@@ -112,7 +112,7 @@ class Smooth:
             for r in range(PEAKS):
                 peak = peaks[min(r, len(peaks) - 1)]
                 rows.append(sign * peak.value / unit)
-                slopes.append(sign * self.space.pull(gradient_of(peak)) / unit)
+                slopes.append(sign * self.space.vjp(gradient_of(peak)) / unit)
         for i, row in enumerate(case.constraints):
             if isinstance(row, ResponseRow):
                 scale = abs(row.bound) or 1.0
@@ -121,7 +121,7 @@ class Smooth:
                     for r in range(LIMIT_PEAKS):
                         peak = peaks[min(r, len(peaks) - 1)]
                         rows.append(sign * (peak.value - row.bound) / scale)
-                        slopes.append(sign * self.space.pull(gradient_of(peak)) / scale)
+                        slopes.append(sign * self.space.vjp(gradient_of(peak)) / scale)
         return np.array(rows), np.array(slopes)
 
     def inequalities(self, v: Floats) -> tuple[Floats, Floats]:

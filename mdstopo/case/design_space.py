@@ -66,7 +66,7 @@ class DesignSpace:
         x[self._free :] = np.divide(own, width, out=np.zeros(len(own)), where=width > 0.0)
         return x
 
-    def pull(self, gradient: FloatArray) -> FloatArray:
+    def vjp(self, gradient: FloatArray) -> FloatArray:
         """dU/dx (n,) of dU/d(design) (N + P,)."""
         if self.identity:
             return gradient
@@ -90,7 +90,7 @@ class DesignSpace:
             return row.coefficients, row.bound
         prices = row.prices if len(row.prices) else np.zeros(len(self._low))
         bound = row.bound - float(prices @ self._low)
-        return self.pull(np.concatenate([row.coefficients, prices])), bound
+        return self.vjp(np.concatenate([row.coefficients, prices])), bound
 
     def named(self, design: FloatArray) -> dict[str, FloatArray]:
         """The part of each variable, by name, of a design or of a derivative by it (..., N + P)."""

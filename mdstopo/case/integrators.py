@@ -1,6 +1,6 @@
 """The integrators that a case file may name: what is declared of each, one record an integrator.
 
-The duties of what a record names are those of `integrators.contract` and `general.duties`.
+What a record names has the interface of `integrators.steps_interface` and `general.method_interface`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ class IntegratorKind(NamedTuple):
     name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called with the
     solver's settings, which returns the `integrators.driver.Method`.
     springs: whether it computes springs between free bodies by their own kernels. general: the module with its entries
-    for all other scenes (`general.duties`); empty where there are none.
+    for all other scenes (`general.method_interface`); empty where there are none.
     adaptive: whether it chooses steps by the tolerance where none is given. finds_step: whether it finds a fixed step
     by itself. order: of the error of fixed steps in their length.
     explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:

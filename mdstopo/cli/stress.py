@@ -107,14 +107,14 @@ def row(outcome: "Outcome") -> list[str]:
         scene.integrator,
         outcome.outcome if outcome.ok else f"{outcome.outcome} !",
         "" if outcome.error is None else number(outcome.error, 2),
-        "" if scene.culprit else number(scene.bound, 2),
+        "" if scene.refusal else number(scene.bound, 2),
         f"{duration(outcome.seconds)}{f'; {outcome.note}' if outcome.note else ''}",
     ]
 
 
 def _expectation(scene: "Scene") -> str:
-    if scene.culprit:
-        return f"is to be refused with {', '.join(map(repr, scene.culprit))}"
+    if scene.refusal:
+        return f"is to be refused with {', '.join(map(repr, scene.refusal))}"
     return f"is to be right within {number(scene.bound, 2)}"
 
 
@@ -138,7 +138,7 @@ def _document(outcomes: "Sequence[Outcome]") -> dict[str, Any]:
                 "outcome": each.outcome,
                 "ok": each.ok,
                 "error": each.error,
-                "bound": None if each.scene.culprit else each.scene.bound,
+                "bound": None if each.scene.refusal else each.scene.bound,
                 "message": each.message,
                 "note": each.note,
                 "seconds": each.seconds,

@@ -10,10 +10,10 @@ T z). An event on the way changes the cotangents by saltation (`events`); a peak
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import balance, factor_matrix, pull_back, solve_unknowns
-from mdstopo.general.duties import point_of, step_back, weights_of
+from mdstopo.general.accelerations import accelerations_vjp, factor_matrix, solve_accelerations, solve_unknowns
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
+from mdstopo.general.method_interface import point_of, step_back, weights_of
 from mdstopo.general.parameters import add_event, add_times
 from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.responses import (
@@ -28,7 +28,7 @@ from mdstopo.general.responses import (
     response,
     value_at,
 )
-from mdstopo.general.track import copy_vector, restore_modes
+from mdstopo.general.step_history import copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
 
 #: an integrand that is a norm has no direction at a stage where it is below ASIDE of its value inside the step; below
@@ -45,56 +45,56 @@ def free_only(model, x):
 
 
 @kernel
-def through_events(model, track, state, lam_q, lam_v, bar_set, drops, strength, out):
+def apply_saltation_transposed(model, history, state, lam_q, lam_v, bar_set, drops, member_state, out):
     """Pull cotangents behind the events of a state back to before them (saltation transposed), in place.
 
     Constant:
       model: the compiled scene.
-      track, state: the history of steps, and the number of the state.
+      history, state: the history of steps, and the number of the state.
       drops (E,): by how much an integrand falls at each event (`event_drops`); no rows where no integral is meant.
     In and out:
       lam_q, lam_v (n,): cotangents of the state's coordinates and velocities.
       bar_set (slots,): those of the permanent sets (`permanent_sets`).
-      strength (3, columns): state of the members; modes are not what they were before the call.
+      member_state (3, columns): state of the members; modes are not what they were before the call.
     Out:
       out (M_padded + P,): what parameters do to the events' times and to the sets made there, added behind the members.
     """
-    last = track.index[state, 3]
-    first = track.index[state - 1, 3] if state > 0 else last
+    last = history.index[state, 3]
+    first = history.index[state - 1, 3] if state > 0 else last
     for back in range(last - first):
         e = last - 1 - back
-        if track.event[e, 0] != state:
+        if history.event[e, 0] != state:
             continue
         pulled = 0.0
         for d in range(lam_v.shape[0]):
-            pulled += lam_v[d] * track.salt[e, 2, d]
+            pulled += lam_v[d] * history.saltation[e, 2, d]
         if model.varied.shape[0] > 0:
-            add_event(model, track, strength, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), out)
+            add_event(model, history, member_state, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), out)
         for d in range(lam_v.shape[0]):
-            lam_q[d] -= pulled * track.salt[e, 0, d]
-            lam_v[d] -= pulled * track.salt[e, 1, d]
+            lam_q[d] -= pulled * history.saltation[e, 0, d]
+            lam_v[d] -= pulled * history.saltation[e, 1, d]
         if drops.shape[0] > 0:
             for d in range(lam_v.shape[0]):
-                lam_q[d] -= drops[e] * track.salt[e, 0, d]
-                lam_v[d] -= drops[e] * track.salt[e, 1, d]
+                lam_q[d] -= drops[e] * history.saltation[e, 0, d]
+                lam_v[d] -= drops[e] * history.saltation[e, 1, d]
         if bar_set.shape[0] > 0:
-            sets_back(model, track, e, bar_set, lam_q, out)
-            time_back(model, track, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), bar_set)
+            sets_back(model, history, e, bar_set, lam_q, out)
+            time_back(model, history, e, pulled + (drops[e] if drops.shape[0] > 0 else 0.0), bar_set)
     free_only(model, lam_q)
     free_only(model, lam_v)
 
 
 @kernel
 def sweep(
-    tag, model, tables, strength, track, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops, looked,
-    square, desk, out, work,
+    tag, model, tables, member_state, history, count, w, c, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar, drops,
+    looked, square, workspace, out, work,
 ):  # fmt: skip
     """Pull cotangents of fraction c of step w's motion back to the start, and gather the gradient at every stage.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, count: the history of steps, and how many steps it has.
+      history, count: the history of steps, and how many steps it has.
       w, c: the step to begin with, and the fraction of it at which the cotangents are given.
       bars (S, 3, n), rows_bar (S, n_row): explicit cotangents of q, v, a and of the multipliers of all stages; no rows
         where there are none.
@@ -104,10 +104,10 @@ def sweep(
     In and out:
       lam_q, lam_v (n,): cotangents of coordinates and velocities; at the end those of the start.
       bar_set (slots,): cotangents of the permanent sets.
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       out (M_padded + P,): the derivative by alpha^mu and, behind the members, by parameters, added to.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
     """
     n = lam_q.shape[0]
@@ -118,52 +118,54 @@ def sweep(
     fraction[0] = c
     spread = bars.shape[0] > 0
     while w >= 0:
-        o = track.index[w, 0]
-        end = track.index[w + 1, 0]
+        o = history.index[w, 0]
+        end = history.index[w + 1, 0]
         b = bars[o:end] if spread else bars
         r = rows_bar[o:end] if spread else rows_bar
         step_back(
-            tag, model, tables, track, w, fraction, lam_q.reshape((1, n)), lam_v.reshape((1, n)), lam_x, b, r, z, y,
-            desk, work,
+            tag, model, tables, history, w, fraction, lam_q.reshape((1, n)), lam_v.reshape((1, n)), lam_x, b, r, z, y,
+            workspace, work,
         )  # fmt: skip
-        restore_modes(track, track.index[w, 3], strength)
-        segment = track.index[w, 2]
-        add_designs(model, segment, track, o, strength, z[0, : end - o], out, work)
+        restore_modes(history, history.index[w, 3], member_state)
+        segment = history.index[w, 2]
+        add_designs(model, segment, history, o, member_state, z[0, : end - o], out, work)
         if bar_set.shape[0] > 0:
             for j in range(end - o):
-                stage = track.stage[o + j]
-                add_sets(model, segment, strength, stage[0], stage[1], z[0, j], 0.0, bar_set)
+                stage = history.stage[o + j]
+                add_sets(model, segment, member_state, stage[0], stage[1], z[0, j], 0.0, bar_set)
                 if spread:
                     for i in range(bar_set.shape[0]):
                         bar_set[i] += sets_bar[o + j, i]
         fraction[0] = 1.0
-        before = track.index[w, 1]
+        before = history.index[w, 1]
         if model.varied.shape[0] > 0:
-            add_times(model, track, strength, count, before + 1, looked, square, lam_v, 0.0, out)
+            add_times(model, history, member_state, count, before + 1, looked, square, lam_v, 0.0, out)
         if before >= 0:
-            through_events(model, track, before + 1, lam_q, lam_v, bar_set, drops, strength, out)
+            apply_saltation_transposed(model, history, before + 1, lam_q, lam_v, bar_set, drops, member_state, out)
         w = before
 
 
 @kernel
-def row_cotangents(tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, out, work):
+def row_cotangents(
+    tag, model, tables, member_state, history, count, j, row, across, workspace, bars, bar_set, out, work
+):
     """Cotangents of the state at which a row of `extremes` is read, and its derivatives by the design at that state.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
       count, j: how many steps there are; the response.
       row (COLUMNS,): the row.
       across: instead of the norm that g_j is (`responses.is_norm`), the component perpendicular to its vector is
         differentiated, the direction held.
     In and out:
-      track: the history of steps; a partial step is kept behind the others where the integrator needs one.
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      history: the history of steps; a partial step is kept behind the others where the integrator needs one.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       bars (3, n): cotangents of q and v; its last row is overwritten.
       bar_set (slots,): cotangents of the permanent sets.
       out (M_padded + P,): derivative by alpha^mu and, behind the members, by parameters, at that state.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
     Returns the step (-1: the start) and its fraction to which the cotangents belong.
@@ -179,144 +181,146 @@ def row_cotangents(tag, model, tables, strength, track, count, j, row, across, d
     k = int(row[2])
     c = row[3]
     w = k
-    segment = track.index[k, 2]
+    segment = history.index[k, 2]
     if c <= 0.0 or c >= 1.0:
-        state = track.state[k if c <= 0.0 else k + 1]
+        state = history.state[k if c <= 0.0 else k + 1]
         copy_vector(state[0], q)
         copy_vector(state[1], v)
         if c <= 0.0:
             w = k - 1
     else:
-        w = point_of(tag, model, tables, strength, track, count, k, c, np.bool_(True), desk, q, v, work)
-    t = track.t[k] + c * (track.t[k + 1] - track.t[k])
-    restore_modes(track, track.index[k, 3], strength)
+        w = point_of(tag, model, tables, member_state, history, count, k, c, np.bool_(True), workspace, q, v, work)
+    t = history.t[k] + c * (history.t[k + 1] - history.t[k])
+    restore_modes(history, history.index[k, 3], member_state)
     rate = row[4]
     if across:
         at_end = c <= 0.0 or c >= 1.0  # a row inside a step needs no rate
-        rate = across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam) if at_end else 0.0
-    balance(model, strength, segment, t, q, v, np.bool_(True), desk, a, lam)
+        rate = across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, a, lam) if at_end else 0.0
+    solve_accelerations(model, member_state, segment, t, q, v, np.bool_(True), workspace, a, lam)
     work[FORCES] += 1
     who = int(row[6])
     if across:
         across_slopes(model, j, q, v, a, lam, bars, row_bar)
     else:
-        response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+        response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
     if bar_set.shape[0] > 0:
         bar_set[:] = 0.0
-        add_looked_sets(model, strength, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
+        add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
     z = bars[2]
-    factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, np.bool_(True))
-    solve_unknowns(model, desk, z, row_bar)
-    pull_back(model, desk, desk.k, desk.c, desk.turn, z, row_bar, bars[0], bars[1])
+    factor_matrix(model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, np.bool_(True))
+    solve_unknowns(model, workspace, z, row_bar)
+    accelerations_vjp(model, workspace, workspace.k, workspace.c, workspace.turn, z, row_bar, bars[0], bars[1])
     free_only(model, bars[0])
     free_only(model, bars[1])
     weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
-    add_design(model, segment, t, strength, q, v, a, z, weight, out, work)
-    sign = force_sign(model, segment, j, who, t, strength, q, v, a)
-    explicit_part(model, segment, j, who, t, strength, q, v, a, sign, out)
+    add_design(model, segment, t, member_state, q, v, a, z, weight, out, work)
+    sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
+    explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, out)
     if bar_set.shape[0] > 0:
-        add_sets(model, segment, strength, q, v, z, 0.0, bar_set)
+        add_sets(model, segment, member_state, q, v, z, 0.0, bar_set)
     at = k if c <= 0.0 else k + 1
     if model.varied.shape[0] > 0 and (c <= 0.0 or c >= 1.0):
         # what lies behind the state does nothing to a value before it
         behind = bars[1] if c <= 0.0 or at == count else np.zeros(n)
-        add_times(model, track, strength, count, at, np.int64(-1), np.bool_(False), behind, rate, out)
+        add_times(model, history, member_state, count, at, np.int64(-1), np.bool_(False), behind, rate, out)
     if c <= 0.0 and k > 0:
-        through_events(model, track, k, bars[0], bars[1], bar_set, np.empty(0), strength, out)
+        apply_saltation_transposed(model, history, k, bars[0], bars[1], bar_set, np.empty(0), member_state, out)
     if (c <= 0.0 and k > 0) or c >= 1.0:
-        event = _first_event(track, at)
+        event = _first_event(history, at)
         if event >= 0:
             if model.varied.shape[0] > 0:
-                add_event(model, track, strength, event, rate, out)
+                add_event(model, history, member_state, event, rate, out)
             for d in range(n):
-                bars[0, d] -= rate * track.salt[event, 0, d]
-                bars[1, d] -= rate * track.salt[event, 1, d]
+                bars[0, d] -= rate * history.saltation[event, 0, d]
+                bars[1, d] -= rate * history.saltation[event, 1, d]
             if bar_set.shape[0] > 0:
-                time_back(model, track, event, rate, bar_set)
+                time_back(model, history, event, rate, bar_set)
     return w, (c if w == k else 1.0)
 
 
 @kernel
-def _first_event(track, state):
+def _first_event(history, state):
     """The first event of a state whose time varies, or -1."""
     if state == 0:
         return -1
-    for e in range(track.index[state - 1, 3], track.index[state, 3]):
-        if track.event[e, 0] != state:
+    for e in range(history.index[state - 1, 3], history.index[state, 3]):
+        if history.event[e, 0] != state:
             continue
         for part in range(2):
-            for d in range(track.salt.shape[2]):
-                if track.salt[e, part, d] != 0.0:
+            for d in range(history.saltation.shape[2]):
+                if history.saltation[e, part, d] != 0.0:
                     return e
     return -1
 
 
 @kernel
-def integral_gradient(tag, model, tables, strength, track, count, j, square, gradient, desk, start, out, work):
+def integral_gradient(
+    tag, model, tables, member_state, history, count, j, square, gradient, workspace, start, out, work
+):
     """The integral over time of g_j (or of its square), and on demand its derivative by alpha^mu.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, count: the history of steps, and how many steps it has.
+      history, count: the history of steps, and how many steps it has.
       j, square: the response; whether its square is integrated.
       gradient: whether the derivative is asked for.
     In and out:
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       out (M_padded + P,): the derivative, behind the members by parameters.
       start (n,), or no length: cotangents of the start's positions.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
     Returns the integral ([g] s, or [g]^2 s).
     """
     n = model.mass.shape[0]
-    stages = track.index[count, 0] if gradient else 0
+    stages = history.index[count, 0] if gradient else 0
     bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, model.size[0]))
     sets_bar = np.zeros((stages, count_sets(model)))
     total = integral_cotangents(
-        tag, model, tables, strength, track, count, j, square, bars, rows_bar, sets_bar, desk, out, work
+        tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, workspace, out, work
     )
     if gradient:
         lam_q = np.zeros(n)
         lam_v = np.zeros(n)
-        drops = event_drops(model, strength, track, count, j, square, desk)
+        drops = event_drops(model, member_state, history, count, j, square, workspace)
         if model.varied.shape[0] > 0:
-            add_times(model, track, strength, count, count, j, square, lam_v, 0.0, out)
+            add_times(model, history, member_state, count, count, j, square, lam_v, 0.0, out)
         bar_set = np.zeros(sets_bar.shape[1])
         sweep(
-            tag, model, tables, strength, track, count, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar, sets_bar,
-            drops, j, square, desk, out, work,
+            tag, model, tables, member_state, history, count, count - 1, 1.0, lam_q, lam_v, bar_set, bars, rows_bar,
+            sets_bar, drops, j, square, workspace, out, work,
         )  # fmt: skip
-        keep_start(model, track, lam_q, bar_set, start, out)
+        keep_start(model, history, lam_q, bar_set, start, out)
     return total
 
 
 @kernel
-def event_drops(model, strength, track, count, j, square, desk):
+def event_drops(model, member_state, history, count, j, square, workspace):
     """(E,): g_j (or its square) before each event, less that after it: the slope of an integral by the event's time.
 
     Constant:
       model: the compiled scene.
-      track, count: the history of steps, and how many steps it has.
+      history, count: the history of steps, and how many steps it has.
       j, square: the response; whether its square is meant.
     In and out:
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
-      desk: workspace of a balance, overwritten.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      workspace: workspace of a balance, overwritten.
     """
-    events = track.index[count, 3]
+    events = history.index[count, 3]
     drops = np.zeros(events)
     values = np.empty(2)
     for e in range(events):
-        state = track.event[e, 0]
+        state = history.event[e, 0]
         if state <= 0 or state >= count:
             continue
         for side in range(2):
-            restore_modes(track, e + side, strength)
+            restore_modes(history, e + side, member_state)
             values[side] = value_at(
-                model, strength, track.index[state - 1, 2], track.t[state], track.state[state], j, desk
+                model, member_state, history.index[state - 1, 2], history.t[state], history.state[state], j, workspace
             )
         if square:
             values *= values
@@ -325,36 +329,36 @@ def event_drops(model, strength, track, count, j, square, desk):
 
 
 @kernel
-def at_stage(model, strength, segment, track, at, j, who, desk, own, own_rows):
+def at_stage(model, member_state, segment, history, at, j, who, workspace, own, own_rows):
     """g_j at a stage, and its slopes.
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       segment: segment of `model.times` in which the stage lies.
-      track, at: the history of steps, and the number of the stage.
+      history, at: the history of steps, and the number of the stage.
       j, who: the response; the member whose force is meant, where it is one of members, below 0 the largest.
     Out:
       own (3, n), own_rows (n_row,): slopes by q, v, a and by the multipliers.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
 
     Returns g_j, and the member.
     """
-    stage = track.stage[at]
-    t = track.when[at]
+    stage = history.stage[at]
+    t = history.when[at]
     if model.response[j, 0] == ENERGY:
-        general_forces(model, strength, segment, t, stage[0], stage[1], np.bool_(False), desk)
+        general_forces(model, member_state, segment, t, stage[0], stage[1], np.bool_(False), workspace)
     if who < 0 and model.response[j, 0] == MEMBER_FORCE:
-        who = largest_force(model, strength, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
+        who = largest_force(model, member_state, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
     value = response(
-        model, strength, segment, j, who, t, stage[0], stage[1], stage[2], track.lam[at], desk, own, own_rows
+        model, member_state, segment, j, who, t, stage[0], stage[1], stage[2], history.lam[at], workspace, own, own_rows
     )
     return value, who
 
 
 @kernel
 def one_sided(
-    model, strength, segment, track, at, inside, j, who, value, mine, size, slopes, rows, desk, own, own_rows
+    model, member_state, segment, history, at, inside, j, who, value, mine, size, slopes, rows, workspace, own, own_rows
 ):
     """g_j and its slopes at a stage as they go on from inside the step, which ends where g_j has a kink.
 
@@ -364,15 +368,15 @@ def one_sided(
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       segment: segment of `model.times` in which the step lies.
-      track, at, inside: the history of steps, the number of the stage, and of one inside the step.
+      history, at, inside: the history of steps, the number of the stage, and of one inside the step.
       j, who, value: the response; at the stage its member and its value.
       mine, size, slopes (3, n), rows (n_row,): of the stage inside its member, its value, and its slopes by q, v, a and
         by the multipliers.
     In and out:
       own (3, n), own_rows (n_row,): the slopes at the stage.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
 
     Returns the value, whose force it is, and whether it has turned round.
     """
@@ -381,7 +385,7 @@ def one_sided(
     if mine != who:  # nearly as large as the largest here: it is the largest inside
         others = np.empty((3, n))
         others_rows = np.empty(model.size[0])
-        other, _ = at_stage(model, strength, segment, track, at, j, mine, desk, others, others_rows)
+        other, _ = at_stage(model, member_state, segment, history, at, j, mine, workspace, others, others_rows)
         if other < (1.0 - VANISHING) * value:
             return value, who, same
         own[:] = others
@@ -391,9 +395,9 @@ def one_sided(
     if value > VANISHING * size:
         return value, who, same
     if model.response[j, 0] == MEMBER_FORCE:
-        a, b = track.stage[at], track.stage[inside]
-        here = force_sign(model, segment, j, who, track.when[at], strength, a[0], a[1], a[2])
-        if here == force_sign(model, segment, j, who, track.when[inside], strength, b[0], b[1], b[2]):
+        a, b = history.stage[at], history.stage[inside]
+        here = force_sign(model, segment, j, who, history.when[at], member_state, a[0], a[1], a[2])
+        if here == force_sign(model, segment, j, who, history.when[inside], member_state, b[0], b[1], b[2]):
             return value, who, same
         _turn(own, own_rows)
         return -value, who, np.bool_(True)
@@ -402,11 +406,11 @@ def one_sided(
         lam = np.empty(model.size[0])
         for i in range(3):
             for d in range(n):
-                state[i, d] = track.stage[at, i, d] + ASIDE * (track.stage[inside, i, d] - track.stage[at, i, d])
+                state[i, d] = history.stage[at, i, d] + ASIDE * (history.stage[inside, i, d] - history.stage[at, i, d])
         for r in range(model.size[0]):
-            lam[r] = track.lam[at, r] + ASIDE * (track.lam[inside, r] - track.lam[at, r])
-        t = track.when[at]
-        response(model, strength, segment, j, who, t, state[0], state[1], state[2], lam, desk, own, own_rows)
+            lam[r] = history.lam[at, r] + ASIDE * (history.lam[inside, r] - history.lam[at, r])
+        t = history.when[at]
+        response(model, member_state, segment, j, who, t, state[0], state[1], state[2], lam, workspace, own, own_rows)
         return value, who, same
     turned = 0.0
     for i in range(3):
@@ -432,22 +436,22 @@ def _turn(slopes, rows):
 
 @kernel
 def integral_cotangents(
-    tag, model, tables, strength, track, count, j, square, bars, rows_bar, sets_bar, desk, out, work
+    tag, model, tables, member_state, history, count, j, square, bars, rows_bar, sets_bar, workspace, out, work
 ):
     """The integral over time of g_j (or of its square) by the weights of the stages, and its cotangents of all stages.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, count: the history of steps, and how many steps it has.
+      history, count: the history of steps, and how many steps it has.
       j, square: the response; whether its square is integrated.
     In and out:
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out; no derivative is formed where bars has no rows:
       bars (S, 3, n), rows_bar (S, n_row), sets_bar (S, slots): cotangents of the stages' q, v, a, of their multipliers
         and of the permanent sets; zeros before the call.
       out (M_padded + P,): the explicit derivative by alpha^mu and by parameters.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
     Returns the integral ([g] s, or [g]^2 s).
@@ -471,44 +475,51 @@ def integral_cotangents(
     tied = np.empty(members_of(model, model.response[j, 5]) if kind == MEMBER_FORCE else 1, np.int64)
     ties = 1
     for w in range(count):
-        restore_modes(track, track.index[w, 3], strength)
-        segment = track.index[w, 2]
-        weights_of(tag, model, tables, track, w, weight)
-        o = track.index[w, 0]
-        stages = track.index[w + 1, 0] - o
+        restore_modes(history, history.index[w, 3], member_state)
+        segment = history.index[w, 2]
+        weights_of(tag, model, tables, history, w, weight)
+        o = history.index[w, 0]
+        stages = history.index[w + 1, 0] - o
         # of two stages the first is where the step begins; one that has its end alone begins where the last one ended
         inside = o + (stages - 1) // 2 if stages > 1 else o - 1
         if bends:
-            size, mine = at_stage(model, strength, segment, track, inside, j, -1, desk, slopes, rows)
+            size, mine = at_stage(model, member_state, segment, history, inside, j, -1, workspace, slopes, rows)
             if gradient and kind == MEMBER_FORCE:
                 ties = equal_forces(
-                    model, strength, segment, track.when[inside], model.response[j, 5], track.stage[inside], size, tied
+                    model,
+                    member_state,
+                    segment,
+                    history.when[inside],
+                    model.response[j, 5],
+                    history.stage[inside],
+                    size,
+                    tied,
                 )
-        for i in range(track.index[w + 1, 0] - o):
+        for i in range(history.index[w + 1, 0] - o):
             if weight[i] == 0.0:
                 continue
-            stage = track.stage[o + i]
-            t = track.when[o + i]
-            value, who = at_stage(model, strength, segment, track, o + i, j, -1, desk, own, own_rows)
+            stage = history.stage[o + i]
+            t = history.when[o + i]
+            value, who = at_stage(model, member_state, segment, history, o + i, j, -1, workspace, own, own_rows)
             turned = np.bool_(False)
             if bends and o + i != inside:
                 value, who, turned = one_sided(
-                    model, strength, segment, track, o + i, inside, j, who, value, mine, size, slopes, rows, desk, own,
-                    own_rows,
+                    model, member_state, segment, history, o + i, inside, j, who, value, mine, size, slopes, rows,
+                    workspace, own, own_rows,
                 )  # fmt: skip
             factor = weight[i] * (2.0 * value if square else 1.0)
             total += weight[i] * (value * value if square else value)
             if not gradient:
                 continue
             if energy:
-                add_design(model, segment, t, strength, stage[0], stage[1], stage[2], none, factor, out, work)
+                add_design(model, segment, t, member_state, stage[0], stage[1], stage[2], none, factor, out, work)
             shares = ties if who == mine and ties > 1 else 1
             factor /= shares
             bars[o + i] = 0.0
             for m in range(shares):
                 if shares > 1:
                     who = tied[m]
-                    at_stage(model, strength, segment, track, o + i, j, who, desk, own, own_rows)
+                    at_stage(model, member_state, segment, history, o + i, j, who, workspace, own, own_rows)
                     if turned:
                         _turn(own, own_rows)
                 for part in range(3):
@@ -516,12 +527,23 @@ def integral_cotangents(
                         bars[o + i, part, d] += factor * own[part, d]
                 for r in range(n_row):
                     rows_bar[o + i, r] = factor * own_rows[r]
-                sign = force_sign(model, segment, j, who, t, strength, stage[0], stage[1], stage[2])
+                sign = force_sign(model, segment, j, who, t, member_state, stage[0], stage[1], stage[2])
                 if turned:
                     sign = -sign
-                explicit_part(model, segment, j, who, t, strength, stage[0], stage[1], stage[2], factor * sign, out)
+                explicit_part(model, segment, j, who, t, member_state, stage[0], stage[1], stage[2], factor * sign, out)
                 if sets_bar.shape[1] > 0:
                     add_looked_sets(
-                        model, strength, segment, j, who, t, stage[0], stage[1], stage[2], own, factor, sets_bar[o + i]
+                        model,
+                        member_state,
+                        segment,
+                        j,
+                        who,
+                        t,
+                        stage[0],
+                        stage[1],
+                        stage[2],
+                        own,
+                        factor,
+                        sets_bar[o + i],
                     )
     return total

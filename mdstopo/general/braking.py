@@ -8,7 +8,7 @@ method is at the limit of its stability there.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import solve_unknowns
+from mdstopo.general.accelerations import solve_unknowns
 from mdstopo.general.contact import contact_rows
 from mdstopo.general.members import rate_of_row
 from mdstopo.mechanics.contact import CLOSED, MU, SLIP, C, K, contact_force
@@ -27,7 +27,7 @@ HELD, HOPELESS = 1000, 10.0
 
 
 @kernel
-def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken, tolerance):
+def friction_error(model, member_state, vectors, s, h, start, ends, a, noise, shaken, tolerance):
     """Estimated error of a step's sliding velocities relative to `slip`, the largest of all contacts that drag.
 
     What counts is the error of T / (mu N) = tanh(slide / slip), of which 1 / (slip (1 + (slide / slip)^2)) is the slope
@@ -35,7 +35,7 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       vectors: the plane VECTORS of the method's table (`integrators.runge_kutta_tables`).
       s, h: number of stages; length of the step (s).
       start, ends (2, n): q, v at both ends of the step.
@@ -52,7 +52,7 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken
     worst = 0.0
     for j in range(model.contact_pair.shape[0]):
         c = model.contact[j]
-        if int(strength[1, first + j]) != CLOSED or c[MU] == 0.0:
+        if int(member_state[1, first + j]) != CLOSED or c[MU] == 0.0:
             continue
         p = model.contact_pair[j]
         _, height = contact_rows(model, j, start[0], start[1], rows, rates)
@@ -91,7 +91,7 @@ def friction_error(model, strength, vectors, s, h, start, ends, a, noise, shaken
 
 
 @kernel
-def brake_rate(model, strength, q, v, enough, desk):
+def brake_rate(model, member_state, q, v, enough, workspace):
     """The fastest rate at which closed contacts brake velocities at a state, at most; and which of them brakes most.
 
     Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, damping c; with rows B and the mobility
@@ -100,13 +100,13 @@ def brake_rate(model, strength, q, v, enough, desk):
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
       enough: rate up to which the trace will do (1/s).
     In and out:
-      desk: the workspace, with the joints as factorised at the state.
+      workspace: the workspace, with the joints as factorised at the state.
 
-    Returns the rate (1/s), and the column of `strength` of the contact that brakes most, or -1.
+    Returns the rate (1/s), and the column of `member_state` of the contact that brakes most, or -1.
     """
     n = q.shape[0]
     first = model.member.shape[1]
@@ -120,7 +120,7 @@ def brake_rate(model, strength, q, v, enough, desk):
     who = -1
     for j in range(count):
         c = model.contact[j]
-        if int(strength[1, first + j]) != CLOSED or (c[MU] == 0.0 and c[C] == 0.0):
+        if int(member_state[1, first + j]) != CLOSED or (c[MU] == 0.0 and c[C] == 0.0):
             continue
         p = model.contact_pair[j]
         _, height = contact_rows(model, j, q, v, rows, rates)
@@ -153,7 +153,7 @@ def brake_rate(model, strength, q, v, enough, desk):
             push[3 * model.pair[p, r // 3] + r % 3] = kept[i, r]
         if held.shape[0] > 0:
             held[:] = 0.0
-            solve_unknowns(model, desk, push, held)
+            solve_unknowns(model, workspace, push, held)
         else:
             for d in range(n):
                 push[d] = push[d] / model.mass[d] if model.free[d] != 0 else 0.0

@@ -56,7 +56,7 @@ def members_peaks(
     near = np.flatnonzero(top >= (1.0 - window) * top.max())
     who = np.sort(near[np.argsort(-top[near], kind="stable")[: max(FOLLOWED, most)]])
     if final:
-        seen = [driver.see_one(j, count, places[0], who=int(i)).copy() for i in who]
+        seen = [driver.evaluate_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]
     seen_all = seen_all[who] if at_once else compare(driver, j, places, who, count)[1]
     limit = _least(top, window, most)
@@ -67,12 +67,12 @@ def members_peaks(
         sign = np.where(force >= 0.0, 1.0, -1.0)
         samples = Samples(t, sign * force, sign * rate, np.full(force.shape, float(i)))
 
-        def see(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
+        def evaluate_at(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
             if exact and len(places) == 1:
-                return driver.see_one(j, count, places[0], who)[None].copy()
-            return driver.visit(j, places, exact, count, who=who)[2]
+                return driver.evaluate_one(j, count, places[0], who)[None].copy()
+            return driver.sample_response(j, places, exact, count, who=who)[2]
 
-        rows += peaks(samples, see, 1.0, own)
+        rows += peaks(samples, evaluate_at, 1.0, own)
     return rows
 
 
@@ -103,7 +103,7 @@ def compare(
     top, seen = np.zeros(members_of(driver, j)), np.zeros((len(who), len(places), 2))
     driver.entry.compare(
         driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,
-        driver.room_ints, driver.strength, exact, j, places, who, top, seen, driver.work,
+        driver.room_ints, driver.member_state, exact, j, places, who, top, seen, driver.work,
     )  # fmt: skip
     return top, seen
 

@@ -8,14 +8,14 @@ with z from the transposed system and (g_q, g_lam). Free bodies make it singular
 import numpy as np
 
 from mdstopo.compiler.jit import entry
-from mdstopo.general.balance import balance, joint_slopes, make_desk
-from mdstopo.general.duties import point_of
+from mdstopo.general.accelerations import joint_slopes, make_workspace, solve_accelerations
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, explicit_part, force_sign
 from mdstopo.general.members import unscale_general
+from mdstopo.general.method_interface import point_of
 from mdstopo.general.model import unpack_general
 from mdstopo.general.responses import ENERGY, response
-from mdstopo.general.track import carve_track, copy_vector, restore_modes
+from mdstopo.general.step_history import carve_history, copy_vector, restore_modes
 
 
 @entry
@@ -31,7 +31,7 @@ def hold(
     row,
     room,
     room_ints,
-    strength,
+    member_state,
     z,
     matrix,
     right,
@@ -42,23 +42,23 @@ def hold(
     """The linear system of constant dynamic loading at a row of `extremes`; or, once it is solved, the gradient.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       ints, floats: the packed scene (`model.pack_general`).
       alpha (N,): the design.
-      limits, room, room_ints: the history of steps, as of `track.carve_track`.
+      limits, room, room_ints: the history of steps, as of `carve_history`.
       count, j: how many steps there are; the response.
       row (COLUMNS,): the row, as of `extremes`.
       z (n,): the virtual displacement that solves the transposed system; no length: the system is asked for.
     In and out:
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       matrix (n + n_row, n + n_row), right (n + n_row,): the system, and (g_q, g_lam); where z has no length.
       out (N,): the gradient by alpha; where z has a length. padded (M_padded,): scratch for it.
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     n_row = model.size[0]
     no = np.bool_(False)
@@ -71,26 +71,26 @@ def hold(
     k = int(row[2])
     c = row[3]
     who = int(row[6])
-    segment = track.index[k, 2]
+    segment = history.index[k, 2]
     if c <= 0.0 or c >= 1.0:
-        copy_vector(track.state[k if c <= 0.0 else k + 1, 0], q)
-        copy_vector(track.state[k if c <= 0.0 else k + 1, 1], v)
+        copy_vector(history.state[k if c <= 0.0 else k + 1, 0], q)
+        copy_vector(history.state[k if c <= 0.0 else k + 1, 1], v)
     else:
-        point_of(tag, model, tables, strength, track, count, k, c, no, desk, q, v, work)
-    t = track.t[k] + c * (track.t[k + 1] - track.t[k])
-    restore_modes(track, track.index[k, 3], strength)
-    balance(model, strength, segment, t, q, v, no, desk, a, lam)
-    response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+        point_of(tag, model, tables, member_state, history, count, k, c, no, workspace, q, v, work)
+    t = history.t[k] + c * (history.t[k + 1] - history.t[k])
+    restore_modes(history, history.index[k, 3], member_state)
+    solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+    response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
     if z.shape[0] > 0:
         padded[:] = 0.0
         weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
-        add_design(model, segment, t, strength, q, v, a, z, weight, padded, work)
-        sign = force_sign(model, segment, j, who, t, strength, q, v, a)
-        explicit_part(model, segment, j, who, t, strength, q, v, a, sign, padded)
+        add_design(model, segment, t, member_state, q, v, a, z, weight, padded, work)
+        sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
+        explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, padded)
         unscale_general(model.block, model.power, alpha, padded, out)
         return
-    general_forces(model, strength, segment, t, q, v, np.bool_(True), desk)
-    joint_slopes(model, q, v, a, lam, desk)
+    general_forces(model, member_state, segment, t, q, v, np.bool_(True), workspace)
+    joint_slopes(model, q, v, a, lam, workspace)
     matrix[:] = 0.0
     for d in range(n):
         right[d] = bars[0, d]
@@ -100,12 +100,12 @@ def hold(
         for i in range(6):
             for m in range(6):
                 line = 3 * model.pair[p, i // 3] + i % 3
-                matrix[line, 3 * model.pair[p, m // 3] + m % 3] += desk.k[p, i, m]
+                matrix[line, 3 * model.pair[p, m // 3] + m % 3] += workspace.k[p, i, m]
     for joint in range(model.joint.shape[0]):
         for r in range(3):
             own = model.row[joint, r]
             if own >= 0:
                 for i in range(6):
                     d = 3 * model.joint[joint, 1 + i // 3] + i % 3
-                    matrix[n + own, d] += desk.jac[joint, r, i]
-                    matrix[d, n + own] += desk.jac[joint, r, i]
+                    matrix[n + own, d] += workspace.jac[joint, r, i]
+                    matrix[d, n + own] += workspace.jac[joint, r, i]

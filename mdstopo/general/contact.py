@@ -5,7 +5,8 @@ the edge's first end and u its direction or normal. With rows B_u = dh_u/dq and 
 
     F = N B_n^T + T B_t^T,   dF = B_n^T dN + B_t^T dT + (N H_n + T H_t) dq,
 
-where H_u = d2h_u/dq2 has the angles' terms only. The mode of contact j stands in `strength` behind those of members.
+where H_u = d2h_u/dq2 has the angles' terms only. The mode of contact j stands in `member_state` behind those of
+members.
 """
 
 import numpy as np
@@ -75,12 +76,12 @@ def contact_rows(model, j, q, v, rows, rates):
 
 
 @kernel
-def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):
+def add_contacts(model, member_state, q, v, tangent, f, k_out, c_out):
     """The forces of all closed contacts, and on demand their tangents.
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
       tangent: whether tangents are asked for.
     Out, all added to:
@@ -91,7 +92,7 @@ def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):
     rates = np.empty((2, 6))
     first = model.member.shape[1]
     for j in range(model.contact_pair.shape[0]):
-        mode = int(strength[1, first + j])
+        mode = int(member_state[1, first + j])
         if mode != CLOSED:
             continue
         p = model.contact_pair[j]
@@ -140,12 +141,12 @@ def add_contacts(model, strength, q, v, tangent, f, k_out, c_out):
 
 
 @kernel
-def contact_switch(model, strength, q, v, a, j, slopes):
+def contact_switch(model, member_state, q, v, a, j, slopes):
     """As `events.switch_of`, of a contact: its next mode, and how far its margin goes beyond zero.
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
       j: the contact.
     Out:
@@ -162,7 +163,7 @@ def contact_switch(model, strength, q, v, a, j, slopes):
     slide = rate_of_row(model, p, rows[0], v)
     rise = rate_of_row(model, p, rows[1], v)
     second = rate_of_row(model, p, rows[1], a) + rate_of_row(model, p, rates[1], v)
-    mode = int(strength[1, model.member.shape[1] + j])
+    mode = int(member_state[1, model.member.shape[1] + j])
     by_along, by_height, by_rise = contact_margin_slopes(c, along, height, rise, mode)
     speed = by_along * slide + by_height * rise + by_rise * second
     for d in range(n):

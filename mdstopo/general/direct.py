@@ -1,34 +1,34 @@
 """The sensitivities of a general motion carried forward with it: the second way to the same gradients.
 
 Each step is a linear map of changes of the state and of a force at each stage. It is built once, by pushing unit
-changes through the step (`duties`), and then applied to the derivatives of the state by every alpha^mu, whose forces
-are each member's own. At events the derivatives jump by saltation. At the row's time its cotangents meet them.
+changes through the step (`method_interface`), and then applied to the derivatives of the state by every alpha^mu, whose
+forces are each member's own. At events the derivatives jump by saltation. At the row's time its cotangents meet them.
 """
 
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
+from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
-from mdstopo.general.balance import make_desk
-from mdstopo.general.duties import step_forward
 from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import unscale_general
+from mdstopo.general.method_interface import step_forward
 from mdstopo.general.model import INERTER, unpack_general
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
-from mdstopo.general.track import carve_track, restore_modes
+from mdstopo.general.step_history import carve_history, restore_modes
 from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 
 @kernel
-def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out):
+def step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, workspace, out):
     """What unit changes of the state at the start of step w, and of the force at each of its stages, do at its end.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, w: the history of steps, and the step.
+      history, w: the history of steps, and the step.
       c: fraction of the step at which it is taken to end.
       sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
       bars (s, 3, n), rows_bar (s, n_row): cotangents of an integral by q, v, a and the multipliers of the stages; no
@@ -37,12 +37,12 @@ def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out)
       out (4 n + s n or more, 4 n + 1): a row for each unit change of q, of v, of the two vectors that the integrator
         carries from step to step, and of each stage's force; its columns are what becomes of q, v and the carried
         vectors, and of the integral.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
 
     Returns whether all sweeps settled.
     """
     n = model.mass.shape[0]
-    s = track.index[w + 1, 0] - track.index[w, 0]
+    s = history.index[w + 1, 0] - history.index[w, 0]
     dq = np.empty(n)
     dv = np.empty(n)
     dx = np.empty((2, n))
@@ -67,7 +67,7 @@ def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out)
             dx[part - 2, b % n] = 1.0
         else:
             force[part - 4, b % n] = 1.0
-        if not step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
+        if not step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
             settled = False
         for d in range(n):
             out[b, d] = dq[d]
@@ -85,14 +85,14 @@ def step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, out)
 
 
 @kernel
-def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):
+def own_force(model, k, i, segment, t, member_state, q, v, a, row, row_rate):
     """The force f_i of a member at unit strength (N), and its row B_i.
 
     Constant:
       model: the compiled scene.
       k, i: the block, and the member (padded).
       segment, t: segment of `model.times`, and time in it (s).
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
     Out:
       row (6,): B_i over the coordinates of both bodies. row_rate (6,): its derivative by time; not set for an inerter.
@@ -100,48 +100,63 @@ def own_force(model, k, i, segment, t, strength, q, v, a, row, row_rate):
     if model.block[k, 3] == INERTER:
         return inerter_force(model, k, i, q, v, a, row)
     x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-    x -= strength[2, i]
+    x -= member_state[2, i]
     value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
+    f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(member_state[1, i]), t, value, model.curves)
     return f
 
 
 @kernel
 def through_step(
-    tag, model, tables, strength, track, w, c, sweeps, bars, rows_bar, sets_bar, desk, column, sets, matrix, spare
+    tag,
+    model,
+    tables,
+    member_state,
+    history,
+    w,
+    c,
+    sweeps,
+    bars,
+    rows_bar,
+    sets_bar,
+    workspace,
+    column,
+    sets,
+    matrix,
+    spare,
 ):
     """Carry the derivatives of the state by every alpha^mu, and by parameters, through step w to its fraction c.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, w, c: the history of steps, the step, and the fraction of it.
+      history, w, c: the history of steps, the step, and the fraction of it.
       sweeps, bars (s, 3, n), rows_bar (s, n_row): as of `step_map`.
       sets (slots, M_padded + P): derivatives of the permanent sets (`permanent_sets`).
       sets_bar (s, slots): cotangents of an integral by the sets at the stages; no rows where there is none.
     In and out:
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
       column (M_padded + P, 4 n + 1): derivatives of q, v and the two carried vectors; the last column sums up that of
         the integral.
     Out:
       matrix (4 n + s n or more, 4 n + 1): of `step_map`. spare (4 n + 1,): scratch.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
 
     Returns whether all sweeps settled.
     """
     n = model.mass.shape[0]
-    o = track.index[w, 0]
-    s = track.index[w + 1, 0] - o
-    segment = track.index[w, 2]
+    o = history.index[w, 0]
+    s = history.index[w + 1, 0] - o
+    segment = history.index[w, 2]
     row = np.empty(6)
     row_rate = np.empty(6)
-    restore_modes(track, track.index[w, 3], strength)
-    settled = step_map(tag, model, tables, track, w, c, sweeps, bars, rows_bar, desk, matrix)
+    restore_modes(history, history.index[w, 3], member_state)
+    settled = step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, workspace, matrix)
     width = 4 * n + 1
     slots = sets.shape[0]
     by_set = np.empty((slots, width))
     if slots > 0:
-        through_sets(model, strength, track, w, matrix, by_set)
+        through_sets(model, member_state, history, w, matrix, by_set)
         for m in range(slots):
             for j in range(sets_bar.shape[0]):
                 by_set[m, 4 * n] += sets_bar[j, m]
@@ -157,9 +172,19 @@ def through_step(
                         spare[d] += value * matrix[b, d]
             if model.active[segment, k] != 0:
                 for j in range(s):
-                    stage = track.stage[o + j]
+                    stage = history.stage[o + j]
                     f = own_force(
-                        model, k, i, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], row, row_rate
+                        model,
+                        k,
+                        i,
+                        segment,
+                        history.when[o + j],
+                        member_state,
+                        stage[0],
+                        stage[1],
+                        stage[2],
+                        row,
+                        row_rate,
                     )
                     for r in range(6):
                         b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
@@ -173,18 +198,18 @@ def through_step(
                 column[i, d] = spare[d]
             column[i, 4 * n] += spare[4 * n]
     if model.varied.shape[0] > 0:
-        _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare)
+        _parameters_through_step(model, member_state, history, w, column, sets, by_set, matrix, spare)
     return settled
 
 
 @kernel
-def _parameters_through_step(model, strength, track, w, column, sets, by_set, matrix, spare):
+def _parameters_through_step(model, member_state, history, w, column, sets, by_set, matrix, spare):
     """Carry the derivatives by parameters, the rows of `column` behind the members, through step w.
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
-      track, w: the history of steps, and the step.
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      history, w: the history of steps, and the step.
       sets (slots, M_padded + P): derivatives of the permanent sets. by_set (slots, 4 n + 1): what unit sets do at the
         end.
       matrix (4 n + s n or more, 4 n + 1): of `step_map`.
@@ -194,8 +219,8 @@ def _parameters_through_step(model, strength, track, w, column, sets, by_set, ma
       spare (4 n + 1,): scratch.
     """
     n = model.mass.shape[0]
-    o = track.index[w, 0]
-    segment = track.index[w, 2]
+    o = history.index[w, 0]
+    segment = history.index[w, 2]
     row = np.empty(6)
     row_rate = np.empty(6)
     width = 4 * n + 1
@@ -212,14 +237,14 @@ def _parameters_through_step(model, strength, track, w, column, sets, by_set, ma
             place = model.varied[e, 1]
             if model.varied[e, 2] != c - members or place > FREE_LENGTH or model.active[segment, k] == 0:
                 continue
-            for j in range(track.index[w + 1, 0] - o):
-                stage = track.stage[o + j]
+            for j in range(history.index[w + 1, 0] - o):
+                stage = history.stage[o + j]
                 for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
                     slope, _ = parameter_slopes(
-                        model, k, i, place, segment, track.when[o + j], strength, stage[0], stage[1], stage[2], row,
-                        row_rate,
+                        model, k, i, place, segment, history.when[o + j], member_state, stage[0], stage[1], stage[2],
+                        row, row_rate,
                     )  # fmt: skip
-                    slope *= strength[0, i]
+                    slope *= member_state[0, i]
                     for r in range(6):
                         b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
                         for d in range(width):
@@ -233,16 +258,16 @@ def _parameters_through_step(model, strength, track, w, column, sets, by_set, ma
 
 
 @kernel
-def shift_times(model, track, strength, count, state, j, square, column):
+def shift_times(model, history, member_state, count, state, j, square, column):
     """What shifting the times of laws that begin or end at a state does to the derivatives by them (`parameters`).
 
     Constant:
       model: the compiled scene.
-      track, count: the history of steps, and how many steps it has.
+      history, count: the history of steps, and how many steps it has.
       state: number of the state.
       j, square: the response whose integral (or that of its square) is meant, -1 for none.
     In and out:
-      strength (3, columns): state of the members; modes are not what they were before the call.
+      member_state (3, columns): state of the members; modes are not what they were before the call.
       column (M_padded + P, 4 n + 1): as of `through_step`; velocities and the integral change.
     """
     n = model.mass.shape[0]
@@ -250,7 +275,7 @@ def shift_times(model, track, strength, count, state, j, square, column):
     for e in range(model.varied.shape[0]):
         if model.varied[e, 1] <= FREE_LENGTH:
             continue
-        does, drop = time_jump(model, track, strength, count, state, e, j, square, dv)
+        does, drop = time_jump(model, history, member_state, count, state, e, j, square, dv)
         if does:
             c = model.member.shape[1] + model.varied[e, 2]
             for d in range(n):
@@ -259,48 +284,48 @@ def shift_times(model, track, strength, count, state, j, square, column):
 
 
 @kernel
-def jump(model, track, strength, count, state, column, sets, drops, j, square):
+def jump(model, history, member_state, count, state, column, sets, drops, j, square):
     """Saltation of the derivatives at the events of a state; a step that follows makes its own carried vectors.
 
     Constant:
       model: the compiled scene.
-      track, count: the history of steps, and how many steps it has.
+      history, count: the history of steps, and how many steps it has.
       state: number of the state.
       drops (E,): of `adjoint.event_drops`, which the derivative of the integral takes in; no rows where there is none.
       j, square: the response whose integral (or that of its square) is meant, -1 for none.
     In and out:
-      strength (3, columns): state of the members; modes are not what they were before the call.
+      member_state (3, columns): state of the members; modes are not what they were before the call.
       column (M_padded + P, 4 n + 1), sets (slots, M_padded + P): as of `through_step`.
     """
     n = model.mass.shape[0]
     if state == 0:
         return
     members = model.member.shape[1]
-    for e in range(track.index[state - 1, 3], track.index[state, 3]):
-        if track.event[e, 0] != state:
+    for e in range(history.index[state - 1, 3], history.index[state, 3]):
+        if history.event[e, 0] != state:
             continue
         for i in range(column.shape[0]):
             later = 0.0
             for d in range(n):
-                later -= track.salt[e, 0, d] * column[i, d] + track.salt[e, 1, d] * column[i, n + d]
+                later -= history.saltation[e, 0, d] * column[i, d] + history.saltation[e, 1, d] * column[i, n + d]
             if i >= members:
                 for entry in range(model.varied.shape[0]):
                     if model.varied[entry, 2] == i - members:
-                        later += event_slope(model, track, strength, e, entry)
+                        later += event_slope(model, history, member_state, e, entry)
             if sets.shape[0] > 0:
-                later += time_forward(model, track, e, sets, i)
+                later += time_forward(model, history, e, sets, i)
             for d in range(n):
-                column[i, n + d] += track.salt[e, 2, d] * later
+                column[i, n + d] += history.saltation[e, 2, d] * later
             if drops.shape[0] > 0:
                 column[i, 4 * n] += drops[e] * later
         if sets.shape[0] > 0:
-            sets_forward(model, track, e, column, sets)
+            sets_forward(model, history, e, column, sets)
     if model.varied.shape[0] > 0:
-        shift_times(model, track, strength, count, state, j, square, column)
+        shift_times(model, history, member_state, count, state, j, square, column)
 
 
 @kernel
-def begin(model, track, first, column, sets):
+def begin(model, history, first, column, sets):
     """Column and sets at the start, whose positions have the derivatives first (M_padded, n), or none (no rows).
 
     The sets that members begin with depend on parameters besides.
@@ -309,8 +334,8 @@ def begin(model, track, first, column, sets):
         for d in range(first.shape[1]):
             column[i, d] = first[i, d]
     if (first.shape[0] > 0 or model.varied.shape[0] > 0) and sets.shape[0] > 0:
-        for e in range(track.index[0, 3]):
-            sets_forward(model, track, e, column, sets)
+        for e in range(history.index[0, 3]):
+            sets_forward(model, history, e, column, sets)
 
 
 @entry
@@ -329,7 +354,7 @@ def push(
     across,
     room,
     room_ints,
-    strength,
+    member_state,
     padded,
     out,
     first,
@@ -338,10 +363,10 @@ def push(
     """The derivative of one row of `extremes`, or of an integral, by the design, carried forward with the motion.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       ints, floats: the packed scene (`model.pack_general`).
       alpha (N,): the design.
-      limits: steps allowed, and the sizes of the history's arrays (`track.carve_track`).
+      limits: steps allowed, and the sizes of the history's arrays (`carve_history`).
       count, j: how many steps there are; the response.
       integral: 0: the row is meant; 1: the integral of g_j; 2: that of its square.
       sweeps: above 0, by the iterative method, with so many sweeps at most.
@@ -349,7 +374,7 @@ def push(
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
       room, room_ints: the history of steps; a partial step may come behind the others.
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       out (N + P,): the derivative by alpha, then by parameters. padded (M_padded + P,): scratch.
       work (WORK,): counts of work, added to.
@@ -357,57 +382,57 @@ def push(
     Returns the step in which the sweeps did not settle, or -1.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     n_row = model.size[0]
     column = np.zeros((padded.shape[0], 4 * n + 1))
     matrix = np.empty((21 * n, 4 * n + 1))
     spare = np.empty(4 * n + 1)
     bars = np.zeros((3, n))
-    stages = track.index[count, 0] if integral > 0 else 0
+    stages = history.index[count, 0] if integral > 0 else 0
     stage_bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, n_row))
     slots = count_sets(model)
     sets = np.zeros((slots, padded.shape[0]))
     bar_set = np.zeros(slots)
     sets_bar = np.zeros((stages, slots))
-    begin(model, track, first, column, sets)
+    begin(model, history, first, column, sets)
     drops = np.empty(0)
     w = count
     c = 1.0
     last = count
     if integral > 0:
         integral_cotangents(
-            tag, model, tables, strength, track, count, j, integral == 2, stage_bars, rows_bar, sets_bar, desk, padded,
-            work,
+            tag, model, tables, member_state, history, count, j, integral == 2, stage_bars, rows_bar, sets_bar,
+            workspace, padded, work,
         )  # fmt: skip
-        drops = event_drops(model, strength, track, count, j, integral == 2, desk)
+        drops = event_drops(model, member_state, history, count, j, integral == 2, workspace)
     else:
         w, c = row_cotangents(
-            tag, model, tables, strength, track, count, j, row, across, desk, bars, bar_set, padded, work
+            tag, model, tables, member_state, history, count, j, row, across, workspace, bars, bar_set, padded, work
         )
-        last = w if w <= count else track.index[w, 1] + 1  # a partial step lies behind the others
+        last = w if w <= count else history.index[w, 1] + 1  # a partial step lies behind the others
     looked = j if integral > 0 else np.int64(-1)
     if model.varied.shape[0] > 0 and last >= 0 and w >= 0:
-        shift_times(model, track, strength, count, np.int64(0), looked, integral == 2, column)
+        shift_times(model, history, member_state, count, np.int64(0), looked, integral == 2, column)
     for k in range(last):
-        o = track.index[k, 0]
-        end = track.index[k + 1, 0]
+        o = history.index[k, 0]
+        end = history.index[k + 1, 0]
         own = stage_bars[o:end] if integral > 0 else stage_bars
         own_rows = rows_bar[o:end] if integral > 0 else rows_bar
         own_sets = sets_bar[o:end] if integral > 0 else sets_bar
         settled = through_step(
-            tag, model, tables, strength, track, k, 1.0, sweeps, own, own_rows, own_sets, desk, column, sets, matrix,
-            spare,
+            tag, model, tables, member_state, history, k, 1.0, sweeps, own, own_rows, own_sets, workspace, column, sets,
+            matrix, spare,
         )  # fmt: skip
         if not settled:
             return k
-        jump(model, track, strength, count, k + 1, column, sets, drops, looked, integral == 2)
+        jump(model, history, member_state, count, k + 1, column, sets, drops, looked, integral == 2)
     if integral == 0 and w >= 0:
         settled = through_step(
-            tag, model, tables, strength, track, w, c, sweeps, stage_bars, rows_bar, sets_bar, desk, column, sets,
-            matrix, spare,
+            tag, model, tables, member_state, history, w, c, sweeps, stage_bars, rows_bar, sets_bar, workspace, column,
+            sets, matrix, spare,
         )  # fmt: skip
         if not settled:
             return last
@@ -423,27 +448,27 @@ def push(
 
 @entry
 def follow(
-    tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, strength, padded, out, first, work
+    tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, member_state, padded, out, first, work
 ):
     """dg_j/dalpha at the start and at the end of every step, the time held fixed; at events the values before them.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       ints, floats: the packed scene (`model.pack_general`).
       alpha (N,): the design.
-      limits, room, room_ints: the history of steps, as of `track.carve_track`.
+      limits, room, room_ints: the history of steps, as of `carve_history`.
       count, j: how many steps there are; the response.
       who (count + 1,): the member whose force is meant at each of these times.
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
-      strength (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
+      member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
       out (count + 1, N + P): the derivatives by alpha, then by parameters. padded (M_padded + P,): scratch.
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     column = np.zeros((padded.shape[0], 4 * n + 1))
     matrix = np.empty((21 * n, 4 * n + 1))
@@ -455,7 +480,7 @@ def follow(
     sets = np.zeros((slots, padded.shape[0]))
     bar_set = np.zeros(slots)
     no_sets = np.zeros((0, slots))
-    begin(model, track, first, column, sets)
+    begin(model, history, first, column, sets)
     row = np.zeros(7)
     for k in range(count + 1):
         row[2] = max(k - 1, 0)
@@ -463,11 +488,24 @@ def follow(
         row[6] = who[k]
         if k > 0:
             through_step(
-                tag, model, tables, strength, track, k - 1, 1.0, 0, nothing, no_rows, no_sets, desk, column, sets,
-                matrix, spare,
+                tag, model, tables, member_state, history, k - 1, 1.0, 0, nothing, no_rows, no_sets, workspace, column,
+                sets, matrix, spare,
             )  # fmt: skip
         row_cotangents(
-            tag, model, tables, strength, track, count, j, row, np.bool_(False), desk, bars, bar_set, padded, work
+            tag,
+            model,
+            tables,
+            member_state,
+            history,
+            count,
+            j,
+            row,
+            np.bool_(False),
+            workspace,
+            bars,
+            bar_set,
+            padded,
+            work,
         )
         for i in range(padded.shape[0]):
             for d in range(n):
@@ -476,6 +514,6 @@ def follow(
                 padded[i] += bar_set[m] * sets[m, i]
         unscale_general(model.block, model.power, alpha, padded, out[k])
         if k == 0 and model.varied.shape[0] > 0:
-            shift_times(model, track, strength, count, k, np.int64(-1), np.bool_(False), column)
+            shift_times(model, history, member_state, count, k, np.int64(-1), np.bool_(False), column)
         if k > 0:
-            jump(model, track, strength, count, k, column, sets, np.empty(0), np.int64(-1), np.bool_(False))
+            jump(model, history, member_state, count, k, column, sets, np.empty(0), np.int64(-1), np.bool_(False))

@@ -27,16 +27,16 @@ from mdstopo.general.extremes import (
     sample,
 )
 from mdstopo.general.kinks import landed
-from mdstopo.general.landings import INTEGRALS, ROUNDS, landings, reduced
 from mdstopo.general.minima import minima
 from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
+from mdstopo.general.quadrature_breakpoints import INTEGRALS, ROUNDS, quadrature_breakpoints, reduced
 from mdstopo.general.ready import Ready
 from mdstopo.general.row_gradients import RowGradients
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
-from mdstopo.general.track import GRAZES, track_room
+from mdstopo.general.step_history import GRAZES, history_room
 from mdstopo.general.variables import Placing
-from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Looked, Method
+from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Method, ResponseResult
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.model import FloatArray
@@ -54,7 +54,7 @@ def load_method(kind: IntegratorKind) -> ModuleType:
 
 
 class GeneralDriver:
-    """One general scene, one method, ready to run; the duties of `integrators.driver.Driver`."""
+    """One general scene, one method, ready to run; the interface of `integrators.driver.Driver`."""
 
     def __init__(self, case: Case, scene: GeneralScene, method: Method, tolerance: float, step: float) -> None:
         self.case = case
@@ -74,22 +74,22 @@ class GeneralDriver:
         self._alpha = np.zeros(n_design)
         #: of the laws' variables; none before the first design
         self._values = np.zeros(0)
-        self.strength = np.zeros((3, padded + len(model.contact_pair) + 1))
+        self.member_state = np.zeros((3, padded + len(model.contact_pair) + 1))
         self.padded = np.zeros(padded + varied)
         self.found = np.zeros(count, dtype=np.int64)
         #: how the value of every response is formed: plain, absolute, a norm (`evaluation.Peak.shape`)
         self.shapes: tuple[Shape, ...] = tuple(shape_of(model, j, name) for j, name in enumerate(scene.reductions))
         self.where = np.full(3, -1, dtype=np.int64)
         n = len(model.mass)
-        #: arrays for the results of `see_one`, and of `_pull`
+        #: arrays for the results of `evaluate_one`, and of `_integral_with_gradient`
         self._one = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
-        self._pulled = np.zeros(n_design + varied)
+        self._integral_gradient = np.zeros(n_design + varied)
         self._row_gradients = RowGradients(self)
         self._make_rows(ROWS)
-        self.pulled_start = np.zeros(n if case.solver.settle else 0)
+        self.start_vjp = np.zeros(n if case.solver.settle else 0)
         self.events = 0
-        #: where the steps of the last evaluation had to end (`landings`)
-        self.landings: list[float] = []
+        #: where the steps of the last evaluation had to end
+        self.quadrature_breakpoints: list[float] = []
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
         self._entry: Any = None
         self._message = ""
@@ -119,14 +119,14 @@ class GeneralDriver:
         # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
         factors = self.method.kind.explicit and not self._inertial
         self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, factors], dtype=np.int64)
-        floats, ints = track_room(self.scene.model, self.limits)
+        floats, ints = history_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self.ready = Ready()  # prepared calls hold the arrays of before
 
     def _make_rows(self, most: int) -> None:
         """Arrays for at most so many peaks of each response; that of `Peak.across` comes when it is first asked for."""
-        count, length = len(self.scene.responses), len(self._pulled)
+        count, length = len(self.scene.responses), len(self._integral_gradient)
         self.rows = np.zeros((count, most, COLUMNS))
         self.gradients = np.zeros((count, most, length))
         self.across: FloatArray | None = None
@@ -166,27 +166,27 @@ class GeneralDriver:
             self._start = q, v
             self._place()
 
-    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> Looked:
+    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and look at all responses; `self.work` holds the counts of this call."""
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
         window = CLOSENESS if rows.window is None else rows.window
         across = self._across() if rows.cones and gradient else None
         code, count, time = self.run(alpha, gradient)
-        self.landings = []
+        self.quadrature_breakpoints = []
         for _ in range(ROUNDS):
-            more = landings(self, count) if code == OK else []
+            more = quadrature_breakpoints(self, count) if code == OK else []
             if not more:
                 break
-            self.landings = self.landings + more
-            code, count, time = self.run(alpha, gradient, self.landings)
+            self.quadrature_breakpoints = self.quadrature_breakpoints + more
+            code, count, time = self.run(alpha, gradient, self.quadrature_breakpoints)
         if code == OK:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient, window)
             if gradient:
                 self._row_gradients(count, across)
         grazing, meeting = self._grazing(), int(self.where[1])
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
+        return ResponseResult(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
 
     def _across(self) -> FloatArray:
         """(n_resp, R, N): of `evaluation.Peak.across`, zeros."""
@@ -195,11 +195,11 @@ class GeneralDriver:
         self.across[:] = 0.0
         return self.across
 
-    def see(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
+    def evaluate_at(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
         """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
         if exact and rates and len(places) == 1:
-            return self.see_one(j, count, places[0])[None].copy()
-        return self.visit(j, places, exact, count, rates=rates)[2]
+            return self.evaluate_one(j, count, places[0])[None].copy()
+        return self.sample_response(j, places, exact, count, rates=rates)[2]
 
     def _grazing(self) -> int:
         """A member (padded) that grazes (`events`), so that the motion or a row found has no derivative; or -1."""
@@ -221,7 +221,7 @@ class GeneralDriver:
         t = self.states()[0][: count + 1]
         rows = self.rows[j]
         if reduction in INTEGRALS:
-            total = self._pull(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
+            total = self._integral_with_gradient(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
             value, slope = reduced(reduction, total, float(t[-1] - t[0]))
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             self.gradients[j, 0] *= slope
@@ -232,14 +232,14 @@ class GeneralDriver:
             found = members_peaks(self, j, t.copy(), reduction == "final", window, most)
             found = ranked(found, window, most, t[-1] - t[0])
         elif reduction == "final":
-            value, rate, who = self.see_one(j, count, np.array([count - 1.0, 1.0])).tolist()
+            value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
             found = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
         elif reduction == "min":
             found = ranked(minima(self, j, t.copy()), window, most, t[-1] - t[0])
         else:
-            see, t = partial(self.see, j, count), t.copy()
-            samples = sample(t, see)
-            found = [row for sign in SIGNS[reduction] for row in peaks(samples, see, sign, window)]
+            evaluate_at, t = partial(self.evaluate_at, j, count), t.copy()
+            samples = sample(t, evaluate_at)
+            found = [row for sign in SIGNS[reduction] for row in peaks(samples, evaluate_at, sign, window)]
             found = ranked(found, window, most, t[-1] - t[0])
         self.found[j] = len(found)
         for r, row in enumerate(found):
@@ -247,7 +247,7 @@ class GeneralDriver:
             rows[r] = row
             rows[r, VALUE] *= flip
 
-    def visit(
+    def sample_response(
         self,
         j: int,
         places: FloatArray,
@@ -270,33 +270,34 @@ class GeneralDriver:
         Returns q, v, a (3, K, n), multipliers (K, n_row + n_driven), and (K, 3) value, rate, member.
         """
         model = self.scene.model
-        packed, limits, room, room_ints, strength = (
-            ((self.ints, self.floats), self.limits, self.room, self.room_ints, self.strength)
+        packed, limits, room, room_ints, member_state = (
+            ((self.ints, self.floats), self.limits, self.room, self.room_ints, self.member_state)
             if steps is None
             else steps.kept
         )
         out = np.zeros((3, len(places), len(model.mass)))
         lam = np.zeros((len(places), self._multipliers))
         seen = np.zeros((len(places), 3))
-        self.entry.visit(
-            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, strength, exact, rates, j,
+        self.entry.sample_response(
+            self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, member_state, exact, rates, j,
             who, places, out, lam, seen, self.work,
         )  # fmt: skip
         return out, lam, seen
 
     @property
     def _multipliers(self) -> int:
-        """How many `visit` gives: of the solved rows and of the driven coordinates."""
+        """How many `sample_response` gives: of the solved rows and of the driven coordinates."""
         return int(self.scene.model.size[0]) + len(self.scene.model.driven)
 
-    def see_one(self, j: int, count: int, place: FloatArray, who: int = -1) -> FloatArray:
-        """(3,) value, rate, member of response j at one place (2,), exactly; who: as of `visit`. The array is the
-        driver's own: the next call overwrites it."""
+    def evaluate_one(self, j: int, count: int, place: FloatArray, who: int = -1) -> FloatArray:
+        """(3,) value, rate, member of response j at one place (2,), exactly; who: as of `sample_response`. The array is
+        the driver's own: the next call overwrites it."""
         places, out, lam, seen = self._one
         places[0] = place
         self.ready(
-            "visit", self.entry.visit, self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count,
-            self.room, self.room_ints, self.strength, True, True, j, who, places, out, lam, seen, self.work,
+            "sample_response", self.entry.sample_response, self.entry.TAG, self.ints, self.floats, self.method.tables,
+            self.limits, count, self.room, self.room_ints, self.member_state, True, True, j, who, places, out, lam,
+            seen, self.work,
         )  # fmt: skip
         found: FloatArray = seen[0]
         return found
@@ -305,16 +306,17 @@ class GeneralDriver:
         """What every entry that differentiates begins with."""
         return self.entry.TAG, self.ints, self.floats, self.method.tables, self._alpha, self.limits, count
 
-    def _pull(self, j: int, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
+    def _integral_with_gradient(self, j: int, integral: int, count: int, gradient: bool, out: FloatArray) -> float:
         """The integral of response j (2: of its square), and on demand its gradient into out (N + P,)."""
         total: float = self.ready(
-            "pull", self.entry.pull, *self.steps_arguments(count), j, integral, gradient, self.room, self.room_ints,
-            self.strength, self.padded, self._pulled, self.pulled_start, self.work,
+            "integral_with_gradient", self.entry.integral_with_gradient, *self.steps_arguments(count), j, integral,
+            gradient, self.room, self.room_ints, self.member_state, self.padded, self._integral_gradient,
+            self.start_vjp, self.work,
         )  # fmt: skip
         if gradient:
-            out[:] = self._pulled
+            out[:] = self._integral_gradient
             if self.start is not None:
-                self.start.pull(self.pulled_start, out)
+                self.start.vjp(self.start_vjp, out)
         return total
 
     def start_from(self, q: FloatArray) -> None:
@@ -331,20 +333,24 @@ class GeneralDriver:
         self.take(design)
         return self.start is None or self.start.move()
 
-    def run(self, alpha: FloatArray, tangent: bool, landings: Sequence[float] = ()) -> tuple[int, int, float]:
+    def run(
+        self, alpha: FloatArray, tangent: bool, quadrature_breakpoints: Sequence[float] = ()
+    ) -> tuple[int, int, float]:
         """Simulate a design (as of `take`) into the driver's own room: code, number of steps, time reached.
 
-        landings: times at which steps are to end, beside those of the model.
+        quadrature_breakpoints: times at which steps are to end, beside those of the model.
         """
         if not self.settle(alpha) and self.start is not None:
             self.room[0], self._message = self.scene.model.times[0], self.start.message
             return UNSETTLED, 0, float(self.room[0])
-        self.ints, self.floats = pack_general(landed(self._with_start(), landings)) if landings else self._packed
+        self.ints, self.floats = (
+            pack_general(landed(self._with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
+        )
         while True:
             self.work[:] = 0
             code, count, self.events, time = self.ready(
                 "simulate", self.entry.simulate, self.ints, self.floats, self.method.tables, self._alpha, tangent,
-                self.settings, self.limits, self.room, self.room_ints, self.strength, self.work, self.where,
+                self.settings, self.limits, self.room, self.room_ints, self.member_state, self.work, self.where,
             )  # fmt: skip
             if code != NEEDS_ROOM:
                 self._message = self._explain(code, time)
@@ -464,7 +470,7 @@ class GeneralSteps:
         self._driver = driver
         # the model too: a later evaluation may land on other times (`GeneralDriver.run`)
         packed = driver.ints, driver.floats
-        self.kept = packed, driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.strength.copy()
+        self.kept = packed, driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.member_state.copy()
         self.count = count
         t, state = driver.states()
         self.t: FloatArray = t[: count + 1].copy()
@@ -478,7 +484,7 @@ class GeneralSteps:
         fraction = (times - self.t[step]) / (self.t[step + 1] - self.t[step])
         fraction[times == self.t[step + 1]] = 1.0
         places = np.stack([step.astype(np.float64), fraction], axis=1)
-        out, solved, _ = self._driver.visit(-1, places, True, self.count, self)
+        out, solved, _ = self._driver.sample_response(-1, places, True, self.count, self)
         return out, self._all_rows(out[0], solved)
 
     def at(self, times: FloatArray) -> FloatArray:

@@ -51,7 +51,7 @@ def has_switches(model, knots):
 
 
 @kernel
-def smallest_margin(model, segment, strength, rel):
+def smallest_margin(model, segment, member_state, rel):
     """The smallest margin of all acting members and contacts at relative poses rel (n_pair, POSE), and whose it is."""
     best = np.inf
     who = -1
@@ -64,15 +64,15 @@ def smallest_margin(model, segment, strength, rel):
         for i in range(lo, lo + model.block[k, 5]):
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - strength[2, i]
-            s = law_margin(code, model.law[k], x, rate, int(strength[1, i]), model.curves)
+            x = stretched(model.member, i, r, length) - member_state[2, i]
+            s = law_margin(code, model.law[k], x, rate, int(member_state[1, i]), model.curves)
             if s < best:
                 best = s
                 who = i
     for j in range(model.contact_pair.shape[0]):
         i = model.member.shape[1] + j
         along, height, _, rise = contact_pose(model.contact[j], rel[model.contact_pair[j]])
-        s = contact_margin(model.contact[j], along, height, rise, int(strength[1, i]))
+        s = contact_margin(model.contact[j], along, height, rise, int(member_state[1, i]))
         if s < best:
             best = s
             who = i
@@ -80,7 +80,7 @@ def smallest_margin(model, segment, strength, rel):
 
 
 @kernel
-def first_dip(model, segment, strength, rel0, rel1, h, parts):
+def first_dip(model, segment, member_state, rel0, rel1, h, parts):
     """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
 
     Looked for on the cubic through a margin's values and rates at both poses.
@@ -88,7 +88,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: time between them (s).
       parts: of how many parts of a step this is one, whose cubic the poses were taken from.
@@ -106,11 +106,11 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):
         p = model.block[k, 0]
         lo = model.block[k, 1]
         for i in range(lo, lo + model.block[k, 5]):
-            mode = int(strength[1, i])
+            mode = int(member_state[1, i])
             r = rel0[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - strength[2, i]
+            x = stretched(model.member, i, r, length) - member_state[2, i]
             s0 = law_margin(code, model.law[k], x, rate, mode, model.curves)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
@@ -119,7 +119,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):
             r = rel1[p]
             length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - strength[2, i]
+            x = stretched(model.member, i, r, length) - member_state[2, i]
             s1 = law_margin(code, model.law[k], x, rate, mode, model.curves)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
@@ -133,7 +133,7 @@ def first_dip(model, segment, strength, rel0, rel1, h, parts):
                 near = c
     for j in range(model.contact_pair.shape[0]):
         row = model.contact[j]
-        mode = int(strength[1, model.member.shape[1] + j])
+        mode = int(member_state[1, model.member.shape[1] + j])
         p = model.contact_pair[j]
         along, height, slide, rise = contact_pose(row, rel0[p])
         by_along, by_height, by_rise = contact_margin_slopes(row, along, height, rise, mode)
@@ -196,7 +196,7 @@ def probes_needed(model, segment, rel0, rel1):
 
 
 @kernel
-def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):
+def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, noise):
     """Where in a step a member seems to leave its mode and come back before the end.
 
     Looked for on the cubic through the states at both ends, in as many parts as the motion asks for, and in each part
@@ -205,7 +205,7 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q0, v0, q1, v1 (n,): coordinates and velocities at both ends (m, rad; m/s, rad/s).
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
@@ -231,10 +231,10 @@ def first_sign(model, segment, strength, q0, v0, q1, v1, rel0, rel1, h, noise):
                 q[d] = a0 * q0[d] + a1 * q1[d] + h * (b0 * v0[d] + b1 * v1[d])
                 v[d] = (da0 * q0[d] + da1 * q1[d]) / h + db0 * v0[d] + db1 * v1[d]
             relative_pose(model.pair, model.home, q, v, rel)
-            margin, _ = smallest_margin(model, segment, strength, rel)
+            margin, _ = smallest_margin(model, segment, member_state, rel)
             if margin < -noise:
                 return c, near
-        dip, may, lowest = first_dip(model, segment, strength, before, rel, h / parts, parts)
+        dip, may, lowest = first_dip(model, segment, member_state, before, rel, h / parts, parts)
         if dip < 1.0:
             return (part - 1 + dip) / parts, near
         if lowest < low:
@@ -322,33 +322,33 @@ def member_rows(model, p, i, q, v, row, row_rate):
 
 
 @kernel
-def switch_any(model, segment, strength, rel, q, v, a, who, slopes):
+def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
     """What becomes of a member or contact whose margin is used up.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       rel (n_pair, POSE): relative poses.
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
-      who: the member or contact, as a column of `strength`.
+      who: the member or contact, as a column of `member_state`.
     Out:
       slopes (2, n): s_q / s', s_v / s'; zero at a knot of a curve, whose time makes no difference.
 
     Returns the mode it goes to, how far its margin goes beyond zero, what a touch that only just happens does
     (`law_grazes`), -s_x / s' (`switch_of`), and by how much its permanent set grows (m).
     """
-    old = int(strength[1, who])
+    old = int(member_state[1, who])
     if who >= model.member.shape[1]:
         j = who - model.member.shape[1]
-        new, beyond = contact_switch(model, strength, q, v, a, j, slopes)
+        new, beyond = contact_switch(model, member_state, q, v, a, j, slopes)
         return new, beyond, contact_grazes(model.contact[j], old), 0.0, 0.0
     k = block_of(model, who)
     code = model.block[k, 3]
-    new, beyond, by_set = switch_of(model, segment, strength, q, v, a, who, k, slopes)
+    new, beyond, by_set = switch_of(model, segment, member_state, q, v, a, who, k, slopes)
     x, _ = stretch_of(model.member, who, rel[model.block[k, 0]])
-    x -= strength[2, who]
-    first = strength[0, who] != 0.0 and strength[2, who] == 0.0
+    x -= member_state[2, who]
+    first = member_state[0, who] != 0.0 and member_state[2, who] == 0.0
     kind = law_grazes(code, model.law[k], x, old) if first else 0
     if law_has_pieces(code):  # nothing jumps at a knot: when it is passed makes no difference
         slopes[:] = 0.0
@@ -356,7 +356,7 @@ def switch_any(model, segment, strength, rel, q, v, a, who, slopes):
 
 
 @kernel
-def switch_of(model, segment, strength, q, v, a, i, k, slopes):
+def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
     """The mode that a member goes to, s'^2 / (2 |s''|), and -s_x / s'.
 
     The second, how far its margin s goes beyond zero (m), is given for margins of Delta alone; infinite for others.
@@ -365,7 +365,7 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
       i, k: the member (padded), and its block.
     Out:
@@ -377,12 +377,12 @@ def switch_of(model, segment, strength, q, v, a, i, k, slopes):
     row = np.empty(6)
     row_rate = np.empty(6)
     x, rate = member_rows(model, p, i, q, v, row, row_rate)
-    x -= strength[2, i]
+    x -= member_state[2, i]
     second = 0.0
     for r in range(6):
         d = 3 * model.pair[p, r // 3] + r % 3
         second += row[r] * a[d] + row_rate[r] * v[d]
-    mode = int(strength[1, i])
+    mode = int(member_state[1, i])
     by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
     speed = by_x * rate + by_rate * second
     for d in range(n):

@@ -30,7 +30,7 @@ FLAT = 1e-9
 RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 
 #: places (K, 2), exact -> (K, 3) value, rate, member
-See = Callable[[FloatArray, bool], FloatArray]
+EvaluateAt = Callable[[FloatArray, bool], FloatArray]
 
 
 @dataclass(frozen=True)
@@ -43,22 +43,22 @@ class Samples:
     who: FloatArray
 
 
-def sample(t: FloatArray, see: See) -> Samples:
+def sample(t: FloatArray, evaluate_at: EvaluateAt) -> Samples:
     """Look at all steps between the times t (m + 1,)."""
     m = len(t) - 1
     places = np.empty((m, len(FRACTIONS), 2))
     places[:, :, 0] = np.arange(m)[:, None]
     places[:, :, 1] = FRACTIONS
-    seen = see(places.reshape(-1, 2), False).reshape(m, len(FRACTIONS), 3)
+    seen = evaluate_at(places.reshape(-1, 2), False).reshape(m, len(FRACTIONS), 3)
     return Samples(t, seen[:, :, 0], seen[:, :, 1], seen[:, :, 2])
 
 
-def peaks(samples: Samples, see: See, sign: float, closeness: float) -> list[FloatArray]:
+def peaks(samples: Samples, evaluate_at: EvaluateAt, sign: float, closeness: float) -> list[FloatArray]:
     """The peaks of sign g that come within `closeness` (relative) of the highest sample, as rows (COLUMNS,)."""
     g, d = sign * samples.value, sign * samples.rate
     highest = float(g.max())
     limit = highest - closeness * abs(highest)
-    found = _inside(samples, g, d, limit, see, sign) + _boundaries(samples, g, d, limit, sign)
+    found = _inside(samples, g, d, limit, evaluate_at, sign) + _boundaries(samples, g, d, limit, sign)
     if not found:  # constant
         w, i = np.unravel_index(int(g.argmax()), g.shape)
         found.append(_row(samples, int(w), FRACTIONS[i], samples.value[w, i], 0.0, sign, samples.who[w, i]))
@@ -120,12 +120,14 @@ def parts(row: FloatArray) -> list[tuple[float, FloatArray]]:
     return [(1.0 - row[SHARE], row), (float(row[SHARE]), other)]
 
 
-def _inside(samples: Samples, g: FloatArray, d: FloatArray, limit: float, see: See, sign: float) -> list[FloatArray]:
+def _inside(
+    samples: Samples, g: FloatArray, d: FloatArray, limit: float, evaluate_at: EvaluateAt, sign: float
+) -> list[FloatArray]:
     """Peaks within steps, as rows: roots of the rate between two samples where it falls through zero.
 
     samples: of the response. g, d (m, 5): sign times its values and rates.
     limit: value of g below which no peak is wanted.
-    see: looks at the motion. sign: 1, or -1 for peaks of -g.
+    evaluate_at: response and rate at places of the motion. sign: 1, or -1 for peaks of -g.
     """
     width = (np.diff(samples.t) / LAST)[:, None]
     da, db = d[:, :-1], d[:, 1:]
@@ -144,26 +146,26 @@ def _inside(samples: Samples, g: FloatArray, d: FloatArray, limit: float, see: S
         rise, fall = float(da[w, i]), float(db[w, i])
         if turning[w, i]:
             middle = low + float(split[w, i]) * (high - low)
-            rate = sign * float(see(np.array([[w, middle]]), True)[0, 1])
+            rate = sign * float(evaluate_at(np.array([[w, middle]]), True)[0, 1])
             if rise > 0.0 > rate:
                 high, fall = middle, rate
             elif rate > 0.0 > fall:
                 low, rise = middle, rate
             else:
                 continue
-        c, value, rate, who = _refine(w, low, high, rise, fall, see, sign)
+        c, value, rate, who = _refine(w, low, high, rise, fall, evaluate_at, sign)
         found.append(_row(samples, w, c, value, rate, sign, who))
     return found
 
 
 def _refine(
-    w: int, low: float, high: float, rise: float, fall: float, see: See, sign: float
+    w: int, low: float, high: float, rise: float, fall: float, evaluate_at: EvaluateAt, sign: float
 ) -> tuple[float, float, float, float]:
     """Fraction, value, rate and member where the rate vanishes, by Illinois' rule on the method's own motion.
 
     w: the step. low, high: fractions between which the rate falls through zero.
     rise, fall: sign times the rate at them, above and below zero.
-    see: looks at the motion. sign: 1, or -1 for peaks of -g.
+    evaluate_at: response and rate at places of the motion. sign: 1, or -1 for peaks of -g.
     """
     size, side = max(rise, -fall), 0
     c = last = np.nan
@@ -172,7 +174,7 @@ def _refine(
         c = (low * fall - high * rise) / (fall - rise)
         if not low < c < high:
             c = 0.5 * (low + high)
-        seen = see(np.array([[w, c]]), True)[0]
+        seen = evaluate_at(np.array([[w, c]]), True)[0]
         rate = sign * float(seen[1])
         if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= 1e-13:
             break

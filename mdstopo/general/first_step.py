@@ -9,7 +9,7 @@ bends; the error of a step is about FIRST (h/tau)^order.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import balance
+from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.integrators.steps import (
     FORCES,
     TURN,
@@ -25,7 +25,7 @@ from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.laws.table import law_is_given, law_unstretched
 
 #: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,
-#: linkages and landings, from 2e-7 to 2e-5 for the second
+#: linkages and contacts, from 2e-7 to 2e-5 for the second
 FIRST = 1e-8, 4e-6
 #: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
 #: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it
@@ -46,7 +46,7 @@ def unstretched_force(model, k):
 
 
 @kernel
-def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):
+def rounding_at_start(model, member_state, rel, v, stiffness, strain, noise):
     """What rounding leaves uncertain of how far each pair has moved.
 
     That of the worst pair by `rounding_of_pairs` holds for all, since joints hand forces on and springs that hold
@@ -55,7 +55,7 @@ def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       rel (n_pair, POSE): relative poses at the start. v (n,): velocities (m/s, rad/s).
       stiffness (n_pair,): of a pair's members (N/m).
       strain (n_pair,): how far a pair is strained at the start (m).
@@ -71,7 +71,7 @@ def rounding_at_start(model, strength, rel, v, stiffness, strain, noise):
         if force > 0.0:
             total = 0.0
             for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-                total += strength[0, i]
+                total += member_state[0, i]
             add_gross_force(model.pair, rel, model.reach, model.block[k, 0], force * total, load)
     for d in range(n):
         inverse[d] = 1.0 / model.mass[d] if model.free[d] != 0 else 0.0
@@ -112,12 +112,14 @@ def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):
 
 
 @kernel
-def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q, v, a, work):
+def first_step(
+    model, member_state, end, q0, v0, a0, rel0, motion, noise, tolerance, order, workspace, lam, q, v, a, work
+):
     """Length of the first step (s).
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       end: time beyond which it does not lead (s).
       q0, v0, a0 (n,): coordinates, velocities, accelerations at the start (m, rad; per s; per s^2).
       rel0 (n_pair, POSE): relative poses at the start.
@@ -125,7 +127,7 @@ def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance,
       tolerance, order: error that a step may have, relative; order of the method.
     Out:
       lam (n_row,), q, v, a (n,): scratch.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
     """
     n = q0.shape[0]
@@ -139,7 +141,9 @@ def first_step(model, strength, end, q0, v0, a0, rel0, motion, noise, tolerance,
         for d in range(n):
             q[d] = q0[d] + h * (v0[d] + 0.5 * h * a0[d])
             v[d] = v0[d] + h * a0[d]
-        singular = balance(model, strength, np.int64(0), t + h, q, v, np.bool_(False), desk, a, lam)
+        singular = solve_accelerations(
+            model, member_state, np.int64(0), t + h, q, v, np.bool_(False), workspace, a, lam
+        )
         work[FORCES] += 1
         finite = True
         for d in range(n):

@@ -174,13 +174,13 @@ def inerter_row(model, q, v, i, a_body, b_body, row, row_rate):
 
 
 @kernel
-def add_inerters(model, segment, strength, q, v, mass, f):
+def add_inerters(model, segment, member_state, q, v, mass, f):
     """Mass of the inerters, sum s b B^T B, and the part of their forces that accelerations do not change.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
     Out:
       mass (n_pair, 6, 6): the mass (kg, kg m, kg m^2), set.
@@ -198,7 +198,7 @@ def add_inerters(model, segment, strength, q, v, mass, f):
         lo = model.block[k, 1]
         for i in range(lo, lo + model.block[k, 5]):
             inerter_row(model, q, v, i, a_body, b_body, row, bias)
-            w = strength[0, i] * model.law[k, 0]
+            w = member_state[0, i] * model.law[k, 0]
             for r in range(6):
                 d = a_body + r if r < 3 else b_body + r - 3
                 f[d] -= w * row[r] * bias[0]
@@ -230,7 +230,7 @@ def inerter_force(model, k, i, q, v, a, row):
 
 
 @kernel
-def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
+def add_inerter_tangents(model, segment, member_state, q, v, a, k_out, c_out):
     """Slopes by coordinates and velocities of sum s b B^T d2Delta/dt2 at fixed a (the reverse of `inerter_row`).
 
     With g = dL''/du, h = dL''/du' = 2 (u' - L' e)/L: g = (u'' - e (e . u''))/L - 2 L' (u' - L' e)/L^2
@@ -239,7 +239,7 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
     Out:
       k_out, c_out (n_pair, 6, 6): stiffness and damping of the pairs, to which d/dq and d/dv are added.
@@ -283,7 +283,7 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
             hy = 2.0 * y * (dy - rate * ey)
             gx = y * (bx - along * ex) - rate * y * hx - excess * y * ex
             gy = y * (by - along * ey) - rate * y * hy - excess * y * ey
-            w = strength[0, i] * model.law[k, 0]
+            w = member_state[0, i] * model.law[k, 0]
             f = w * (along + excess)
             # columns: how u, u', u'' change with a coordinate, and with its velocity
             for col in range(6):
@@ -336,30 +336,30 @@ def add_inerter_tangents(model, segment, strength, q, v, a, k_out, c_out):
 
 
 @kernel
-def general_forces(model, strength, segment, t, q, v, tangent, desk):
+def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
     """All forces of members, bushings, loads and contacts at one state, without inerters; on demand with tangents.
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       segment, t: segment of `model.times`, and time in it (s).
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
-      tangent: whether desk.k, .c and .turn are asked for.
+      tangent: whether workspace.k, .c and .turn are asked for.
     In and out:
-      desk: the workspace. Set are f (N, N m), turned, and, of the pairs that carry more than joints, rel and sums.
+      workspace: the workspace. Set are f (N, N m), turned, and, of the pairs that carry more than joints, rel and sums.
     """
     pair = model.pair
-    rel = desk.rel
-    sums = desk.sums
-    f = desk.f
-    carries = desk.carries
-    turn_bodies(q, desk.turned)
+    rel = workspace.rel
+    sums = workspace.sums
+    f = workspace.f
+    carries = workspace.carries
+    turn_bodies(q, workspace.turned)
     for p in range(pair.shape[0]):
         if carries[p] != 0:
-            turned_pose(model, p, desk.turned, q, v, rel)
+            turned_pose(model, p, workspace.turned, q, v, rel)
             for i in range(SUMS if tangent else FIRST_TANGENT):
                 sums[p, i] = 0.0
-    general_sums(model, segment, t, strength, rel, tangent, sums)
+    general_sums(model, segment, t, member_state, rel, tangent, sums)
     add_bushings(model, rel, q, tangent, sums)
     f[:] = 0.0
     add_loads(model, segment, t, q, f)
@@ -367,15 +367,15 @@ def general_forces(model, strength, segment, t, q, v, tangent, desk):
         if carries[p] != 0:
             add_pair_force(pair, rel, p, sums[p, 0], sums[p, 1], sums[p, 2], f)
     if tangent:
-        damped = desk.switches[DAMPED] != 0
-        k = desk.k
-        c = desk.c
+        damped = workspace.switches[DAMPED] != 0
+        k = workspace.k
+        c = workspace.c
         for p in range(pair.shape[0]):
             if carries[p] != 0:
                 pair_tangent(p, rel, sums, damped, k, c)
-            elif desk.switches[APART] == 0:
+            elif workspace.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0
-        load_tangent(model, segment, t, q, desk.turn)
+        load_tangent(model, segment, t, q, workspace.turn)
     if model.contact_pair.shape[0] > 0:
-        add_contacts(model, strength, q, v, tangent, f, desk.k, desk.c)
+        add_contacts(model, member_state, q, v, tangent, f, workspace.k, workspace.c)

@@ -9,8 +9,8 @@ from mdstopo.general.members import block_design, rate_of_row, stretched
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
+from mdstopo.general.step_history import has_factors
 from mdstopo.general.switches import carriers
-from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.alike import elastic_designs
@@ -18,7 +18,7 @@ from mdstopo.mechanics.laws.table import SPRING, law
 
 
 @kernel
-def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):
+def add_design(model, segment, t, member_state, q, v, a, z, weight, out, work):
     """What all design members do to the gradient at one state: out -= f_i (b_i . T z) at unit strength, += weight V_i.
 
     Behind the members out has the derivatives by parameters (P,), here and everywhere (`parameters`).
@@ -26,7 +26,7 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):
     Constant:
       model: the compiled scene.
       segment, t: segment of `model.times`, and time in it (s).
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
       z (n,): virtual displacements.
       weight: of the stored energy.
@@ -45,18 +45,18 @@ def add_design(model, segment, t, strength, q, v, a, z, weight, out, work):
         stage[0, 1, d] = v[d]
         stage[0, 2, d] = a[d]
     turn_bodies(q, turned[0])
-    _add(model, segment, when, strength, stage, turned, z.reshape((1, n)), weight, out)
+    _add(model, segment, when, member_state, stage, turned, z.reshape((1, n)), weight, out)
 
 
 @kernel
-def add_designs(model, segment, track, o, strength, z, out, work):
+def add_designs(model, segment, history, o, member_state, z, out, work):
     """`add_design` at many stages, without energy: springs are read once for all.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
-      track, o: the history of steps, and the number of the first stage.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      history, o: the history of steps, and the number of the first stage.
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       z (S, n): virtual displacements of the S stages from o on.
     Out:
       out (M_padded + P,): the derivative by alpha^mu and by parameters, added to.
@@ -64,23 +64,23 @@ def add_designs(model, segment, track, o, strength, z, out, work):
     """
     end = o + z.shape[0]
     work[DESIGN] += z.shape[0]
-    if has_factors(track):
-        turned = track.turned[o:end]
+    if has_factors(history):
+        turned = history.turned[o:end]
     else:
         turned = np.empty((z.shape[0], model.mass.shape[0] // 3, 2))
         for j in range(z.shape[0]):
-            turn_bodies(track.stage[o + j, 0], turned[j])
-    _add(model, segment, track.when[o:end], strength, track.stage[o:end], turned, z, 0.0, out)
+            turn_bodies(history.stage[o + j, 0], turned[j])
+    _add(model, segment, history.when[o:end], member_state, history.stage[o:end], turned, z, 0.0, out)
 
 
 @kernel
-def _add(model, segment, when, strength, stage, turned, z, weight, out):
+def _add(model, segment, when, member_state, stage, turned, z, weight, out):
     """`add_design` at S states of one segment.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`. when (S,): times (s).
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       stage (S, 3, n): coordinates, velocities, accelerations. turned (S, n_body, 2): of `forces.turn_bodies`.
       z (S, n): virtual displacements.
       weight: of the stored energy.
@@ -112,14 +112,16 @@ def _add(model, segment, when, strength, stage, turned, z, weight, out):
             continue
         for j in range(count):
             if code != INERTER:
-                block_design(model, k, segment, when[j], strength, strength[1], rel[j, p], u[j, p], weight, out)
+                block_design(model, k, segment, when[j], member_state, member_state[1], rel[j, p], u[j, p], weight, out)
                 continue
             for i in range(lo, lo + model.block[k, 5]):
                 f = inerter_force(model, k, i, stage[j, 0], stage[j, 1], stage[j, 2], row)
                 out[i] -= f * rate_of_row(model, p, row, z[j])
     if model.varied.shape[0] > 0:
         for j in range(count):
-            add_parameters(model, segment, when[j], strength, stage[j, 0], stage[j, 1], stage[j, 2], z[j], weight, out)
+            add_parameters(
+                model, segment, when[j], member_state, stage[j, 0], stage[j, 1], stage[j, 2], z[j], weight, out
+            )
 
 
 @kernel
@@ -131,7 +133,7 @@ def _virtual(pair, rel, p, z, out):
 
 
 @kernel
-def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):
+def explicit_part(model, segment, j, who, t, member_state, q, v, a, scale, out):
     """What the design does to g_j at fixed motion, where g_j is the force f* of a member.
 
     f* has a sign; its absolute value is what is looked at (`force_sign`).
@@ -140,7 +142,7 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):
       model: the compiled scene.
       j, who: the response, and the number of the member in its group.
       segment, t: segment of `model.times`, and time in it (s).
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
       scale: factor of df*.
     Out:
@@ -148,13 +150,13 @@ def explicit_part(model, segment, j, who, t, strength, q, v, a, scale, out):
     """
     if model.response[j, 0] != MEMBER_FORCE:
         return
-    _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out)
+    _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out)
     if model.varied.shape[0] > 0:
-        add_force_parameters(model, segment, model.response[j, 5], who, t, strength, q, v, a, scale, out)
+        add_force_parameters(model, segment, model.response[j, 5], who, t, member_state, q, v, a, scale, out)
 
 
 @kernel
-def force_sign(model, segment, j, who, t, strength, q, v, a):
+def force_sign(model, segment, j, who, t, member_state, q, v, a):
     """The sign of f* where g_j is the force of a member; else 1.
 
     It is that of the very number that `response` takes the absolute value of: near zero another formula for the same
@@ -164,26 +166,26 @@ def force_sign(model, segment, j, who, t, strength, q, v, a):
       model: the compiled scene.
       j, who: the response, and the number of the member in its group.
       segment, t: segment of `model.times`, and time in it (s).
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
     """
     if model.response[j, 0] != MEMBER_FORCE:
         return 1.0
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
-    f, _ = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+    f, _ = member_force(model, member_state, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
     return 1.0 if f >= 0.0 else -1.0
 
 
 @kernel
-def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):
+def _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out):
     """The forces of all laws of a member at unit strength, each to its own place.
 
     Constant:
       model: the compiled scene.
       j, who: the response, which names the group, and the number of the member in it.
       segment, t: segment of `model.times`, and time in it (s).
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
       scale: factor of the forces.
     Out:
@@ -201,12 +203,12 @@ def _add_laws(model, segment, j, who, t, strength, q, v, a, scale, out):
         if model.block[k, 3] == INERTER:
             f = inerter_force(model, k, i, q, v, a, row)
         else:
-            f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], strength)
+            f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], member_state)
         out[i] += scale * f
 
 
 @kernel
-def _unit_force(model, k, i, segment, t, r, strength):
+def _unit_force(model, k, i, segment, t, r, member_state):
     """The force of a member at unit strength (N), in tension positive; no inerter.
 
     Constant:
@@ -214,7 +216,7 @@ def _unit_force(model, k, i, segment, t, r, strength):
       k, i: the block, and the member (padded).
       segment, t: segment of `model.times`, and time in it (s).
       r (POSE,): relative pose of its pair.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
     """
     c = r[2]
     s = r[3]
@@ -225,6 +227,6 @@ def _unit_force(model, k, i, segment, t, r, strength):
     length = np.sqrt(x * x + y * y)
     rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
     value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    stretch = stretched(model.member, i, r, length) - strength[2, i]
-    f, _, _, _, _ = law(model.block[k, 3], model.law[k], stretch, rate, int(strength[1, i]), t, value, model.curves)
+    stretch = stretched(model.member, i, r, length) - member_state[2, i]
+    f, _, _, _, _ = law(model.block[k, 3], model.law[k], stretch, rate, int(member_state[1, i]), t, value, model.curves)
     return f

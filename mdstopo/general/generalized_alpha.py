@@ -14,17 +14,17 @@ jumps, a method of second order loses nothing, and steps that stay as they are h
 import numpy as np
 
 from mdstopo.compiler.jit import entry
-from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.forces import drive_state
 from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
-from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
+from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_trial
 from mdstopo.general.members import meeting, scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_size, start_modes
-from mdstopo.general.track import carve_track, copy_vector, keep_state
+from mdstopo.general.step_history import carve_history, copy_vector, keep_state
 from mdstopo.integrators.generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
@@ -43,7 +43,7 @@ TAG = (0, 0)
 
 
 @entry
-def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):
+def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, member_state, work, where):
     """Integrate a design over `model.times` in fixed steps.
 
     Constant:
@@ -53,10 +53,10 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
       tangent: not read; tangents are always kept.
       settings: tolerance of the case, relative (it tells which touches count as doubtful); Newton tolerance, relative
         to the motion; the step (s), or, where negative, so many radians of the fastest vibration at the start.
-      limits: steps allowed, and the sizes of the arrays (`track.carve_track`).
+      limits: steps allowed, and the sizes of the arrays (`carve_history`).
     Out:
-      room, room_ints: the history of steps, as of `track.carve_track`.
-      strength (3, columns): state of the members; scales are set from alpha, modes and sets are those at the end.
+      room, room_ints: the history of steps, as of `carve_history`.
+      member_state (3, columns): state of the members; scales are set from alpha, modes and sets are those at the end.
       work (WORK,): counts of work, added to.
       where (3,): each -1 where there is none: the member or the unknown that is to blame for an early end; a member
         whose ends have met; one that grazes so that the motion has no derivative.
@@ -69,13 +69,13 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     n_row = model.size[0]
-    track = carve_track(model, limits, room, room_ints)
-    track.mass[0] = 0.0
-    scale_general(model.block, model.power, alpha, strength)
-    strength[1] = 0.0
-    strength[2] = 0.0
+    history = carve_history(model, limits, room, room_ints)
+    history.mass[0] = 0.0
+    scale_general(model.block, model.power, alpha, member_state)
+    member_state[1] = 0.0
+    member_state[2] = 0.0
     times = model.times
-    desk = make_desk(model)
+    workspace = make_workspace(model)
     no = np.bool_(False)
     size = scene_size(model)
     rounding = ROUNDING * size
@@ -105,13 +105,13 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     drive_state(model, np.int64(0), t, q, v)
     switching = has_switches(model, no)
     if switching:
-        singular = start_modes(model, strength, desk, q, v, a0, lam, no)
+        singular = start_modes(model, member_state, workspace, q, v, a0, lam, no)
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t
         if model.varied.shape[0] > 0:
-            where[2] = begins_divided(model, strength, q, v, graze)
-    singular = balance(model, strength, np.int64(0), t, q, v, np.bool_(True), desk, a0, lam)
+            where[2] = begins_divided(model, member_state, q, v, graze)
+    singular = solve_accelerations(model, member_state, np.int64(0), t, q, v, np.bool_(True), workspace, a0, lam)
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
@@ -121,34 +121,34 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     noise = extent[1]
     stiffness = np.empty(n_pair)
     for p in range(n_pair):
-        stiffness[p] = desk.sums[p, 7] + desk.sums[p, 11]
-        if desk.sums[p, 3] > 0.0 and stiffness[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / stiffness[p])
-    rounding_at_start(model, strength, rel0, v, stiffness, motion, noise)
+        stiffness[p] = workspace.sums[p, 7] + workspace.sums[p, 11]
+        if workspace.sums[p, 3] > 0.0 and stiffness[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * workspace.sums[p, 3] / stiffness[p])
+    rounding_at_start(model, member_state, rel0, v, stiffness, motion, noise)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
     if not step > 0.0:
-        rate = rate_of(model, desk)
+        rate = rate_of(model, workspace)
         step = min(-step / rate, span / FEWEST) if rate > 0.0 else span / FEWEST
     events = np.int64(0)
     if switching:
-        for i in range(strength.shape[1] - 1):
-            if strength[1, i] != 0.0:
-                if events >= track.event.shape[0]:
+        for i in range(member_state.shape[1] - 1):
+            if member_state[1, i] != 0.0:
+                if events >= history.event.shape[0]:
                     return NEEDS_ROOM, 0, 0, t
-                track.event[events, 0] = 0
-                track.event[events, 1] = i
-                track.event[events, 2] = 0
-                track.event[events, 3] = int(strength[1, i])
-                track.event[events, 4] = 0
-                track.kept[events, 0] = 0.0
-                track.kept[events, 1] = strength[2, i]
-                track.kept[events, 2] = 0.0
-                track.salt[events] = 0.0
+                history.event[events, 0] = 0
+                history.event[events, 1] = i
+                history.event[events, 2] = 0
+                history.event[events, 3] = int(member_state[1, i])
+                history.event[events, 4] = 0
+                history.kept[events, 0] = 0.0
+                history.kept[events, 1] = member_state[2, i]
+                history.kept[events, 2] = 0.0
+                history.saltation[events] = 0.0
                 events += 1
-        strength[1, strength.shape[1] - 1] = events
-    keep_state(track, 0, t, q, v, push[0], push[1])
-    track.index[0, 0] = 0
+        member_state[1, member_state.shape[1] - 1] = events
+    keep_state(history, 0, t, q, v, push[0], push[1])
+    history.index[0, 0] = 0
     count = np.int64(0)
     stages = np.int64(0)
     crowd_time = t
@@ -157,19 +157,19 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         end = times[segment + 1]
         if segment > 0:
             drive_state(model, segment, t, q, v)
-            keep_state(track, count, t, q, v, track.push[count, 0], track.push[count, 1])
+            keep_state(history, count, t, q, v, history.push[count, 0], history.push[count, 1])
             if switching:
-                balance(model, strength, segment, t, q, v, no, desk, a0, lam)
+                solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
                 first = events
                 events = log_switches(
-                    model, strength, segment, t, q, v, desk, a0, lam, track, count, events, -1.0, rounding,
+                    model, member_state, segment, t, q, v, workspace, a0, lam, history, count, events, -1.0, rounding,
                     work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
-                    track.salt[e] = 0.0
-                    track.kept[e, 2] = 0.0
+                    history.saltation[e] = 0.0
+                    history.kept[e, 2] = 0.0
         begin = t
         pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
         done = 0.0
@@ -178,15 +178,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             h = (end - begin) / pieces
             if not count + pieces - done <= limits[0]:
                 return STEP_LIMIT, count, events, t
-            if count + 3 > track.t.shape[0] or stages + 3 > track.when.shape[0]:
+            if count + 3 > history.t.shape[0] or stages + 3 > history.when.shape[0]:
                 return NEEDS_ROOM, count, events, t
             if not h > 1e-15 * max(abs(begin), abs(end)):
                 return STEP_TOO_SMALL, count, events, t
             lands = done + 1.0 >= pieces
             starting = np.bool_(known == 0)
             code, used, singular = advance(
-                model, tables[0], strength, segment, t, h, starting, state, guess, newton_tolerance, size, stages, desk,
-                track, ends, push, extent, rel0, work,
+                model, tables[0], member_state, segment, t, h, starting, state, guess, newton_tolerance, size, stages,
+                workspace, history, ends, push, extent, rel0, work,
             )  # fmt: skip
             if code != OK:
                 where[0] = singular
@@ -195,7 +195,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             happens = False
             who = nowhere
             if switching:
-                margin, who = smallest_margin(model, segment, strength, rel)
+                margin, who = smallest_margin(model, segment, member_state, rel)
                 low = 0.0
                 high = h
                 top = 0
@@ -207,7 +207,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(model.pair, model.home, left[0], left[1], before)
                     relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     dip, near = first_sign(
-                        model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
+                        model, segment, member_state, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
                         cut[top] - low, rounding,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
@@ -223,50 +223,50 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     cut[top] = middle
                     copy_state(state, kept)
                     code, _, singular = advance(
-                        model, tables[0], strength, segment, t, middle, starting, kept, guess, newton_tolerance,
-                        size, nowhere, desk, track, beyond[top], push, extent, rel0, work,
+                        model, tables[0], member_state, segment, t, middle, starting, kept, guess, newton_tolerance,
+                        size, nowhere, workspace, history, beyond[top], push, extent, rel0, work,
                     )  # fmt: skip
                     if code != OK:
                         where[0] = singular
                         return code, count, events, t
                     relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
-                    value, near_who = smallest_margin(model, segment, strength, rel)
+                    value, near_who = smallest_margin(model, segment, member_state, rel)
                     if value < -rounding:
                         high = middle
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, strength, rel, near_who):
+                    if value < graze and matters(model, member_state, rel, near_who):
                         where[2] = near_who
                 relative_pose(model.pair, model.home, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
-                    at_low, _ = smallest_margin(model, segment, strength, before)
+                    at_low, _ = smallest_margin(model, segment, member_state, before)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
                     for look in range(LOOKS):
-                        middle = next_look(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
+                        middle = next_trial(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
                         if middle < 0.0:
                             break
                         copy_state(state, kept)
                         code, _, singular = advance(
-                            model, tables[0], strength, segment, t, middle, starting, kept, guess, newton_tolerance,
-                            size, nowhere, desk, track, trial, push, extent, rel0, work,
+                            model, tables[0], member_state, segment, t, middle, starting, kept, guess, newton_tolerance,
+                            size, nowhere, workspace, history, trial, push, extent, rel0, work,
                         )  # fmt: skip
                         if code != OK:
                             where[0] = singular
                             return code, count, events, t
                         relative_pose(model.pair, model.home, trial[0], trial[1], rel)
-                        value, who = smallest_margin(model, segment, strength, rel)
+                        value, who = smallest_margin(model, segment, member_state, rel)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
                         )
                     h = high
                     lands = lands and t + h >= end
                     code, used, singular = advance(
-                        model, tables[0], strength, segment, t, h, starting, state, guess, newton_tolerance, size,
-                        stages, desk, track, ends, push, extent, rel0, work,
+                        model, tables[0], member_state, segment, t, h, starting, state, guess, newton_tolerance, size,
+                        stages, workspace, history, ends, push, extent, rel0, work,
                     )  # fmt: skip
                 relative_pose(model.pair, model.home, ends[0], ends[1], rel)
             finite = True
@@ -278,7 +278,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 motion[p] = max(motion[p], deflection(rel, rel0, model.reach, p))
             if where[1] < 0:
                 relative_pose(model.pair, model.home, q, v, before)
-                where[1] = meeting(model, segment, t, strength, before, rel)
+                where[1] = meeting(model, segment, t, member_state, before, rel)
             done += 1.0
             known += 1
             t = end if lands else (t + h if happens else begin + h * done)
@@ -294,18 +294,18 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     guess[1, d] = ends[3, d] - 2.0 * slope
                     guess[2, d] = ends[3, d] - 3.0 * slope
             copy_state(ends, state)
-            track.index[count, 1] = count - 1
-            track.index[count, 2] = segment
-            track.index[count, 3] = events
+            history.index[count, 1] = count - 1
+            history.index[count, 2] = segment
+            history.index[count, 3] = events
             stages += used
             count += 1
-            track.index[count, 0] = stages
-            keep_state(track, count, t, q, v, push[0], push[1])
+            history.index[count, 0] = stages
+            keep_state(history, count, t, q, v, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
-                balance(model, strength, segment, t, q, v, no, desk, a0, lam)
+                solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
                 events = log_switches(
-                    model, strength, segment, t, q, v, desk, a0, lam, track, count, events, graze, rounding,
+                    model, member_state, segment, t, q, v, workspace, a0, lam, history, count, events, graze, rounding,
                     work, where,
                 )  # fmt: skip
                 if events < 0:
@@ -320,6 +320,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 done = 0.0
                 known = 0
                 pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
-            track.index[count, 3] = events
-    track.index[count + 1, 0] = stages  # no step follows (`weights_of`)
+            history.index[count, 3] = events
+    history.index[count + 1, 0] = stages  # no step follows (`weights_of`)
     return OK, count, events, t

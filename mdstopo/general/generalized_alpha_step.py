@@ -3,11 +3,11 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import balance, factor_matrix, solve_unknowns
+from mdstopo.general.accelerations import factor_matrix, solve_accelerations, solve_unknowns
 from mdstopo.general.forces import drive_state, turned_pose
 from mdstopo.general.projection import project
-from mdstopo.general.track import copy_vector, keep_stage
-from mdstopo.integrators.gauss_balance import CLOSELY, fastest_rate
+from mdstopo.general.step_history import copy_vector, keep_stage
+from mdstopo.integrators.gauss_equations import CLOSELY, fastest_rate
 from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import (
     FORCES,
@@ -24,8 +24,8 @@ from mdstopo.integrators.steps import (
 
 
 @kernel
-def rate_of(model, desk):
-    """Angular frequency of the fastest vibration at the balanced state on the desk, rad/s (an estimate)."""
+def rate_of(model, workspace):
+    """Angular frequency of the fastest vibration at the balanced state in the workspace, rad/s (an estimate)."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     inverse = np.zeros(n)
@@ -35,8 +35,8 @@ def rate_of(model, desk):
     return fastest_rate(
         model.pair,
         inverse,
-        desk.k.reshape((1, n_pair, 6, 6)),
-        desk.c.reshape((1, n_pair, 6, 6)),
+        workspace.k.reshape((1, n_pair, 6, 6)),
+        workspace.c.reshape((1, n_pair, 6, 6)),
         np.bool_(True),
         CLOSELY,
     )
@@ -46,7 +46,7 @@ def rate_of(model, desk):
 def advance(
     model,
     radius,
-    strength,
+    member_state,
     segment,
     t,
     h,
@@ -56,8 +56,8 @@ def advance(
     newton_tolerance,
     size,
     o,
-    desk,
-    track,
+    workspace,
+    history,
     ends,
     push,
     extent,
@@ -69,7 +69,7 @@ def advance(
     Constant:
       model: the compiled scene.
       radius: the spectral radius.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       segment, t, h: segment of `model.times`, time at the start (s), length of the step (s).
       starting: whether a and x are to be made here.
       guess (3, n): x of the three steps before, for the first iterate.
@@ -81,10 +81,10 @@ def advance(
     In and out:
       state (4, n): q, v, a, x at the start of the step; the last two are set where `starting`.
     Out:
-      track: the history of steps, to which the stages are written.
+      history: the history of steps, to which the stages are written.
       ends (4, n): the same at the end; q, v on the joints.
       push (2, n_row): the multipliers that put them there (`projection`).
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
     Returns a code (`integrators.steps`), the number of stages, and the place of a singular unknown, or -1.
@@ -109,27 +109,27 @@ def advance(
     if starting:
         copy_vector(state[0], q)
         copy_vector(state[1], v)
-        singular = balance(model, strength, segment, t, q, v, yes, desk, a, lam)
+        singular = solve_accelerations(model, member_state, segment, t, q, v, yes, workspace, a, lam)
         work[FORCES] += 1
         work[TANGENTS] += 1
         if singular >= 0:
             return SINGULAR, stages, singular
         if o >= 0:
-            keep_stage(track, o, t, q, v, a, lam, desk, yes)
+            keep_stage(history, o, t, q, v, a, lam, workspace, yes)
         stages = 1
         copy_vector(a, x)
-        if lag > 0.0 and h * rate_of(model, desk) < RESOLVED:
+        if lag > 0.0 and h * rate_of(model, workspace) < RESOLVED:
             ahead = lag * h
             for d in range(n):
                 q[d] = state[0, d] + ahead * (state[1, d] + 0.5 * ahead * a[d])
                 v[d] = state[1, d] + ahead * a[d]
-            singular = balance(model, strength, segment, t + ahead, q, v, yes, desk, balanced, lam)
+            singular = solve_accelerations(model, member_state, segment, t + ahead, q, v, yes, workspace, balanced, lam)
             work[FORCES] += 1
             work[TANGENTS] += 1
             if singular >= 0:
                 return SINGULAR, stages, singular
             if o >= 0:
-                keep_stage(track, o + 1, t + ahead, q, v, balanced, lam, desk, yes)
+                keep_stage(history, o + 1, t + ahead, q, v, balanced, lam, workspace, yes)
             stages = 2
             for d in range(n):
                 x[d] = 2.0 * a[d] - balanced[d]
@@ -145,7 +145,7 @@ def advance(
                 q[d] = state[0, d] + h * (state[1, d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
                 v[d] = state[1, d] + h * ((1.0 - gamma) * x[d] + gamma * x_now[d])
             previous = np.inf
-        singular = balance(model, strength, segment, t + h, q, v, yes, desk, balanced, lam)
+        singular = solve_accelerations(model, member_state, segment, t + h, q, v, yes, workspace, balanced, lam)
         work[FORCES] += 1
         work[TANGENTS] += 1
         work[NEWTON] += 1
@@ -161,23 +161,31 @@ def advance(
             for i in range(6):
                 total = 0.0
                 for j in range(6):
-                    total += desk.mass[p, i, j] * balanced[3 * model.pair[p, j // 3] + j % 3]
+                    total += workspace.mass[p, i, j] * balanced[3 * model.pair[p, j // 3] + j % 3]
                 delta[3 * model.pair[p, i // 3] + i % 3] += total
         for j in range(model.joint.shape[0]):
             for r in range(3):
                 if model.row[j, r] >= 0:
                     for i in range(6):
                         column = 3 * model.joint[j, 1 + i // 3] + i % 3
-                        row[model.row[j, r]] += desk.jac[j, r, i] * balanced[column]
+                        row[model.row[j, r]] += workspace.jac[j, r, i] * balanced[column]
         factor_matrix(
-            model, desk, desk.k, desk.c, desk.turn, desk.mass, h * h * beta * e1, h * gamma * e1, np.bool_(False)
+            model,
+            workspace,
+            workspace.k,
+            workspace.c,
+            workspace.turn,
+            workspace.mass,
+            h * h * beta * e1,
+            h * gamma * e1,
+            np.bool_(False),
         )
-        solve_unknowns(model, desk, delta, row)
+        solve_unknowns(model, workspace, delta, row)
         rounding = 1e-8
         for p in range(model.pair.shape[0]):
-            turned_pose(model, p, desk.turned, q, v, desk.rel)
-            reached = max(extent[0, p], deflection(desk.rel, rel0, model.reach, p))
-            lost = noise_of(model.pair, extent[1], desk.rel, model.reach, q, p)
+            turned_pose(model, p, workspace.turned, q, v, workspace.rel)
+            reached = max(extent[0, p], deflection(workspace.rel, rel0, model.reach, p))
+            lost = noise_of(model.pair, extent[1], workspace.rel, model.reach, q, p)
             scale[p] = max(reached, 1e3 * lost)
             rounding = max(rounding, 100.0 * lost / scale[p])
         motion_weights(model.pair, rel0, model.reach, scale, weight)
@@ -202,12 +210,12 @@ def advance(
         # the multipliers that belong to the corrected accelerations
         for r in range(n_row):
             lam[r] += row[r]
-        keep_stage(track, o + stages, t + h, q, v, now, lam, desk, yes)
+        keep_stage(history, o + stages, t + h, q, v, now, lam, workspace, yes)
     copy_vector(q, ends[0])
     copy_vector(v, ends[1])
     copy_vector(now, ends[2])
     copy_vector(x_now, ends[3])
-    singular = project(model, size, ends[0], ends[1], desk, push[0], push[1])
+    singular = project(model, size, ends[0], ends[1], workspace, push[0], push[1])
     return (SINGULAR if singular >= 0 else OK), stages + 1, singular
 
 

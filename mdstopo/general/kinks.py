@@ -2,7 +2,7 @@
 
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
 first looked at, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
-derivatives bend more sharply than values; for values see `landings`). The
+derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The
 integrand is continuous there, so that its derivatives need no term of their own.
 """
 
@@ -19,7 +19,7 @@ from mdstopo.scene.model import FloatArray
 if TYPE_CHECKING:
     from mdstopo.general.driver import GeneralDriver
 
-See = Callable[[FloatArray, bool], FloatArray]
+EvaluateAt = Callable[[FloatArray, bool], FloatArray]
 
 
 def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
@@ -31,18 +31,18 @@ def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
         return []
     found = list(pieces.changes)
     rate = float(np.abs(samples.rate).max())
-    for row in peaks(samples, pieces.see, -1.0, 1e9):
+    for row in peaks(samples, pieces.evaluate_at, -1.0, 1e9):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
         if low > LOW * highest or not t[0] < row[0] < t[-1]:
             continue
-        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.see)
+        w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
         time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
         found.append(time)
         found += _around(time, low, rate, float(t[0]), float(t[-1]))
     return found
 
 
-def _sharpened(w: int, c: float, see: See) -> float:
+def _sharpened(w: int, c: float, evaluate_at: EvaluateAt) -> float:
     """Where in step w a value comes down to zero and goes up again: rates near a kink are smeared, values are not.
 
     On both sides the value is a line through zero, so that two values tell where.
@@ -50,7 +50,7 @@ def _sharpened(w: int, c: float, see: See) -> float:
     for d in (3e-3, 1e-4, 3e-6, 1e-7):
         if c <= d or c >= 1.0 - d:
             break
-        left, right = see(np.array([[w, c - d], [w, c + d]]), True)[:, 0].tolist()
+        left, right = evaluate_at(np.array([[w, c - d], [w, c + d]]), True)[:, 0].tolist()
         if left + right > 0.0:
             c += d * (left - right) / (left + right)
     return min(max(c, 0.0), 1.0)

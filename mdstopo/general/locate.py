@@ -20,7 +20,7 @@ NEAR, AIM = 50.0, 5.0
 
 
 @kernel
-def next_look(low, high, at_low, at_high, rounding, resolution, look):
+def next_trial(low, high, at_low, at_high, rounding, resolution, look):
     """Where within a step to look next for the moment at which a margin vanishes; -1 where `high` is near enough.
 
     It is the secant through both ends, aimed behind the switch by more than rounding; after many looks every other one
@@ -71,16 +71,16 @@ def cut_at(dip, near, low, high):
 
 
 @kernel
-def matters(model, strength, rel, i):
+def matters(model, member_state, rel, i):
     """Whether derivatives depend on it that member or contact i only just does not leave its mode.
 
     rel (n_pair, POSE): relative poses at that moment. Members with a permanent set are left out: where no energy is
     lost they come back to the very place at which the set was made, which is no touch to warn of.
     """
     if i >= model.member.shape[1]:
-        return contact_grazes(model.contact[i - model.member.shape[1]], int(strength[1, i])) == 2
-    if i < 0 or strength[0, i] == 0.0 or strength[2, i] != 0.0:
+        return contact_grazes(model.contact[i - model.member.shape[1]], int(member_state[1, i])) == 2
+    if i < 0 or member_state[0, i] == 0.0 or member_state[2, i] != 0.0:
         return False
     k = block_of(model, i)
     x, _ = stretch_of(model.member, i, rel[model.block[k, 0]])
-    return law_grazes(model.block[k, 3], model.law[k], x, int(strength[1, i])) == 2
+    return law_grazes(model.block[k, 3], model.law[k], x, int(member_state[1, i])) == 2

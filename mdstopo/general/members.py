@@ -6,8 +6,8 @@ Geometry as in `mechanics.laws.spring`: with r = d + R q - p, L = |r|, e = r/L,
 
 and a law f(Delta, dDelta/dt, t) with its partials gives Q = -sum s f b, K = sum s (b (f_D b + f_Dd B2 xi')^T + f B2),
 C = sum s f_Dd b b^T, E = sum s V, E_xi = sum s V' b, where s = alpha^mu. A law that switches is taken in the mode that
-the member is in (`strength` row 1); the integrators keep modes fixed within a step and land on their ends (`events`).
-Blocks of springs, which neither switch nor remember, take the vectors of `mechanics.laws.alike` instead.
+the member is in (`member_state` row 1); the integrators keep modes fixed within a step and land on their ends
+(`events`). Blocks of springs, which neither switch nor remember, take the vectors of `mechanics.laws.alike` instead.
 """
 
 import math
@@ -23,8 +23,8 @@ from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, el
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import SPRING, law, law_first_set, law_has_pieces, law_remembers, law_start
 
-#: rows of `strength` (3, M_padded + n_contact + 1): alpha^mu, the mode of a law that switches or of a contact, the
-#: permanent set of a law that remembers. The last column has the number of events that the modes include (`track`)
+#: rows of `member_state` (3, M_padded + n_contact + 1): alpha^mu, the mode of a law that switches or of a contact, the
+#: permanent set of a law that remembers. The last column has the number of events that the modes include (`history`)
 SCALE, MODE, SET = range(3)
 
 #: members of a group up to which steps end at the knots of their curves: a hundred would pass so many that steps
@@ -33,14 +33,14 @@ KNOTTED = 12
 
 
 @kernel
-def scale_general(block, power, alpha, strength):
-    """strength row SCALE = alpha^mu (Eq. 12); 1 for members that are no design variables."""
+def scale_general(block, power, alpha, member_state):
+    """member_state row SCALE = alpha^mu (Eq. 12); 1 for members that are no design variables."""
     for k in range(block.shape[0]):
         first = block[k, 4]
         mu = power[k]
         for i in range(block[k, 5]):
             a = alpha[first + i] if first >= 0 else 1.0
-            strength[0, block[k, 1] + i] = a if mu == 1.0 else a**mu
+            member_state[0, block[k, 1] + i] = a if mu == 1.0 else a**mu
 
 
 @inline
@@ -92,7 +92,7 @@ def rate_of_row(model, p, row, v):
 
 
 @kernel
-def add_block(model, k, segment, t, strength, r, tangent, o):
+def add_block(model, k, segment, t, member_state, r, tangent, o):
     """Add the forces, energy and tangents of the members of a block to the sums of its pair.
 
     Springs are summed by `add_springs`.
@@ -103,7 +103,7 @@ def add_block(model, k, segment, t, strength, r, tangent, o):
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       r (POSE,): relative pose of the pair.
       tangent: whether K and C are wanted.
     Out:
@@ -125,9 +125,9 @@ def add_block(model, k, segment, t, strength, r, tangent, o):
         if length == 0.0:  # not y == 0.0: that is so infinitely far away, too
             continue
         rate = bx * vx + by * vy + bt * vt
-        scale = strength[0, i]
-        x = stretched(member, i, r, length) - strength[2, i]
-        f, fd, fr, energy, pull = law(code, p, x, rate, int(strength[1, i]), t, value, curves)
+        scale = member_state[0, i]
+        x = stretched(member, i, r, length) - member_state[2, i]
+        f, fd, fr, energy, pull = law(code, p, x, rate, int(member_state[1, i]), t, value, curves)
         f *= scale
         o[0] -= f * bx
         o[1] -= f * by
@@ -169,14 +169,14 @@ def add_block(model, k, segment, t, strength, r, tangent, o):
 
 
 @part
-def add_springs(model, k, strength, r, tangent, o):
+def add_springs(model, k, member_state, r, tangent, o):
     """Add the forces, energy and tangents of a block of springs to the sums of its pair.
 
     Constant:
       model: the compiled scene.
       k: the block.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       r (POSE,): relative pose of the pair.
       tangent: whether K and C are wanted.
     Out:
@@ -189,7 +189,7 @@ def add_springs(model, k, strength, r, tangent, o):
     counted = model.block[k, 4] >= 0
     width = member.shape[1]
     rows = member.reshape(member.size)
-    scale = strength.reshape(strength.size)
+    scale = member_state.reshape(member_state.size)
     c = p[0]
     if p[1] != 0.0 or p[2] != 0.0:
         alike_sums(rows, width, scale, start, stop, p, r, counted, o)
@@ -207,7 +207,7 @@ def add_springs(model, k, strength, r, tangent, o):
 
 
 @kernel
-def general_sums(model, segment, t, strength, rel, tangent, sums):
+def general_sums(model, segment, t, member_state, rel, tangent, sums):
     """Add the forces, energy and tangents of all members that act, but inerters, to the sums of their pairs.
 
     Constant:
@@ -215,7 +215,7 @@ def general_sums(model, segment, t, strength, rel, tangent, sums):
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       rel (n_pair, POSE): relative poses.
       tangent: whether K and C are wanted.
     Out:
@@ -225,14 +225,15 @@ def general_sums(model, segment, t, strength, rel, tangent, sums):
         if model.active[segment, k] != 0 and model.block[k, 3] != INERTER:
             p = model.block[k, 0]
             if model.block[k, 3] == SPRING:
-                add_springs(model, k, strength, rel[p], tangent, sums[p])
+                add_springs(model, k, member_state, rel[p], tangent, sums[p])
             else:
-                add_block(model, k, segment, t, strength, rel[p], tangent, sums[p])
+                add_block(model, k, segment, t, member_state, rel[p], tangent, sums[p])
 
 
 @kernel
-def set_modes(model, strength, rel, rel_rate, knots):
-    """Set rows MODE and SET of strength, modes and permanent sets of members and contacts, as they are at the start.
+def set_modes(model, member_state, rel, rel_rate, knots):
+    """Set rows MODE and SET of member_state, modes and permanent sets of members and contacts, as they are at the
+    start.
 
     rel (n_pair, POSE): relative poses; rel_rate (n_pair, 3): their second derivatives in time.
     knots: whether each piece of a curve is a mode, so that steps end at its knots; otherwise, and in groups of more
@@ -251,16 +252,16 @@ def set_modes(model, strength, rel, rel_rate, knots):
             second = second_rate(model.member, i, r, acc)
             x = stretched(model.member, i, r, length)
             whole = law_has_pieces(code) and (not knots or model.block[k, 5] > KNOTTED)
-            strength[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
-            strength[2, i] = law_first_set(code, model.law[k], x, int(strength[1, i]))
+            member_state[1, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
+            member_state[2, i] = law_first_set(code, model.law[k], x, int(member_state[1, i]))
             if law_remembers(code) and model.active[0, k] == 0:  # it has not acted yet
-                strength[1, i] = 0.0
-                strength[2, i] = 0.0
+                member_state[1, i] = 0.0
+                member_state[2, i] = 0.0
     for j in range(model.contact_pair.shape[0]):
         p = model.contact_pair[j]
         along, height, _, rise = contact_pose(model.contact[j], rel[p])
         second = second_rise(model.contact[j], rel[p], rel_rate[p])
-        strength[1, model.member.shape[1] + j] = contact_start(model.contact[j], along, height, rise, second)
+        member_state[1, model.member.shape[1] + j] = contact_start(model.contact[j], along, height, rise, second)
 
 
 @inline
@@ -287,7 +288,7 @@ def second_rate(member, i, r, acc):
 
 
 @kernel
-def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):
+def block_design(model, k, segment, t, member_state, modes_of, r, u, weight, out):
     """Add what the members of a block contribute to a derivative by alpha^mu at one state: f_i (b_i . u) + weight V_i.
 
     f_i and V_i are a member's force (N) and energy (J) at unit strength; not of inerters.
@@ -298,7 +299,7 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       modes_of (M_padded or more,): mode of every member.
       r (POSE,): relative pose of the pair.
       u (3,): virtual change of that pose (m, m, rad).
@@ -323,7 +324,7 @@ def block_design(model, k, segment, t, strength, modes_of, r, u, weight, out):
         if length == 0.0:
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
-        x = stretched(member, i, r, length) - strength[2, i]
+        x = stretched(member, i, r, length) - member_state[2, i]
         f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, curves)
         out[i] += f * (bx * u[0] + by * u[1] + bt * u[2]) + weight * energy
 
@@ -352,7 +353,7 @@ def unscale_general(block, power, alpha, padded, out):
 
 
 @kernel
-def meeting(model, segment, t, strength, before, after):
+def meeting(model, segment, t, member_state, before, after):
     """A member whose ends meet between two relative poses while it would carry a force, or -1.
 
     There its direction is not defined, so the motion has no derivative.
@@ -362,7 +363,7 @@ def meeting(model, segment, t, strength, before, after):
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       before, after (n_pair, POSE): the poses; between them ends move on straight lines.
 
     Returns the number of the member (padded).
@@ -389,9 +390,9 @@ def meeting(model, segment, t, strength, before, after):
             if not met and x * x + y * y > ZERO_LENGTH_SQUARED:
                 continue
             f, _, _, _, _ = law(
-                model.block[k, 3], model.law[k], -m[4, i] - strength[2, i], 0.0, int(strength[1, i]), t, value,
+                model.block[k, 3], model.law[k], -m[4, i] - member_state[2, i], 0.0, int(member_state[1, i]), t, value,
                 model.curves,
             )  # fmt: skip
-            if f * strength[0, i] != 0.0:
+            if f * member_state[0, i] != 0.0:
                 return i
     return -1

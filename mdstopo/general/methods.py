@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
-from mdstopo.general.landings import INTEGRALS, reduced
-from mdstopo.integrators.driver import Looked
+from mdstopo.general.quadrature_breakpoints import INTEGRALS, reduced
+from mdstopo.integrators.driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray
 from mdstopo.sensitivity.constant_load import DROPPED
@@ -21,7 +21,7 @@ SWEEPS = 200
 
 
 def differentiate(
-    driver: "GeneralDriver", method: str, alpha: FloatArray, looked: Looked, across: FloatArray | None = None
+    driver: "GeneralDriver", method: str, alpha: FloatArray, looked: ResponseResult, across: FloatArray | None = None
 ) -> tuple[FloatArray, str]:
     """Gradients (n_resp, R, N) by alpha (N,) of the rows that `evaluate` found, by direct, iterative or
     constant_load; and what the user should know although it worked.
@@ -31,7 +31,7 @@ def differentiate(
     gradients, message = np.zeros_like(looked.gradients), ""
     rows = looked.rows.copy()
     before = driver.work.copy()
-    _, count, _ = driver.run(alpha, True, driver.landings)
+    _, count, _ = driver.run(alpha, True, driver.quadrature_breakpoints)
     driver.work += before
     for j, reduction in enumerate(driver.scene.reductions):
         for r in range(int(looked.found[j])):
@@ -48,7 +48,7 @@ def differentiate(
                     own = np.zeros(gradients.shape[2])
                     stopped = driver.entry.push(
                         *driver.steps_arguments(count), j, integral, sweeps, part, aside, driver.room, driver.room_ints,
-                        driver.strength, driver.padded, own, driver.start_slopes(), driver.work,
+                        driver.member_state, driver.padded, own, driver.start_slopes(), driver.work,
                     )  # fmt: skip
                     if stopped >= 0:
                         message = FALLBACK.format(float(driver.states()[0][stopped]))
@@ -74,7 +74,7 @@ def _held(driver: "GeneralDriver", j: int, row: FloatArray, reduction: str, coun
     values = np.zeros(count + 1)
     for k in range(count + 1):
         place = np.array([[min(k, count - 1), float(k == count)]])
-        seen = driver.visit(j, place, True, count)[2][0]
+        seen = driver.sample_response(j, place, True, count)[2][0]
         weight = 0.5 * (t[min(k + 1, count)] - t[max(k - 1, 0)])
         at = row_of(t[k], seen[0], place[0, 0], place[0, 1], seen[1], 1.0, seen[2])
         factor = 2.0 * seen[0] if reduction == "rms" else 1.0
@@ -93,7 +93,7 @@ def _held_at(driver: "GeneralDriver", j: int, row: FloatArray, count: int) -> Fl
     n, size = len(model.mass), len(model.mass) + int(model.size[0])
     matrix, right, out = np.zeros((size, size)), np.zeros(size), np.zeros(len(driver._alpha))
     arguments = (
-        *driver.steps_arguments(count), j, row.copy(), driver.room, driver.room_ints, driver.strength,
+        *driver.steps_arguments(count), j, row.copy(), driver.room, driver.room_ints, driver.member_state,
     )  # fmt: skip
     hold(*arguments, np.zeros(0), matrix, right, driver.padded, out, driver.work)
     moving = np.concatenate([np.flatnonzero(model.free), np.arange(n, size)])
@@ -110,10 +110,10 @@ def histories(driver: "GeneralDriver", alpha: FloatArray, j: int) -> tuple[Statu
         return status_of(code), np.zeros(0), np.zeros((0, len(alpha)))
     places = np.stack([np.maximum(np.arange(count + 1.0) - 1.0, 0.0), np.ones(count + 1)], axis=1)
     places[0, 1] = 0.0
-    who = driver.visit(j, places, True, count)[2][:, 2].copy()
+    who = driver.sample_response(j, places, True, count)[2][:, 2].copy()
     lines = np.zeros((count + 1, len(alpha)))
     driver.entry.follow(
-        *driver.steps_arguments(count), j, who, driver.room, driver.room_ints, driver.strength, driver.padded, lines,
-        driver.start_slopes(), driver.work,
+        *driver.steps_arguments(count), j, who, driver.room, driver.room_ints, driver.member_state, driver.padded,
+        lines, driver.start_slopes(), driver.work,
     )  # fmt: skip
     return Status.OK, driver.states()[0][: count + 1].copy(), lines

@@ -49,7 +49,7 @@ LANDED = 1e-6
 class Pieces:
     """The steps of a motion, those in which the largest force changes hands cut there: on each, response j is smooth.
 
-    t (P + 1,): their times. With `see` they are looked at as steps are.
+    t (P + 1,): their times. With `evaluate_at` they are looked at as steps are.
     """
 
     def __init__(self, driver: "GeneralDriver", j: int, t: FloatArray) -> None:
@@ -66,16 +66,16 @@ class Pieces:
     @cached_property
     def samples(self) -> Samples:
         """Looks at all pieces."""
-        return sample(self.t, self.see)
+        return sample(self.t, self.evaluate_at)
 
-    def see(self, places: FloatArray, exact: bool) -> FloatArray:
+    def evaluate_at(self, places: FloatArray, exact: bool) -> FloatArray:
         """(K, 3) value, rate, member at places (K, 2): pieces and fractions of them."""
         k = places[:, 0].astype(np.int64)
         real = np.column_stack([self._step[k], self.fraction(k, places[:, 1])])
         out = np.empty((len(k), 3))
         for member in np.unique(self._member[k]).tolist():
             own = self._member[k] == member
-            out[own] = self._driver.visit(self._j, real[own], exact, self._count, who=member)[2]
+            out[own] = self._driver.sample_response(self._j, real[own], exact, self._count, who=member)[2]
         return out
 
     def fraction(self, k: IndexArray, c: FloatArray) -> FloatArray:
@@ -86,7 +86,7 @@ class Pieces:
     def value(self, k: int, fractions: FloatArray) -> FloatArray:
         """Values at fractions of the step that piece k is in, of the member that leads there."""
         real = np.column_stack([np.full(len(fractions), float(self._step[k])), fractions])
-        seen = self._driver.visit(self._j, real, True, self._count, who=int(self._member[k]), rates=False)[2]
+        seen = self._driver.sample_response(self._j, real, True, self._count, who=int(self._member[k]), rates=False)[2]
         value: FloatArray = seen[:, 0]
         return value
 
@@ -101,7 +101,7 @@ def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> list[FloatArray]:
     """The minima of response j that come near the lowest, as rows of `extremes`; t (m + 1,): the steps' times."""
     pieces = Pieces(driver, j, t)
     samples = pieces.samples
-    rows = peaks(samples, pieces.see, -1.0, CLOSENESS)
+    rows = peaks(samples, pieces.evaluate_at, -1.0, CLOSENESS)
     highest = float(np.abs(samples.value).max())
     bent = bool(has_kinks(driver.scene.model, j))
     for row in rows:
@@ -121,7 +121,7 @@ def _at_boundary(row: FloatArray, pieces: Pieces, b: int, highest: float, stated
 
     stated: whether the time is given, or an event's: then it varies as that does.
     """
-    before, behind = pieces.see(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
+    before, behind = pieces.evaluate_at(np.array([[b - 1.0, 1.0], [b, 0.0]]), True)
     row[VALUE] = (before if row[FRACTION] == pieces.leads[b - 1].high else behind)[0]
     (falls, first), (rises, second) = before[1:].tolist(), behind[1:].tolist()
     if not falls <= 0.0 <= rises or falls == rises:

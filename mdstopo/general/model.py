@@ -3,7 +3,7 @@
 Bodies are those of the case as declared, ground after them; n = 3 bodies coordinates q, what (x, y, psi) of each
 has changed by since home. A
 coordinate is free, or driven: known as a cubic of time within each segment; ground is driven and stands still. Rows of
-joints are solved together with the accelerations (`balance`); rows that others imply are left out there.
+joints are solved together with the accelerations (`solve_accelerations`); rows that others imply are left out there.
 """
 
 from typing import Any, NamedTuple

@@ -23,13 +23,13 @@ With tau exactly at the start (at the end) it can move to one side only: that si
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.events import block_of, member_rows
 from mdstopo.general.forces import inerter_row
 from mdstopo.general.members import rate_of_row
 from mdstopo.general.model import INERTER
 from mdstopo.general.responses import value_at
-from mdstopo.general.track import restore_modes
+from mdstopo.general.step_history import restore_modes
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
@@ -41,7 +41,7 @@ from mdstopo.mechanics.laws.table import (
 
 
 @kernel
-def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate):
+def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate):
     """Derivatives of the force and energy of one member, at unit strength, by a parameter of its law.
 
     Constant:
@@ -52,7 +52,7 @@ def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
     Out:
       row (6,): slopes dDelta/dq by the coordinates of the two bodies (m/m, m/rad).
@@ -70,13 +70,13 @@ def parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row
             value += row[r] * a[first + r if r < 3 else second + r - 3]
         return value, 0.0
     x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-    x -= strength[2, i]
+    x -= member_state[2, i]
     level = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    return law_slopes(model.block[k, 3], model.law[k], place, x, rate, int(strength[1, i]), t, level, model.curves)
+    return law_slopes(model.block[k, 3], model.law[k], place, x, rate, int(member_state[1, i]), t, level, model.curves)
 
 
 @kernel
-def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):
+def add_parameters(model, segment, t, member_state, q, v, a, z, weight, out):
     """Add s (weight dV/dp - df/dp (B . z)) of all members to the derivatives by the laws' parameters p, at one state.
 
     Constant:
@@ -84,7 +84,7 @@ def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
       z (n,): virtual displacements at this state.
       weight: factor of the stored energy, that of design members.
@@ -102,14 +102,14 @@ def add_parameters(model, segment, t, strength, q, v, a, z, weight, out):
         own = weight if model.block[k, 4] >= 0 else 0.0
         total = 0.0
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate)
+            by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
             pulled = rate_of_row(model, model.block[k, 0], row, z)
-            total += strength[0, i] * (own * by_energy - by_force * pulled)
+            total += member_state[0, i] * (own * by_energy - by_force * pulled)
         out[members + model.varied[e, 2]] += total
 
 
 @kernel
-def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale, out):
+def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, scale, out):
     """Add the derivatives, at fixed motion, of the force of one member by the parameters of its laws.
 
     Constant:
@@ -118,7 +118,7 @@ def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale
       segment: number of the stretch of time between two breakpoints.
       group, who: the group, and the number of the member in it.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
       scale: factor of the derivatives of f*.
     Out:
@@ -135,38 +135,38 @@ def add_force_parameters(model, segment, group, who, t, strength, q, v, a, scale
             continue
         if own >= 0 and own < model.block[k, 5]:
             i = model.block[k, 1] + own
-            slope, _ = parameter_slopes(model, k, i, place, segment, t, strength, q, v, a, row, row_rate)
-            out[members + model.varied[e, 2]] += scale * strength[0, i] * slope
+            slope, _ = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
+            out[members + model.varied[e, 2]] += scale * member_state[0, i] * slope
 
 
 @kernel
-def event_slope(model, track, strength, event, e):
+def event_slope(model, history, member_state, event, e):
     """Derivative of the time of an event by the parameter of entry e of `varied`: dt_e/dp = -m_p/m' (s per unit of p).
 
     0 where the parameter is not in the margin m of the member that switched, or where the time is given. The modes
-    in strength are perhaps changed to those just before the event.
+    in member_state are perhaps changed to those just before the event.
     """
     k = model.varied[e, 0]
     place = model.varied[e, 1]
-    state = track.event[event, 0]
-    who = track.event[event, 1]
+    state = history.event[event, 0]
+    who = history.event[event, 1]
     if place > FREE_LENGTH or state == 0 or block_of(model, who) != k:
         return 0.0
     given = True
     for part in range(2):
         for d in range(model.mass.shape[0]):
-            given = given and track.salt[event, part, d] == 0.0
+            given = given and history.saltation[event, part, d] == 0.0
     if given:
         return 0.0
-    segment = track.index[state - 1, 2]
-    q = track.state[state, 0]
-    v = track.state[state, 1]
+    segment = history.index[state - 1, 2]
+    q = history.state[state, 0]
+    v = history.state[state, 1]
     row = np.empty(6)
     row_rate = np.empty(6)
     x, rate = member_rows(model, model.block[k, 0], who, q, v, row, row_rate)
-    x -= track.kept[event, 0]
+    x -= history.kept[event, 0]
     code = model.block[k, 3]
-    mode = int(track.event[event, 2])
+    mode = int(history.event[event, 2])
     by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, model.curves)
     if by_p == 0.0:
         return 0.0
@@ -175,9 +175,11 @@ def event_slope(model, track, strength, event, e):
     if by_rate != 0.0:
         a = np.empty(model.mass.shape[0])
         lam = np.empty(model.size[0])
-        restore_modes(track, event, strength)
-        desk = make_desk(model)
-        balance(model, strength, segment, track.t[state], q.copy(), v.copy(), np.bool_(False), desk, a, lam)
+        restore_modes(history, event, member_state)
+        workspace = make_workspace(model)
+        solve_accelerations(
+            model, member_state, segment, history.t[state], q.copy(), v.copy(), np.bool_(False), workspace, a, lam
+        )
         for r in range(6):
             d = 3 * model.pair[model.block[k, 0], r // 3] + r % 3
             speed += by_rate * (row[r] * a[d] + row_rate[r] * v[d])
@@ -185,17 +187,17 @@ def event_slope(model, track, strength, event, e):
 
 
 @kernel
-def add_event(model, track, strength, event, factor, out):
+def add_event(model, history, member_state, event, factor, out):
     """Add what the laws' parameters do to a value by shifting the time of an event.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       event: number of the event.
       factor: derivative of the value by the time of the event (per s).
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes are perhaps changed to those just before the event.
     Out:
       out (M_padded + P,): factor dt_e/dp is added behind the members.
@@ -203,11 +205,11 @@ def add_event(model, track, strength, event, factor, out):
     if factor == 0.0:
         return
     for e in range(model.varied.shape[0]):
-        out[model.member.shape[1] + model.varied[e, 2]] += factor * event_slope(model, track, strength, event, e)
+        out[model.member.shape[1] + model.varied[e, 2]] += factor * event_slope(model, history, member_state, event, e)
 
 
 @kernel
-def begins_or_ends(model, track, count, state, e):
+def begins_or_ends(model, history, count, state, e):
     """Whether the law of entry e of `varied` begins (1) or ceases (-1) to act at a state; else 0.
 
     count is the number of steps: the number of the last state.
@@ -220,9 +222,9 @@ def begins_or_ends(model, track, count, state, e):
     before = edge and state == count
     after = edge and state == 0
     if state > 0:
-        before = model.active[track.index[state - 1, 2], k] != 0 and (before or state < count)
+        before = model.active[history.index[state - 1, 2], k] != 0 and (before or state < count)
     if state < count:
-        after = model.active[track.index[state, 2], k] != 0 and (after or state > 0)
+        after = model.active[history.index[state, 2], k] != 0 and (after or state > 0)
     if place == ACTIVE_FROM and after and not before:
         return 1
     if place == ACTIVE_UNTIL and before and not after:
@@ -231,7 +233,7 @@ def begins_or_ends(model, track, count, state, e):
 
 
 @kernel
-def time_jump(model, track, strength, count, state, e, j, square, dv):
+def time_jump(model, history, member_state, count, state, e, j, square, dv):
     """What shifting the time of entry e of `varied`, at which laws begin or end to act, does at one state.
 
     Entries with the same value are shifted together: the first of them stands for all.
@@ -239,7 +241,7 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):
     Constant:
       model: the compiled scene.
         Its `active` is changed on the way and then as before.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
       count: number of steps.
     In:
       state: number of the state.
@@ -247,7 +249,7 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):
       j: a response whose integral is differentiated; -1: none.
       square: whether the integral is that of the response's square.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes are perhaps changed to those of the step in which the laws act.
     Out:
       dv (n,): derivative of the velocities behind the state by that time (m/s^2, rad/s^2); 0 where it does nothing.
@@ -262,14 +264,14 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):
     way = 0
     for other in range(e, model.varied.shape[0]):
         if model.varied[other, 2] == which:
-            shifted[other] = begins_or_ends(model, track, count, state, other)
+            shifted[other] = begins_or_ends(model, history, count, state, other)
             way = shifted[other] if shifted[other] != 0 else way
     if way == 0:
         return False, 0.0
     step = state if way > 0 else state - 1
-    segment = track.index[step, 2]
-    restore_modes(track, track.index[step, 3], strength)
-    desk = make_desk(model)
+    segment = history.index[step, 2]
+    restore_modes(history, history.index[step, 3], member_state)
+    workspace = make_workspace(model)
     a = np.empty(dv.shape[0])
     lam = np.empty(model.size[0])
     drop = 0.0
@@ -278,15 +280,15 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):
         for other in range(e, model.varied.shape[0]):
             if shifted[other] != 0:
                 model.active[segment, model.varied[other, 0]] = 1 - side
-        balance(
-            model, strength, segment, track.t[state], track.state[state, 0].copy(), track.state[state, 1].copy(),
-            np.bool_(False), desk, a, lam,
+        solve_accelerations(
+            model, member_state, segment, history.t[state], history.state[state, 0].copy(),
+            history.state[state, 1].copy(), np.bool_(False), workspace, a, lam,
         )  # fmt: skip
         for d in range(dv.shape[0]):
             if model.free[d] != 0:
                 dv[d] += sign * a[d]
         if j >= 0:
-            value = value_at(model, strength, segment, track.t[state], track.state[state], j, desk)
+            value = value_at(model, member_state, segment, history.t[state], history.state[state], j, workspace)
             drop += sign * (value * value if square else value)
     for other in range(e, model.varied.shape[0]):
         if shifted[other] != 0:
@@ -295,12 +297,12 @@ def time_jump(model, track, strength, count, state, e, j, square, dv):
 
 
 @kernel
-def add_times(model, track, strength, count, state, j, square, lam_v, rate, out):
+def add_times(model, history, member_state, count, state, j, square, lam_v, rate, out):
     """Add what shifting the times does, at one state, at which laws begin or end to act.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
       count: number of steps.
     In:
       state: number of the state.
@@ -309,7 +311,7 @@ def add_times(model, track, strength, count, state, j, square, lam_v, rate, out)
       lam_v (n,): cotangents of the velocities behind the state.
       rate: rate in time of a peak that stands at the state, and moves with the time (per s); 0 for none.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes are perhaps changed to those of the steps beside the state.
     Out:
       out (M_padded + P,): added to behind the members.
@@ -318,7 +320,7 @@ def add_times(model, track, strength, count, state, j, square, lam_v, rate, out)
     for e in range(model.varied.shape[0]):
         if model.varied[e, 1] < ACTIVE_FROM:
             continue
-        does, drop = time_jump(model, track, strength, count, state, e, j, square, dv)
+        does, drop = time_jump(model, history, member_state, count, state, e, j, square, dv)
         if not does:
             continue
         total = drop

@@ -9,13 +9,13 @@ all the same, so that these belong to what was computed. Driven coordinates are 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import (
+from mdstopo.general.accelerations import (
     factor_matrix,
     gather,
     gather_multipliers,
     gather_turned,
     joint_state,
-    pull_matrices,
+    matrices_vjp,
     solve_unknowns,
 )
 from mdstopo.general.forces import turn_bodies
@@ -44,7 +44,7 @@ def misfit(model, phi, rows):
 
 
 @kernel
-def project(model, scale, q, v, desk, mu, nu):
+def project(model, scale, q, v, workspace, mu, nu):
     """Move a state onto the joints, to the nearest one by mass.
 
     Constant:
@@ -53,7 +53,7 @@ def project(model, scale, q, v, desk, mu, nu):
     In place:
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s); driven ones are in place already.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
         It holds the joints at the state that was found, and the factors of their matrix.
       mu, nu (n_row,): multipliers that moved the coordinates and the velocities.
 
@@ -71,8 +71,8 @@ def project(model, scale, q, v, desk, mu, nu):
     which = np.zeros(1, np.int64)
     for d in range(n):
         start[d] = q[d]
-    none = desk.mass
-    if desk.switches[DIAGONAL] == 0:
+    none = workspace.mass
+    if workspace.switches[DIAGONAL] == 0:
         none[:] = 0.0
     last = np.inf
     worst = np.inf
@@ -80,13 +80,13 @@ def project(model, scale, q, v, desk, mu, nu):
     for b in range(0, n, 3):
         moved = max(moved, abs(q[b]), abs(q[b + 1]), min(abs(q[b + 2]), 1.0) * scale)
     for _ in range(MOST):
-        turn_bodies(q, desk.turned)
-        joint_state(model, q, v, desk)
-        worst = misfit(model, desk.phi, which)
+        turn_bodies(q, workspace.turned)
+        joint_state(model, q, v, workspace)
+        worst = misfit(model, workspace.phi, which)
         if worst <= 1e-15 * min(moved, scale) or not worst < last:
             break
         last = worst
-        singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
+        singular = factor_matrix(model, workspace, none, none, q, none, 0.0, 0.0, np.bool_(False))
         if singular >= 0:
             return singular
         for d in range(n):
@@ -94,14 +94,14 @@ def project(model, scale, q, v, desk, mu, nu):
         for j in range(model.joint.shape[0]):
             for r in range(3):
                 if model.row[j, r] >= 0:
-                    mu[model.row[j, r]] = -desk.phi[j, r]
-        solve_unknowns(model, desk, shift, mu)
+                    mu[model.row[j, r]] = -workspace.phi[j, r]
+        solve_unknowns(model, workspace, shift, mu)
         for d in range(n):
             q[d] += shift[d]
     else:
-        turn_bodies(q, desk.turned)
-        joint_state(model, q, v, desk)
-    singular = factor_matrix(model, desk, none, none, q, none, 0.0, 0.0, np.bool_(False))
+        turn_bodies(q, workspace.turned)
+        joint_state(model, q, v, workspace)
+    singular = factor_matrix(model, workspace, none, none, q, none, 0.0, 0.0, np.bool_(False))
     if singular >= 0:
         return singular
     for d in range(n):
@@ -112,16 +112,16 @@ def project(model, scale, q, v, desk, mu, nu):
             if own >= 0:
                 value = 0.0
                 for i in range(6):
-                    value -= desk.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
+                    value -= workspace.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
                 nu[own] = value
-    solve_unknowns(model, desk, shift, nu)
+    solve_unknowns(model, workspace, shift, nu)
     for d in range(n):
         v[d] += shift[d]
     return model.place.shape[0] + which[0] if worst > MISFIT * scale else -1
 
 
 @kernel
-def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
+def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope):
     """How the products of Phi_q with mu, nu and v change with the coordinates.
 
     Constant:
@@ -129,7 +129,7 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
     In:
       q, v (n,): the projected state (m, rad; m/s, rad/s).
       mu, nu (n_row,): multipliers that moved it there.
-      desk: workspace of a balance, with the bodies turned (`forces.turn_bodies`).
+      workspace: workspace of a balance, with the bodies turned (`forces.turn_bodies`).
     Out:
       h_mu, h_nu (n_pair, 6, 6): d(Phi_q^T mu)/dq and d(Phi_q^T nu)/dq of the joints of each pair.
       slope (n_joint, 3, 6): d(Phi_q v)/dq.
@@ -142,7 +142,7 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
     for j in range(model.joint.shape[0]):
         code = model.joint[j, 0]
         par = model.joint_par[j]
-        gather_turned(model, j, q, desk.turned, w)
+        gather_turned(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather_multipliers(model, j, mu, mine)
         joint_stiffness(code, par, w, mine, h_mu[model.joint[j, 3]])
@@ -152,8 +152,8 @@ def _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope):
 
 
 @kernel
-def swept(model, desk, h, x, y):
-    """Solve [M + H^T, Phi_q^T; Phi_q, 0] by sweeps with the factors of H = 0, which are on the desk.
+def swept(model, workspace, h, x, y):
+    """Solve [M + H^T, Phi_q^T; Phi_q, 0] by sweeps with the factors of H = 0, which are in the workspace.
 
     H is as small as what a step has drifted, so few sweeps do. Returns whether they have settled.
 
@@ -168,7 +168,7 @@ def swept(model, desk, h, x, y):
         right[d] = x[d]
         last[d] = 0.0
     for _ in range(SWEEPS):
-        solve_unknowns(model, desk, x, y)
+        solve_unknowns(model, workspace, x, y)
         size = 0.0
         change = 0.0
         for d in range(n):
@@ -182,14 +182,14 @@ def swept(model, desk, h, x, y):
             for d in range(n):
                 x[d] = last[d]
             return True
-        pull_matrices(model.pair, h, last, x)
+        matrices_vjp(model.pair, h, last, x)
     for d in range(n):
         x[d] = right[d]
     return False
 
 
 @kernel
-def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
+def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
     """Pull cotangents of projected states back to the states before the projection.
 
     Constant:
@@ -200,7 +200,7 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
     In place:
       bar_q, bar_v (R, n): R cotangents of coordinates and velocities.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = q.shape[0]
     count = bar_q.shape[0]
@@ -211,19 +211,19 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
     h_nu = np.empty((n_pair, 6, 6))
     slope = np.zeros((model.joint.shape[0], 3, 6))
     y = np.zeros(mu.shape[0])
-    none = desk.mass
-    if desk.switches[DIAGONAL] == 0:
+    none = workspace.mass
+    if workspace.switches[DIAGONAL] == 0:
         none[:] = 0.0
-    turn_bodies(q, desk.turned)
-    joint_state(model, q, v, desk)
-    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
-    factor_matrix(model, desk, none, none, bar_q[0], none, 0.0, 0.0, np.bool_(True))
+    turn_bodies(q, workspace.turned)
+    joint_state(model, q, v, workspace)
+    _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)
+    factor_matrix(model, workspace, none, none, bar_q[0], none, 0.0, 0.0, np.bool_(True))
     left = 0
     unsettled = np.empty(count, np.int64)
     for m in range(count):
         y[:] = 0.0
-        solve_unknowns(model, desk, bar_v[m], y)
-        pull_matrices(model.pair, h_nu, bar_v[m], bar_q[m])
+        solve_unknowns(model, workspace, bar_v[m], y)
+        matrices_vjp(model.pair, h_nu, bar_v[m], bar_q[m])
         for j in range(model.joint.shape[0]):
             for r in range(3):
                 own = model.row[j, r]
@@ -231,16 +231,16 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
                     for i in range(6):
                         bar_q[m, 3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
         y[:] = 0.0
-        if not swept(model, desk, h_mu, bar_q[m], y):
+        if not swept(model, workspace, h_mu, bar_q[m], y):
             unsettled[left] = m
             left += 1
     if left > 0:
-        desk.by_q[:] = 0.0
-        desk.by_v[:] = 0.0
-        factor_matrix(model, desk, h_mu, none, np.zeros(n), none, 1.0, 0.0, np.bool_(True))
+        workspace.by_q[:] = 0.0
+        workspace.by_v[:] = 0.0
+        factor_matrix(model, workspace, h_mu, none, np.zeros(n), none, 1.0, 0.0, np.bool_(True))
         for i in range(left):
             y[:] = 0.0
-            solve_unknowns(model, desk, bar_q[unsettled[i]], y)
+            solve_unknowns(model, workspace, bar_q[unsettled[i]], y)
     for m in range(count):
         for d in range(n):
             bar_q[m, d] *= model.mass[d]
@@ -248,7 +248,7 @@ def project_back(model, q, v, mu, nu, desk, bar_q, bar_v):
 
 
 @kernel
-def project_forward(model, q, v, mu, nu, desk, dq, dv):
+def project_forward(model, q, v, mu, nu, workspace, dq, dv):
     """Push changes of a state through its projection.
 
     Constant:
@@ -259,7 +259,7 @@ def project_forward(model, q, v, mu, nu, desk, dq, dv):
     In place:
       dq, dv (n,): changes of coordinates and velocities, before and then behind the projection.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = q.shape[0]
     if mu.shape[0] == 0:
@@ -271,16 +271,16 @@ def project_forward(model, q, v, mu, nu, desk, dq, dv):
     y = np.zeros(mu.shape[0])
     none = np.zeros((n_pair, 6, 6))
     turn = np.zeros(n)
-    turn_bodies(q, desk.turned)
-    joint_state(model, q, v, desk)
-    _stiffnesses(model, q, v, mu, nu, desk, h_mu, h_nu, slope)
-    desk.by_q[:] = 0.0
-    desk.by_v[:] = 0.0
-    factor_matrix(model, desk, h_mu, none, turn, none, 1.0, 0.0, np.bool_(False))
+    turn_bodies(q, workspace.turned)
+    joint_state(model, q, v, workspace)
+    _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)
+    workspace.by_q[:] = 0.0
+    workspace.by_v[:] = 0.0
+    factor_matrix(model, workspace, h_mu, none, turn, none, 1.0, 0.0, np.bool_(False))
     for d in range(n):
         dq[d] *= model.mass[d]
         dv[d] *= model.mass[d]
-    solve_unknowns(model, desk, dq, y)
+    solve_unknowns(model, workspace, dq, y)
     for p in range(n_pair):
         for i in range(6):
             value = 0.0
@@ -295,5 +295,5 @@ def project_forward(model, q, v, mu, nu, desk, dq, dv):
                 for i in range(6):
                     value -= slope[j, r, i] * dq[3 * model.joint[j, 1 + i // 3] + i % 3]
                 y[own] = value
-    factor_matrix(model, desk, none, none, turn, none, 0.0, 0.0, np.bool_(False))
-    solve_unknowns(model, desk, dv, y)
+    factor_matrix(model, workspace, none, none, turn, none, 0.0, 0.0, np.bool_(False))
+    solve_unknowns(model, workspace, dv, y)

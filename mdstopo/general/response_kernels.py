@@ -4,11 +4,11 @@ A kernel takes what it needs of the following, in any order, by these names:
 
     model, j          the scene's arrays (`general.model`), and which of its responses it is; `model.response_par[j]`
                       has the point in body coordinates, then `Response.numbers`, four at most
-    strength, segment (`general.members`), the stretch of time between two breakpoints
+    member_state, segment (`general.members`), the stretch of time between two breakpoints
     who               of a response of members the member that is looked at
     t, q, v, a, lam   a state whose balance has just been made: time, coordinates, velocities, accelerations (n,),
                       multipliers (n_row,)
-    desk              what the balance has left (`general.balance`)
+    workspace              what the balance has left (`general.accelerations`)
     bars, row_bar     (3, n) slopes by q, v, a and (n_row,) by lam: zero before, added to
 """
 
@@ -39,13 +39,13 @@ class ResponseKernels:
 
     value: g_j, with its slopes added to bars and row_bar.
     vector: of a component or a norm. absolute: whether it is an absolute value, or a largest one, which has kinks.
-    needs_balance: whether it needs a, lam or the desk; where not, its order (`ResponseKind`) says of how many
-    derivatives of the motion it is. by_state: whether its rate is g_q v + g_v a where the motion has the derivatives
-    that its order asks for; else the rate is differenced along the motion.
+    needs_accelerations: whether it needs a, lam or the workspace; where not, its order (`ResponseKind`) says of how
+    many derivatives of the motion it is. by_state: whether its rate is g_q v + g_v a where the motion has the
+    derivatives that its order asks for; else the rate is differenced along the motion.
     """
 
     value: Function
     vector: VectorKernels | None = None
     absolute: bool = False
-    needs_balance: bool = True
+    needs_accelerations: bool = True
     by_state: bool = False

@@ -1,7 +1,8 @@
 """What can be looked at in a general scene: g(q, v, a, lam, alpha) of Eq. 16, its slopes and its rate.
 
-A response is evaluated at a state whose balance has just been made (`balance`), so poses, forces, accelerations and
-multipliers are at hand. Of each kind there is a record, `ResponseKernels`; the branches by code are made from them.
+A response is evaluated at a state whose balance has just been made (`solve_accelerations`), so poses, forces,
+accelerations and multipliers are at hand. Of each kind there is a record, `ResponseKernels`; the branches by code are
+made from them.
 """
 
 import importlib
@@ -12,10 +13,10 @@ from mdstopo.case.responses import RESPONSES, ResponseKind
 from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.balance import balance, gather_multipliers
-from mdstopo.general.duties import beside, derivatives
+from mdstopo.general.accelerations import gather_multipliers, solve_accelerations
 from mdstopo.general.events import member_between, member_rows
 from mdstopo.general.forces import inerter_force
+from mdstopo.general.method_interface import beside, derivatives
 from mdstopo.general.model import INERTER, GeneralModel
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
 from mdstopo.mechanics.geometry import add_pair_force, turned_body
@@ -49,8 +50,8 @@ def _is_vector(kind):
     return False
 
 
-@chosen(LISTED, lambda each: True if each.needs_balance else None, part)
-def needs_balance(kind):
+@chosen(LISTED, lambda each: True if each.needs_accelerations else None, part)
+def needs_accelerations(kind):
     """Whether responses of a kind need more than the state: accelerations, multipliers, sums of forces."""
     return False
 
@@ -68,13 +69,13 @@ def kinked(model, j):
 
 
 @kernel
-def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
+def member_force(model, member_state, segment, t, group, i, q, v, a, slopes, own):
     """Force f* of one member of a group, all its laws together, with its slopes.
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group, i: the group, and the number of the member in it.
@@ -94,9 +95,9 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
             continue
         pair = model.block[k, 0]
         m = model.block[k, 1] + own_i
-        scale = strength[0, m]
+        scale = member_state[0, m]
         x, rate = member_rows(model, pair, m, q, v, own[0], own[1])
-        x -= strength[2, m]
+        x -= member_state[2, m]
         if model.block[k, 3] == INERTER:
             total += scale * inerter_force(model, k, m, q, v, a, own[0])
             for r in range(6):
@@ -105,7 +106,7 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
         tau = t - model.times[segment]
         value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
         f, by_x, by_rate, _, _ = law(
-            model.block[k, 3], model.law[k], x, rate, int(strength[1, m]), t, value, model.curves
+            model.block[k, 3], model.law[k], x, rate, int(member_state[1, m]), t, value, model.curves
         )
         total += scale * f
         for r in range(6):
@@ -115,13 +116,13 @@ def member_force(model, strength, segment, t, group, i, q, v, a, slopes, own):
 
 
 @kernel
-def group_forces(model, strength, segment, t, group, q, v, a, out):
+def group_forces(model, member_state, segment, t, group, q, v, a, out):
     """Forces f* of all members of a group: those of `member_force`, to the bit, without slopes.
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group: the group.
@@ -145,7 +146,7 @@ def group_forces(model, strength, segment, t, group, q, v, a, out):
         value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
         first = model.block[k, 7] - model.block[k, 1]
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            scale = strength[0, i]
+            scale = member_state[0, i]
             if model.block[k, 3] == INERTER:
                 out[first + i] += scale * inerter_force(model, k, i, q, v, a, row)
                 continue
@@ -154,19 +155,21 @@ def group_forces(model, strength, segment, t, group, q, v, a, out):
             dx = v[b_body] - wb * qy - v[a_body] + wa * py
             dy = v[b_body + 1] + wb * qx - v[a_body + 1] - wa * px
             rate = ux * y * dx + uy * y * dy
-            x = stretch - strength[2, i]
-            f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(strength[1, i]), t, value, model.curves)
+            x = stretch - member_state[2, i]
+            f, _, _, _, _ = law(
+                model.block[k, 3], model.law[k], x, rate, int(member_state[1, i]), t, value, model.curves
+            )
             out[first + i] += scale * f
 
 
 @kernel
-def largest_force(model, strength, segment, t, group, q, v, a):
+def largest_force(model, member_state, segment, t, group, q, v, a):
     """The number within its group of the member that carries the largest |f*|.
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group: the group.
@@ -177,7 +180,7 @@ def largest_force(model, strength, segment, t, group, q, v, a):
     best = -1.0
     who = 0
     for i in range(members_of(model, group)):
-        f, _ = member_force(model, strength, segment, t, group, i, q, v, a, slopes, own)
+        f, _ = member_force(model, member_state, segment, t, group, i, q, v, a, slopes, own)
         if abs(f) > best:
             best = abs(f)
             who = i
@@ -195,13 +198,13 @@ def members_of(model, group):
 
 
 @kernel
-def equal_forces(model, strength, segment, t, group, stage, largest, tied):
+def equal_forces(model, member_state, segment, t, group, stage, largest, tied):
     """Find the members of a group that share the largest |f*|, to TIE.
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group: the group.
@@ -216,7 +219,7 @@ def equal_forces(model, strength, segment, t, group, stage, largest, tied):
     own = np.empty((2, 6))
     found = 0
     for i in range(members_of(model, group)):
-        f, _ = member_force(model, strength, segment, t, group, i, stage[0], stage[1], stage[2], slopes, own)
+        f, _ = member_force(model, member_state, segment, t, group, i, stage[0], stage[1], stage[2], slopes, own)
         if abs(f) >= (1.0 - TIE) * largest and largest > 0.0:
             tied[found] = i
             found += 1
@@ -224,67 +227,67 @@ def equal_forces(model, strength, segment, t, group, stage, largest, tied):
 
 
 @chosen(LISTED, lambda each: each.value, part)
-def _value(kind, model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):
+def _value(kind, model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar):
     """Value of a response by its kind (`ResponseKernels.value`).
 
     kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
     model: the compiled scene.
-    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     segment: number of the stretch of time between two breakpoints.
     j: the response.
     who: of a member force the number of the member in its group.
     t: time (s).
     q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
     lam (n_row,): multipliers of the joints.
-    desk: workspace as the balance of this state has left it.
+    workspace: workspace as the balance of this state has left it.
     bars (3, n), row_bar (n_row,): slopes by q, v, a and by lam, zero before.
     """
     return np.nan
 
 
 @kernel
-def response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar):
+def response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar):
     """Value of response j, with its slopes, at a state whose balance has just been made.
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       j: the response.
       who: of a member force the number of the member in its group.
       t: time (s).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
       lam (n_row,): multipliers of the joints.
-      desk: workspace as the balance of this state has left it.
+      workspace: workspace as the balance of this state has left it.
     Out:
       bars (3, n): slopes by q, v and a.
       row_bar (n_row,): slopes by lam.
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
-    return _value(model.response[j, 0], model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    return _value(model.response[j, 0], model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
 
 
 @kernel
-def energy_value(model, desk, bars):
+def energy_value(model, workspace, bars):
     """Elastic energy stored in all design members (J); its slopes by q are added to bars (3, n)."""
     value = 0.0
     for p in range(model.pair.shape[0]):
-        o = desk.sums[p]
+        o = workspace.sums[p]
         value += o[3]
-        add_pair_force(model.pair, desk.rel, p, o[4], o[5], o[6], bars[0])
+        add_pair_force(model.pair, workspace.rel, p, o[4], o[5], o[6], bars[0])
     return value
 
 
 @kernel
-def members_value(model, strength, segment, j, who, t, q, v, a, bars):
+def members_value(model, member_state, segment, j, who, t, q, v, a, bars):
     """|f*| of one member of a group (N).
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       j: the response, which says which group.
       who: number of the member in the group.
@@ -295,7 +298,7 @@ def members_value(model, strength, segment, j, who, t, q, v, a, bars):
     """
     slopes = np.empty((3, 6))
     own = np.empty((2, 6))
-    f, pair = member_force(model, strength, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+    f, pair = member_force(model, member_state, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
     sign = 1.0 if f >= 0.0 else -1.0
     inertial = False
     for i in range(3):
@@ -303,7 +306,7 @@ def members_value(model, strength, segment, j, who, t, q, v, a, bars):
             bars[i, 3 * model.pair[pair, c // 3] + c % 3] += sign * slopes[i, c]
             inertial = inertial or (i == 2 and slopes[i, c] != 0.0)
     if inertial:
-        _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars)
+        _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars)
     return sign * f
 
 
@@ -526,40 +529,40 @@ def joint_force_components(model, j, lam, out):
 
 
 @kernel
-def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):
+def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, a, lam):
     """Rate in time, at a state within a step, of the component of `across_slopes`; by differences, as in `rated`.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       k, c: number of the step, and the fraction of it at which the state is.
       j: the response, a norm (`is_norm`).
       t: time (s).
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
     Out:
       a (n,), lam (n_row,): scratch.
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = q.shape[0]
-    segment = track.index[k, 2]
+    segment = history.index[k, 2]
     no = np.bool_(False)
     near = np.empty((3, n))
     vector = np.empty(2)
     aside = np.empty((2, 2))
-    balance(model, strength, segment, t, q, v, no, desk, a, lam)
+    solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
     _components(model.response[j, 0], model, j, q, v, a, lam, vector)
     size = np.hypot(vector[0], vector[1])
     if size == 0.0:
         return 0.0
     here = a.copy()
-    apart = APART * (track.t[k + 1] - track.t[k])
+    apart = APART * (history.t[k + 1] - history.t[k])
     for side in range(2):
         e = apart if side == 1 else -apart
-        beside(tag, track, k, c, e, q, v, here, near[0], near[1])
-        balance(model, strength, segment, t + e, near[0], near[1], no, desk, near[2], lam)
+        beside(tag, history, k, c, e, q, v, here, near[0], near[1])
+        solve_accelerations(model, member_state, segment, t + e, near[0], near[1], no, workspace, near[2], lam)
         _components(model.response[j, 0], model, j, near[0], near[1], near[2], lam, aside[side])
     x = aside[1, 0] - aside[0, 0]
     y = aside[1, 1] - aside[0, 1]
@@ -567,13 +570,13 @@ def across_rate(tag, model, strength, track, k, c, j, t, q, v, desk, a, lam):
 
 
 @kernel
-def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):
+def _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars):
     """Add the slopes by q and v of an inerter's force, by sixth-order differences of its formula: rarely needed.
 
     Constant:
       model: the compiled scene.
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       who: number of the member in the group.
       j: the response, which says which group.
@@ -607,20 +610,20 @@ def _inerter_slopes(model, strength, segment, who, j, sign, q, v, a, bars):
                     x[d] = kept - (n + 1) * size
                     slope += weight * (plus - inerter_force(model, k, m, q, v, a, own))
                 x[d] = kept
-                bars[which, d] += sign * strength[0, m] * slope / size
+                bars[which, d] += sign * member_state[0, m] * slope / size
 
 
 @kernel
-def value_at(model, strength, segment, t, state, j, desk):
+def value_at(model, member_state, segment, t, state, j, workspace):
     """Value of response j at a state, in the modes that members are in; of member forces the largest.
 
     model: the compiled scene.
-    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     segment: number of the stretch of time between two breakpoints.
     t: time (s).
     state (2, n): coordinates and velocities (m, rad; m/s, rad/s).
     j: the response.
-    desk: workspace of a balance (`balance.Desk`).
+    workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = model.mass.shape[0]
     q = state[0].copy()
@@ -629,53 +632,53 @@ def value_at(model, strength, segment, t, state, j, desk):
     lam = np.empty(model.size[0])
     bars = np.empty((3, n))
     row_bar = np.empty(model.size[0])
-    balance(model, strength, segment, t, q, v, np.bool_(False), desk, a, lam)
+    solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
     who = -1
     if model.response[j, 0] == MEMBER_FORCE:
-        who = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
-    return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+        who = largest_force(model, member_state, segment, t, model.response[j, 5], q, v, a)
+    return response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
 
 
 @kernel
-def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, lam, bars, row_bar, near):
+def rated(tag, model, member_state, history, k, c, j, who, rates, t, q, v, workspace, a, lam, bars, row_bar, near):
     """Value of response j and its rate in time at a state within a step.
 
     Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, the rate is
     dg/dt = g_q v + g_v a; else it is differenced along the method's own motion.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       k, c: number of the step, and the fraction of it at which the state is.
       j: the response; below 0 none is asked for, and only the balance is made.
       who: of a member force the number of the member in its group.
       rates: whether the rate is wanted; else it may be meaningless, and where g is one of positions or velocities alone
-        there is no balance: a, lam and the desk stay those of another state.
+        there is no balance: a, lam and the workspace stay those of another state.
       t: time (s).
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
     Out:
       a (n,), lam (n_row,): accelerations and multipliers of the state.
-      desk: workspace as the balance of the state leaves it.
+      workspace: workspace as the balance of the state leaves it.
       bars (3, n), row_bar (n_row,): slopes of the response by q, v, a and by lam.
       near (4, n): scratch.
     """
     n = q.shape[0]
-    segment = track.index[k, 2]
-    h = track.t[k + 1] - track.t[k]
+    segment = history.index[k, 2]
+    h = history.t[k + 1] - history.t[k]
     no = np.bool_(False)
     rate = 0.0
     if j < 0:
-        balance(model, strength, segment, t, q, v, no, desk, a, lam)
+        solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         return np.nan, np.nan
     kind = model.response[j, 0]
-    if not rates and not needs_balance(kind) and model.response[j, 4] < 2:
-        return response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar), rate
+    if not rates and not needs_accelerations(kind) and model.response[j, 4] < 2:
+        return response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar), rate
     simple = not rates or (_is_by_state(kind) and model.response[j, 4] < derivatives(tag))
     if not simple:
-        balance(model, strength, segment, t, q, v, no, desk, a, lam)
+        solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         for d in range(n):
             near[0, d] = a[d]
             near[1, d] = q[d]
@@ -684,14 +687,14 @@ def rated(tag, model, strength, track, k, c, j, who, rates, t, q, v, desk, a, la
         sides = np.zeros(2)
         for side in range(2):
             e = apart if side == 1 else -apart
-            beside(tag, track, k, c, e, q, v, near[0], near[1], near[2])
-            balance(model, strength, segment, t + e, near[1], near[2], no, desk, near[3], lam)
+            beside(tag, history, k, c, e, q, v, near[0], near[1], near[2])
+            solve_accelerations(model, member_state, segment, t + e, near[1], near[2], no, workspace, near[3], lam)
             sides[side] = response(
-                model, strength, segment, j, who, t + e, near[1], near[2], near[3], lam, desk, bars, row_bar
+                model, member_state, segment, j, who, t + e, near[1], near[2], near[3], lam, workspace, bars, row_bar
             )
         rate = (sides[1] - sides[0]) / (2.0 * apart)
-    balance(model, strength, segment, t, q, v, no, desk, a, lam)
-    value = response(model, strength, segment, j, who, t, q, v, a, lam, desk, bars, row_bar)
+    solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+    value = response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
     if simple:
         for d in range(n):
             rate += bars[0, d] * v[d] + bars[1, d] * a[d]
@@ -705,10 +708,10 @@ OF_ENERGY = ResponseKernels(value=energy_value, by_state=True)
 OF_POINT = ResponseKernels(
     value=motion_value,
     vector=VectorKernels(across=motion_across, components=motion_components),
-    needs_balance=False,
+    needs_accelerations=False,
     by_state=True,
 )
-OF_ANGLE = ResponseKernels(value=motion_value, needs_balance=False, by_state=True)
+OF_ANGLE = ResponseKernels(value=motion_value, needs_accelerations=False, by_state=True)
 OF_MEMBERS = ResponseKernels(value=members_value, absolute=True)
 OF_JOINT_FORCE = ResponseKernels(
     value=joint_force_value,

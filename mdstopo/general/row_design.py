@@ -13,8 +13,8 @@ from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
 from mdstopo.general.members import direction, rate_of_row, stretched
 from mdstopo.general.model import INERTER
 from mdstopo.general.parameters import parameter_slopes
+from mdstopo.general.step_history import has_factors
 from mdstopo.general.switches import carriers
-from mdstopo.general.track import has_factors
 from mdstopo.integrators.steps import DESIGN
 from mdstopo.mechanics.geometry import POSE, copy_rows, pair_displacement
 from mdstopo.mechanics.laws.alike import alike_designs, elastic_designs_of_rows
@@ -22,16 +22,16 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH, SPRING, law
 
 
 @kernel
-def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work):
+def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out, work):
     """Add the derivatives by the design of many rows at the stages of one step: `gather.add_designs` for all of them.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       segment: number of the stretch of time between two breakpoints.
       o, stages: number of the first stage, and how many there are.
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       z (R, 17, n): virtual displacements of each row at each stage.
     Out:
       out (R, M_padded + P): derivatives by alpha^mu and values of each row, added to.
@@ -45,9 +45,9 @@ def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work
     turned = np.empty((model.mass.shape[0] // 3, 2))
     carries = carriers(model)
     for j in range(stages):
-        stage = track.stage[o + j]
-        if has_factors(track):
-            copy_rows(track.turned[o + j], turned)
+        stage = history.stage[o + j]
+        if has_factors(history):
+            copy_rows(history.turned[o + j], turned)
         else:
             turn_bodies(stage[0], turned)
         for p in range(n_pair):
@@ -79,16 +79,16 @@ def add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work
             continue
         for j in range(stages):
             if model.block[k, 3] == INERTER:
-                _add_inerters(model, k, track.stage[o + j], z, j, out)
+                _add_inerters(model, k, history.stage[o + j], z, j, out)
             else:
-                _add_laws(model, k, segment, track.when[o + j], strength, rel[j, p], u, j, seen, out)
+                _add_laws(model, k, segment, history.when[o + j], member_state, rel[j, p], u, j, seen, out)
     if model.varied.shape[0] > 0:
         for j in range(stages):
-            _add_parameters(model, segment, track.when[o + j], strength, track.stage[o + j], z, j, out)
+            _add_parameters(model, segment, history.when[o + j], member_state, history.stage[o + j], z, j, out)
 
 
 @kernel
-def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):
+def _add_laws(model, k, segment, t, member_state, r, u, j, seen, out):
     """Add the derivatives by alpha^mu of the members of block k, no inerters, at one stage.
 
     Constant:
@@ -97,7 +97,7 @@ def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       r (POSE,): relative pose of the block's pair.
       u (R, stages, n_pair, 3): virtual changes -T z of the relative poses.
       j: the stage, counted from the first of the step.
@@ -116,8 +116,8 @@ def _add_laws(model, k, segment, t, strength, r, u, j, seen, out):
         f = 0.0
         if length > 0.0:
             rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - strength[2, i]
-            f, _, _, _, _ = law(model.block[k, 3], p, x, rate, int(strength[1, i]), t, value, model.curves)
+            x = stretched(model.member, i, r, length) - member_state[2, i]
+            f, _, _, _, _ = law(model.block[k, 3], p, x, rate, int(member_state[1, i]), t, value, model.curves)
         seen[0, e] = f
         seen[1, e] = bx
         seen[2, e] = by
@@ -149,13 +149,13 @@ def _add_inerters(model, k, stage, z, j, out):
 
 
 @kernel
-def _add_parameters(model, segment, t, strength, stage, z, j, out):
+def _add_parameters(model, segment, t, member_state, stage, z, j, out):
     """Add the derivatives by the laws' parameters at one stage: `parameters.add_parameters` of rows, without energy.
 
     model: the compiled scene.
     segment: number of the stretch of time between two breakpoints.
     t: time (s).
-    strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     stage (3, n): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
     z (R, 17, n): virtual displacements of each row at each stage.
     j: the stage, counted from the first of the step.
@@ -173,9 +173,9 @@ def _add_parameters(model, segment, t, strength, stage, z, j, out):
         total[:] = 0.0
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
             slope, _ = parameter_slopes(
-                model, k, i, place, segment, t, strength, stage[0], stage[1], stage[2], row, row_rate
+                model, k, i, place, segment, t, member_state, stage[0], stage[1], stage[2], row, row_rate
             )
             for m in range(out.shape[0]):
-                total[m] -= strength[0, i] * (slope * rate_of_row(model, model.block[k, 0], row, z[m, j]))
+                total[m] -= member_state[0, i] * (slope * rate_of_row(model, model.block[k, 0], row, z[m, j]))
         for m in range(out.shape[0]):
             out[m, members + model.varied[e, 2]] += total[m]

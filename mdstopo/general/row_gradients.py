@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mdstopo.general.extremes import COLUMNS, FRACTION, SIGN, STEP, parts
-from mdstopo.general.landings import INTEGRALS
+from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
@@ -57,13 +57,13 @@ class RowGradients:
             block.which[:] = [(j, aside) for j, _, aside, _, _ in part]
             block.rows[:] = [row for *_, row in part]
             driver.ready(
-                f"pull_rows {len(part)}", driver.entry.pull_rows, *driver.steps_arguments(count), block.which,
-                block.rows, driver.room, driver.room_ints, driver.strength, block.padded, block.out, block.starts,
+                f"pull_rows {len(part)}", driver.entry.rows_vjp, *driver.steps_arguments(count), block.which,
+                block.rows, driver.room, driver.room_ints, driver.member_state, block.padded, block.out, block.starts,
                 driver.work,
             )  # fmt: skip
             for (j, r, aside, share, _), own, start in zip(part, block.out, block.starts, strict=True):
                 if driver.start is not None:
-                    driver.start.pull(start, own)
+                    driver.start.vjp(start, own)
                 if aside and across is not None:
                     across[j, r] += share * own
                 else:
@@ -80,7 +80,7 @@ class RowGradients:
             np.zeros((count, COLUMNS)),
             np.zeros((count, len(driver.padded))),
             np.zeros((count, driver.gradients.shape[2])),
-            np.zeros((count, len(driver.pulled_start))),
+            np.zeros((count, len(driver.start_vjp))),
         )
         if count <= KEPT:
             self._blocks[count] = block

@@ -2,47 +2,49 @@
 
 All rows go through the steps together, so what a step needs (tangents, factors, the members' forces and directions) is
 read or formed once for all of them; each row joins at its own step. A point inside a step that needs a step of its own
-(`duties`, 1) is gone through by its row alone before it joins. The arithmetic of each row is what it is alone.
+(`method_interface`) is gone through by its row alone before it joins. The arithmetic of each row is what it is alone.
 """
 
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.adjoint import row_cotangents, through_events
-from mdstopo.general.balance import make_desk
-from mdstopo.general.duties import step_back
+from mdstopo.general.accelerations import make_workspace
+from mdstopo.general.adjoint import apply_saltation_transposed, row_cotangents
 from mdstopo.general.gather import add_designs
 from mdstopo.general.members import unscale_general
+from mdstopo.general.method_interface import step_back
 from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
 from mdstopo.general.permanent_sets import add_sets, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
-from mdstopo.general.track import carve_track, restore_modes
+from mdstopo.general.step_history import carve_history, restore_modes
 
 
 @kernel
-def step_of_rows(tag, model, tables, strength, track, count, w, c, lam_q, lam_v, lam_x, bar_set, z, y, desk, out, work):
+def step_of_rows(
+    tag, model, tables, member_state, history, count, w, c, lam_q, lam_v, lam_x, bar_set, z, y, workspace, out, work
+):
     """Pull the cotangents of R rows through one step back to its start, and to before the events there.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables: coefficients of the method.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
       count: number of steps.
     In:
       w: number of the step.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes change on the way.
       c (R,): the fraction of the step whose state each row's cotangents belong to; becomes 1.
       lam_q, lam_v (R, n): cotangents of coordinates and velocities.
-      lam_x (R, 2, n): those of what the method carries from step to step besides (`duties`).
+      lam_x (R, 2, n): those of what the method carries from step to step besides (`method_interface`).
       bar_set (R, slots): those of the permanent sets.
     Out:
       z (R, 17, n): virtual displacements of the stages' balances.
       y (n_row,): scratch.
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       out (R, M_padded + P): derivatives by alpha^mu and values, added to.
       work (WORK,): counts of work, added to.
 
@@ -51,36 +53,40 @@ def step_of_rows(tag, model, tables, strength, track, count, w, c, lam_q, lam_v,
     none = np.empty((0, 3, lam_q.shape[1]))
     no_rows = np.empty((0, model.size[0]))
     no_drops = np.empty(0)
-    o = track.index[w, 0]
-    stages = track.index[w + 1, 0] - o
-    segment = track.index[w, 2]
-    step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, none, no_rows, z, y, desk, work)
-    restore_modes(track, track.index[w, 3], strength)
+    o = history.index[w, 0]
+    stages = history.index[w + 1, 0] - o
+    segment = history.index[w, 2]
+    step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, none, no_rows, z, y, workspace, work)
+    restore_modes(history, history.index[w, 3], member_state)
     if z.shape[0] == 1:
-        add_designs(model, segment, track, o, strength, z[0, :stages], out[0], work)
+        add_designs(model, segment, history, o, member_state, z[0, :stages], out[0], work)
     else:
-        add_designs_of_rows(model, segment, track, o, stages, strength, z, out, work)
-    before = track.index[w, 1]
+        add_designs_of_rows(model, segment, history, o, stages, member_state, z, out, work)
+    before = history.index[w, 1]
     for m in range(lam_q.shape[0]):
         if bar_set.shape[1] > 0:
-            restore_modes(track, track.index[w, 3], strength)
+            restore_modes(history, history.index[w, 3], member_state)
             for j in range(stages):
-                stage = track.stage[o + j]
-                add_sets(model, segment, strength, stage[0], stage[1], z[m, j], 0.0, bar_set[m])
+                stage = history.stage[o + j]
+                add_sets(model, segment, member_state, stage[0], stage[1], z[m, j], 0.0, bar_set[m])
         if model.varied.shape[0] > 0:
-            add_times(model, track, strength, count, before + 1, np.int64(-1), np.bool_(False), lam_v[m], 0.0, out[m])
+            add_times(
+                model, history, member_state, count, before + 1, np.int64(-1), np.bool_(False), lam_v[m], 0.0, out[m]
+            )
         if before >= 0:
-            through_events(model, track, before + 1, lam_q[m], lam_v[m], bar_set[m], no_drops, strength, out[m])
+            apply_saltation_transposed(
+                model, history, before + 1, lam_q[m], lam_v[m], bar_set[m], no_drops, member_state, out[m]
+            )
         c[m] = 1.0
     return before
 
 
 @kernel
-def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk, starts, out, work):
+def rows_gradients(tag, model, tables, member_state, history, count, which, rows, workspace, starts, out, work):
     """Differentiate R rows of `extremes` by alpha^mu and the laws' values, in one sweep backwards over the steps.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables: coefficients of the method.
       count: number of steps.
@@ -89,10 +95,10 @@ def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk
         (`adjoint.row_cotangents`), else 0.
       rows (R, COLUMNS): the rows, the latest first.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      track: the history of steps (`Track`); partial steps are kept behind it.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      history: the history of steps (`StepHistory`); partial steps are kept behind it.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       starts (R, n): cotangents of the start's positions; or (R, 0): not wanted.
       out (R, M_padded + P): the derivatives.
       work (WORK,): counts of work, added to.
@@ -110,16 +116,16 @@ def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk
     y = np.empty(model.size[0])
     for m in range(total):
         w, fraction[m] = row_cotangents(
-            tag, model, tables, strength, track, count, which[m, 0], rows[m], which[m, 1] != 0, desk, bars, bar_set[m],
-            out[m], work,
+            tag, model, tables, member_state, history, count, which[m, 0], rows[m], which[m, 1] != 0, workspace, bars,
+            bar_set[m], out[m], work,
         )  # fmt: skip
         lam_q[m] = bars[0]
         lam_v[m] = bars[1]
         if w > count:
             own = slice(m, m + 1)
             w = step_of_rows(
-                tag, model, tables, strength, track, count, w, fraction[own], lam_q[own], lam_v[own], lam_x[own],
-                bar_set[own], z[own], y, desk, out[own], work,
+                tag, model, tables, member_state, history, count, w, fraction[own], lam_q[own], lam_v[own], lam_x[own],
+                bar_set[own], z[own], y, workspace, out[own], work,
             )  # fmt: skip
         begins[m] = w
     w = begins[0] if total > 0 else -1
@@ -128,24 +134,39 @@ def rows_gradients(tag, model, tables, strength, track, count, which, rows, desk
         while active < total and begins[active] >= w:
             active += 1
         w = step_of_rows(
-            tag, model, tables, strength, track, count, w, fraction[:active], lam_q[:active], lam_v[:active],
-            lam_x[:active], bar_set[:active], z[:active], y, desk, out[:active], work,
+            tag, model, tables, member_state, history, count, w, fraction[:active], lam_q[:active], lam_v[:active],
+            lam_x[:active], bar_set[:active], z[:active], y, workspace, out[:active], work,
         )  # fmt: skip
     for m in range(total):
-        keep_start(model, track, lam_q[m], bar_set[m], starts[m], out[m])
+        keep_start(model, history, lam_q[m], bar_set[m], starts[m], out[m])
 
 
 @entry
-def pull_rows(
-    tag, ints, floats, tables, alpha, limits, count, which, rows, room, room_ints, strength, padded, out, starts, work
+def rows_vjp(
+    tag,
+    ints,
+    floats,
+    tables,
+    alpha,
+    limits,
+    count,
+    which,
+    rows,
+    room,
+    room_ints,
+    member_state,
+    padded,
+    out,
+    starts,
+    work,
 ):
     """Differentiate R rows of `extremes` by alpha and the laws' values, in one sweep backwards over the steps.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       ints, floats: the packed scene (`pack_general`).
       tables: coefficients of the method.
-      limits (6,): sizes of the history of steps (`carve_track`).
+      limits (6,): sizes of the history of steps (`carve_history`).
     In:
       alpha (N,): the design.
       count: number of steps.
@@ -153,8 +174,8 @@ def pull_rows(
         (`adjoint.row_cotangents`), else 0.
       rows (R, COLUMNS): the rows, the latest first.
     In place:
-      room, room_ints: flat arrays of the history of steps (`carve_track`); partial steps are kept behind it.
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      room, room_ints: flat arrays of the history of steps (`carve_history`); partial steps are kept behind it.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out:
       padded (R, M_padded + P): derivatives by alpha^mu, then by the values of the laws' variables.
       out (R, N + P): derivatives by alpha, then by these values.
@@ -162,8 +183,8 @@ def pull_rows(
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
-    rows_gradients(tag, model, tables, strength, track, count, which, rows, desk, starts, padded, work)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
+    rows_gradients(tag, model, tables, member_state, history, count, which, rows, workspace, starts, padded, work)
     for m in range(rows.shape[0]):
         unscale_general(model.block, model.power, alpha, padded[m], out[m])

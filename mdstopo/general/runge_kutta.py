@@ -8,12 +8,12 @@ that a switching member's margin does not survive is shortened until it ends at 
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
 from mdstopo.general.forces import drive_state, pose_acceleration
-from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_look
+from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_trial
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
@@ -27,8 +27,8 @@ from mdstopo.general.singular_poses import (
     step_beside,
     way_to_pose,
 )
+from mdstopo.general.step_history import carve_history, copy_vector, has_factors, keep_stage, keep_state
 from mdstopo.general.switches import APART, THOROUGH
-from mdstopo.general.track import carve_track, copy_vector, has_factors, keep_stage, keep_state
 from mdstopo.integrators.runge_kutta import MOST, _error
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
 from mdstopo.integrators.steps import (
@@ -67,7 +67,27 @@ CHATTER = 400
 
 @kernel
 def advance(
-    model, table, s, strength, segment, t, h, q0, v0, tangent, o, desk, lam, q, v, a, track, ends, push, size, work
+    model,
+    table,
+    s,
+    member_state,
+    segment,
+    t,
+    h,
+    q0,
+    v0,
+    tangent,
+    o,
+    workspace,
+    lam,
+    q,
+    v,
+    a,
+    history,
+    ends,
+    push,
+    size,
+    work,
 ):
     """Make one step, and put its end onto the joints.
 
@@ -77,17 +97,17 @@ def advance(
       s: number of its stages.
       size: size of the scene (m).
     In:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t, h: time at the start, and length of the step (s).
       q0, v0 (n,): coordinates and velocities at the start (m, rad; m/s, rad/s).
       tangent: whether the tangents of the stages are wanted.
-      o: number of the first stage as which they are kept in `track`; -1: they are not kept.
+      o: number of the first stage as which they are kept in `history`; -1: they are not kept.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       lam (n_row,): multipliers of the joints at the last stage.
       q, v, a (s or more, n): coordinates, velocities, accelerations of the stages.
-      track: the history of steps (`Track`), where stages are kept.
+      history: the history of steps (`StepHistory`), where stages are kept.
       ends (2, n): coordinates and velocities at the end.
       push (2, n_row): the multipliers of the projection there.
       work (WORK,): counts of work, added to.
@@ -96,8 +116,8 @@ def advance(
     """
     n = q0.shape[0]
     vectors = table[2]
-    desk.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
-    desk.switches[APART] = 1 if has_factors(track) else 0
+    workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
+    workspace.switches[APART] = 1 if has_factors(history) else 0
     for i in range(s):
         for d in range(n):
             q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
@@ -112,16 +132,16 @@ def advance(
                 for d in range(n):
                     v[i, d] += u * a[j, d]
         time = t + h * vectors[0, i]
-        singular = balance(model, strength, segment, time, q[i], v[i], tangent, desk, a[i], lam)
+        singular = solve_accelerations(model, member_state, segment, time, q[i], v[i], tangent, workspace, a[i], lam)
         work[FORCES] += 1
         if singular >= 0:
-            desk.switches[THOROUGH] = 1
-            desk.switches[APART] = 0
+            workspace.switches[THOROUGH] = 1
+            workspace.switches[APART] = 0
             return singular
         if o >= 0:
-            keep_stage(track, o + i, time, q[i], v[i], a[i], lam, desk, tangent)
-    desk.switches[THOROUGH] = 1
-    desk.switches[APART] = 0
+            keep_stage(history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
+    workspace.switches[THOROUGH] = 1
+    workspace.switches[APART] = 0
     if tangent:
         work[TANGENTS] += s
     for d in range(n):
@@ -133,7 +153,7 @@ def advance(
         ends[0, d] = position
         ends[1, d] = speed
     drive_state(model, segment, t + h, ends[0], ends[1])
-    return project(model, size, ends[0], ends[1], desk, push[0], push[1])
+    return project(model, size, ends[0], ends[1], workspace, push[0], push[1])
 
 
 @kernel
@@ -148,7 +168,7 @@ def scene_size(model):
 
 
 @kernel
-def start_modes(model, strength, desk, q, v, a, lam, knots):
+def start_modes(model, member_state, workspace, q, v, a, lam, knots):
     """Set the modes and permanent sets at the start: by elongation, then by its rate, then by its second derivative.
 
     The last is that of a balance with the modes that elongations and rates tell.
@@ -157,10 +177,10 @@ def start_modes(model, strength, desk, q, v, a, lam, knots):
       model: the compiled scene.
       knots: whether each piece of a curve is a mode (`members.set_modes`).
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q, v (n,): the start (m, rad; m/s, rad/s); driven parts are put in place.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       a (n,), lam (n_row,): accelerations and multipliers of that balance.
 
     Returns the place of an unknown at which the joints are singular, or -1.
@@ -170,9 +190,11 @@ def start_modes(model, strength, desk, q, v, a, lam, knots):
     second = np.zeros((n_pair, 3))
     relative_pose(model.pair, model.home, q, v, rel)
     for attempt in range(2):
-        set_modes(model, strength, rel, second, knots)
+        set_modes(model, member_state, rel, second, knots)
         if attempt == 0:
-            singular = balance(model, strength, np.int64(0), model.times[0], q, v, np.bool_(False), desk, a, lam)
+            singular = solve_accelerations(
+                model, member_state, np.int64(0), model.times[0], q, v, np.bool_(False), workspace, a, lam
+            )
             if singular >= 0:
                 return singular
             for p in range(n_pair):
@@ -181,7 +203,9 @@ def start_modes(model, strength, desk, q, v, a, lam, knots):
 
 
 @kernel
-def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, events, graze, noise, work, where):
+def log_switches(
+    model, member_state, segment, t, q, v, workspace, a, lam, history, state, events, graze, noise, work, where
+):
     """Switch every member whose margin is used up, one after the other, and note each as an event.
 
     The loop ends because each member switches at most twice here.
@@ -197,12 +221,12 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
       graze: a member whose margin would fall below zero by less than this only grazes (m).
       noise: margins that are below zero by no more than this are rounding.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       a (n,): accelerations before the first event, then behind the last one.
-      track: the history of steps (`Track`), which takes the events.
+      history: the history of steps (`StepHistory`), which takes the events.
       where (3,): where[2] becomes a member that grazes so that the motion has no derivative.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       lam (n_row,): multipliers of the joints behind the last event.
       work (WORK,): counts of work, added to.
 
@@ -214,54 +238,54 @@ def log_switches(model, strength, segment, t, q, v, desk, a, lam, track, state, 
     relative_pose(model.pair, model.home, q, v, rel)
     done = 0
     while True:
-        margin, who = smallest_margin(model, segment, strength, rel)
-        if not margin < -noise or done > 2 * strength.shape[1]:
+        margin, who = smallest_margin(model, segment, member_state, rel)
+        if not margin < -noise or done > 2 * member_state.shape[1]:
             return events
-        if events >= track.event.shape[0]:
+        if events >= history.event.shape[0]:
             return -1
-        salt = track.salt[events]
-        new, beyond, kind, by_set, grown = switch_any(model, segment, strength, rel, q, v, a, who, salt)
-        old = int(strength[1, who])
+        saltation = history.saltation[events]
+        new, beyond, kind, by_set, grown = switch_any(model, segment, member_state, rel, q, v, a, who, saltation)
+        old = int(member_state[1, who])
         if beyond < graze and kind == 2:
             where[2] = who
-        track.event[events, 0] = state
-        track.event[events, 1] = who
-        track.event[events, 2] = old
-        track.event[events, 3] = new
-        track.event[events, 4] = 1 if beyond < graze and kind > 0 else 0
-        track.kept[events, 0] = strength[2, who]
-        strength[2, who] += grown
-        track.kept[events, 1] = strength[2, who]
-        track.kept[events, 2] = by_set
-        strength[1, who] = new
+        history.event[events, 0] = state
+        history.event[events, 1] = who
+        history.event[events, 2] = old
+        history.event[events, 3] = new
+        history.event[events, 4] = 1 if beyond < graze and kind > 0 else 0
+        history.kept[events, 0] = member_state[2, who]
+        member_state[2, who] += grown
+        history.kept[events, 1] = member_state[2, who]
+        history.kept[events, 2] = by_set
+        member_state[1, who] = new
         events += 1
-        strength[1, strength.shape[1] - 1] = events
+        member_state[1, member_state.shape[1] - 1] = events
         done += 1
         for d in range(n):
-            salt[2, d] = a[d]
-        balance(model, strength, segment, t, q, v, np.bool_(False), desk, a, lam)
+            saltation[2, d] = a[d]
+        solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
         work[FORCES] += 1
         for d in range(n):
-            salt[2, d] -= a[d]
+            saltation[2, d] -= a[d]
         if new == old:
             return events
 
 
 @entry
-def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, strength, work, where):
+def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_ints, member_state, work, where):
     """Integrate the motion of a design over model.times.
 
     Constant:
       ints, floats: the packed scene (`pack_general`).
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
       settings (4,): the tolerance; -; a fixed step (s; above 0: no error control); -.
-      limits (6,): steps allowed, then sizes of the history of steps (`carve_track`).
+      limits (6,): steps allowed, then sizes of the history of steps (`carve_history`).
     In:
       alpha (N,): the design.
       tangent: whether tangents are kept for a reverse sweep.
     Out:
-      room, room_ints: flat arrays of the history of steps (`carve_track`).
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member, at the end.
+      room, room_ints: flat arrays of the history of steps (`carve_history`).
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member, at the end.
       work (WORK,): counts of work, added to.
       where (3,): each -1 where there is none: the member or the unknown that is to blame for an early end; a member
         whose ends have met; a member that grazes so that the motion has no derivative.
@@ -275,11 +299,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     n_row = model.size[0]
-    track = carve_track(model, limits, room, room_ints)
-    track.mass[0] = 0.0
-    scale_general(model.block, model.power, alpha, strength)
-    strength[1] = 0.0
-    strength[2] = 0.0
+    history = carve_history(model, limits, room, room_ints)
+    history.mass[0] = 0.0
+    scale_general(model.block, model.power, alpha, member_state)
+    member_state[1] = 0.0
+    member_state[2] = 0.0
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     order = ORDERS[method]
@@ -287,7 +311,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     pair = model.pair
     times = model.times
     reach = model.reach
-    desk = make_desk(model)
+    workspace = make_workspace(model)
     no = np.bool_(False)
     nowhere = np.int64(-1)
     keep = np.bool_(tangent)
@@ -324,18 +348,18 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     braking = -1  # the contact that brakes most
     held = 0  # steps in a row that were kept short by that rate
     if switching:
-        singular = start_modes(model, strength, desk, q0, v0, a0, lam, np.bool_(True))
+        singular = start_modes(model, member_state, workspace, q0, v0, a0, lam, np.bool_(True))
         if singular >= 0:
             where[0] = singular
             return SINGULAR, 0, 0, t
         if model.varied.shape[0] > 0:
-            where[2] = begins_divided(model, strength, q0, v0, graze)
-    singular = balance(model, strength, np.int64(0), t, q0, v0, np.bool_(True), desk, a0, lam)
+            where[2] = begins_divided(model, member_state, q0, v0, graze)
+    singular = solve_accelerations(model, member_state, np.int64(0), t, q0, v0, np.bool_(True), workspace, a0, lam)
     work[FORCES] += 1
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
-    sigma = least_singular_value(model, desk)
+    sigma = least_singular_value(model, workspace)
     largest = sigma
     way = np.inf  # time until the next pose at which joints repeat each other
     must = True
@@ -345,42 +369,42 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     scale = np.empty(n_pair)
     shaken = 0.0
     for p in range(n_pair):
-        scale[p] = desk.sums[p, 7] + desk.sums[p, 11]
-        if desk.sums[p, 3] > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * desk.sums[p, 3] / scale[p])  # members of the pair store energy at the start
-    rounding_at_start(model, strength, rel0, v0, scale, motion, noise)
+        scale[p] = workspace.sums[p, 7] + workspace.sums[p, 11]
+        if workspace.sums[p, 3] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * workspace.sums[p, 3] / scale[p])  # members of the pair store energy at the start
+    rounding_at_start(model, member_state, rel0, v0, scale, motion, noise)
     for p in range(n_pair):
         shaken += abs(scale[p]) * noise[p]
-    # the modes at the start, to which events lead back (`track.restore_modes`), are events of state 0
+    # the modes at the start, to which events lead back (`restore_modes`), are events of state 0
     events = np.int64(0)
     if switching:
-        for i in range(strength.shape[1] - 1):
-            if strength[1, i] != 0.0:
-                if events >= track.event.shape[0]:
+        for i in range(member_state.shape[1] - 1):
+            if member_state[1, i] != 0.0:
+                if events >= history.event.shape[0]:
                     return NEEDS_ROOM, 0, 0, t
-                track.event[events, 0] = 0
-                track.event[events, 1] = i
-                track.event[events, 2] = 0
-                track.event[events, 3] = int(strength[1, i])
-                track.event[events, 4] = 0
-                track.kept[events, 0] = 0.0
-                track.kept[events, 1] = strength[2, i]
-                track.kept[events, 2] = 0.0
-                track.salt[events] = 0.0
+                history.event[events, 0] = 0
+                history.event[events, 1] = i
+                history.event[events, 2] = 0
+                history.event[events, 3] = int(member_state[1, i])
+                history.event[events, 4] = 0
+                history.kept[events, 0] = 0.0
+                history.kept[events, 1] = member_state[2, i]
+                history.kept[events, 2] = 0.0
+                history.saltation[events] = 0.0
                 events += 1
-        strength[1, strength.shape[1] - 1] = events
+        member_state[1, member_state.shape[1] - 1] = events
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = fixed_step
     if not fixed_step > 0.0:
         wanted = first_step(
-            model, strength, times[1], q0, v0, a0, rel0, motion, noise, tolerance, order, desk, lam, q[0], v[0], a[0],
-            work,
+            model, member_state, times[1], q0, v0, a0, rel0, motion, noise, tolerance, order, workspace, lam, q[0],
+            v[0], a[0], work,
         )  # fmt: skip
     if rubbing and not fixed_step > 0.0:
-        brake, braking = brake_rate(model, strength, q0, v0, BRAKED / wanted, desk)
-    keep_state(track, 0, t, q0, v0, push[0], push[1])
-    track.index[0, 0] = 0
+        brake, braking = brake_rate(model, member_state, q0, v0, BRAKED / wanted, workspace)
+    keep_state(history, 0, t, q0, v0, push[0], push[1])
+    history.index[0, 0] = 0
     count = np.int64(0)
     stages = np.int64(0)
     longest = 0.0
@@ -390,20 +414,20 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
         end = times[segment + 1]
         if segment > 0:
             drive_state(model, segment, t, q0, v0)
-            keep_state(track, count, t, q0, v0, track.push[count, 0], track.push[count, 1])
+            keep_state(history, count, t, q0, v0, history.push[count, 0], history.push[count, 1])
             if switching:
                 # a member whose law begins to act at this time may be on either side of its switch
-                balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
+                solve_accelerations(model, member_state, segment, t, q0, v0, no, workspace, a0, lam)
                 first = events
                 events = log_switches(
-                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, -1.0, rounding,
+                    model, member_state, segment, t, q0, v0, workspace, a0, lam, history, count, events, -1.0, rounding,
                     work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
-                    track.salt[e] = 0.0  # the time is given: it does not vary with the design
-                    track.kept[e, 2] = 0.0
+                    history.saltation[e] = 0.0  # the time is given: it does not vary with the design
+                    history.kept[e, 2] = 0.0
         while t < end:
             where[0] = -1
             held = held + 1 if wanted * brake > BRAKED else 0
@@ -424,11 +448,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     lands = False
             if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
                 return STEP_TOO_SMALL, count, events, t
-            if count + 4 > track.t.shape[0] or stages + 2 * s > track.when.shape[0]:
+            if count + 4 > history.t.shape[0] or stages + 2 * s > history.when.shape[0]:
                 return NEEDS_ROOM, count, events, t
             singular = advance(
-                model, table, s, strength, segment, t, h, q0, v0, keep, stages, desk, lam, q, v, a, track, ends,
-                push, size, work,
+                model, table, s, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q, v, a, history,
+                ends, push, size, work,
             )  # fmt: skip
             if singular >= 0:
                 # a long step may have gone beyond a singular pose, a shorter one need not; a very short one is at it
@@ -439,7 +463,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 must = False
                 work[REJECTED] += 1
                 continue
-            sigma_end = least_singular_value(model, desk)
+            sigma_end = least_singular_value(model, workspace)
             relative_pose(pair, model.home, ends[0], ends[1], rel)
             motion_scale(pair, ends[0], rel, rel0, reach, motion, noise, tolerance, scale)
             motion_weights(pair, rel, reach, scale, weight)
@@ -448,11 +472,11 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             lasting = longest if sigma >= CLOSE * largest else 0.0
             error = _error(table[2], s, h, lasting, a, weight)
             if crosses(h, way):
-                error = error_along(model, desk, table[2], s, h, a, weight, error, sigma_end)
+                error = error_along(model, workspace, table[2], s, h, a, weight, error, sigma_end)
             if rubbing:
                 copy_vector(q0, left[0])
                 copy_vector(v0, left[1])
-                grip = friction_error(model, strength, table[2], s, h, left, ends, a, noise, shaken, tolerance)
+                grip = friction_error(model, member_state, table[2], s, h, left, ends, a, noise, shaken, tolerance)
                 if grip > error or not np.isfinite(grip):
                     error = grip
             finite = True
@@ -482,7 +506,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     continue
             happens = False
             if switching:
-                margin, who = smallest_margin(model, segment, strength, rel)
+                margin, who = smallest_margin(model, segment, member_state, rel)
                 low = 0.0
                 high = h
                 # pieces of the step that are still to be looked at, the next one last: from `low` to cut[top]
@@ -496,7 +520,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(pair, model.home, left[0], left[1], before)
                     relative_pose(pair, model.home, beyond[top, 0], beyond[top, 1], rel)
                     dip, near = first_sign(
-                        model, segment, strength, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
+                        model, segment, member_state, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
                         cut[top] - low, rounding,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
@@ -511,45 +535,45 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     top += 1
                     cut[top] = middle
                     advance(
-                        model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
-                        track, beyond[top], push, size, work,
+                        model, table, s, member_state, segment, t, middle, q0, v0, no, nowhere, workspace, lam, q, v, a,
+                        history, beyond[top], push, size, work,
                     )  # fmt: skip
                     relative_pose(pair, model.home, beyond[top, 0], beyond[top, 1], rel)
-                    value, near_who = smallest_margin(model, segment, strength, rel)
+                    value, near_who = smallest_margin(model, segment, member_state, rel)
                     if value < -rounding:
                         high = middle
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, strength, rel, near_who):
+                    if value < graze and matters(model, member_state, rel, near_who):
                         where[2] = near_who
                 relative_pose(pair, model.home, left[0], left[1], before)
                 happens = margin < -rounding
                 if happens:
-                    at_low, _ = smallest_margin(model, segment, strength, before)
+                    at_low, _ = smallest_margin(model, segment, member_state, before)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
                     for look in range(LOOKS):
-                        middle = next_look(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
+                        middle = next_trial(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
                         if middle < 0.0:
                             break
                         advance(
-                            model, table, s, strength, segment, t, middle, q0, v0, no, nowhere, desk, lam, q, v, a,
-                            track, trial, push, size, work,
+                            model, table, s, member_state, segment, t, middle, q0, v0, no, nowhere, workspace, lam, q,
+                            v, a, history, trial, push, size, work,
                         )  # fmt: skip
                         relative_pose(pair, model.home, trial[0], trial[1], rel)
-                        value, who = smallest_margin(model, segment, strength, rel)
+                        value, who = smallest_margin(model, segment, member_state, rel)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
                         )
                     h = high
                     lands = lands and h >= end - t
                     singular = advance(
-                        model, table, s, strength, segment, t, h, q0, v0, keep, stages, desk, lam, q, v, a,
-                        track, ends, push, size, work,
+                        model, table, s, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q, v, a,
+                        history, ends, push, size, work,
                     )  # fmt: skip
-                    sigma_end = least_singular_value(model, desk)
+                    sigma_end = least_singular_value(model, workspace)
                 relative_pose(pair, model.home, ends[0], ends[1], rel)
             largest = max(largest, sigma_end)
             way = way_to_pose(h, sigma, sigma_end, largest)
@@ -559,26 +583,26 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
             if where[1] < 0:
                 relative_pose(pair, model.home, q0, v0, before)
-                where[1] = meeting(model, segment, t, strength, before, rel)
+                where[1] = meeting(model, segment, t, member_state, before, rel)
             happened = events
             t = end if lands else t + h
             longest = max(longest, h)
             for d in range(n):
                 q0[d] = ends[0, d]
                 v0[d] = ends[1, d]
-            track.index[count, 1] = count - 1
-            track.index[count, 2] = segment
-            track.index[count, 3] = happened
+            history.index[count, 1] = count - 1
+            history.index[count, 2] = segment
+            history.index[count, 3] = happened
             stages += s
             count += 1
-            track.index[count, 0] = stages
-            keep_state(track, count, t, q0, v0, push[0], push[1])
+            history.index[count, 0] = stages
+            keep_state(history, count, t, q0, v0, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
-                balance(model, strength, segment, t, q0, v0, no, desk, a0, lam)
+                solve_accelerations(model, member_state, segment, t, q0, v0, no, workspace, a0, lam)
                 events = log_switches(
-                    model, strength, segment, t, q0, v0, desk, a0, lam, track, count, events, graze, rounding,
-                    work, where,
+                    model, member_state, segment, t, q0, v0, workspace, a0, lam, history, count, events, graze,
+                    rounding, work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
@@ -589,6 +613,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     where[0] = who
                     return CHATTERING, count, events, t
             if rubbing and not fixed_step > 0.0:
-                brake, braking = brake_rate(model, strength, q0, v0, BRAKED / wanted, desk)
-            track.index[count, 3] = events
+                brake, braking = brake_rate(model, member_state, q0, v0, BRAKED / wanted, workspace)
+            history.index[count, 3] = events
     return OK, count, events, t

@@ -1,10 +1,10 @@
 """What the driver calls of the explicit methods for general scenes."""
 
-import mdstopo.general.runge_kutta_duties  # noqa: F401  (enters the method's duties)
+import mdstopo.general.runge_kutta_sensitivity  # noqa: F401  (enters the method's functions)
+from mdstopo.general.dense_output import compare, sample_response
 from mdstopo.general.direct import follow, push
-from mdstopo.general.look import pull
-from mdstopo.general.row_sweep import pull_rows
+from mdstopo.general.integral_gradients import integral_with_gradient
+from mdstopo.general.row_sweep import rows_vjp
 from mdstopo.general.runge_kutta import TAG, simulate
-from mdstopo.general.visit import compare, visit
 
-__all__ = ["TAG", "compare", "follow", "pull", "pull_rows", "push", "simulate", "visit"]
+__all__ = ["TAG", "compare", "follow", "integral_with_gradient", "push", "rows_vjp", "sample_response", "simulate"]

@@ -165,7 +165,9 @@ class _AtRest:
         from mdstopo.general.settle_entry import statics
 
         d = self._driver
-        statics(d.ints, d.floats, self._alpha, d.strength, q, self._lam, self.force, self._dense, self._rows, self._phi)
+        statics(
+            d.ints, d.floats, self._alpha, d.member_state, q, self._lam, self.force, self._dense, self._rows, self._phi
+        )
         root = self._root
         self.stiffness = self._dense[np.ix_(self.free, self.free)] / root[:, None] / root
         self.pull = self.force[self.free] / root

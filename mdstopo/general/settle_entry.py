@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.balance import joint_slopes, joint_state, make_desk
+from mdstopo.general.accelerations import joint_slopes, joint_state, make_workspace
 from mdstopo.general.direct import own_force
 from mdstopo.general.forces import drive_state, general_forces
 from mdstopo.general.members import scale_general, set_modes
@@ -14,19 +14,19 @@ from mdstopo.mechanics.laws.table import FREE_LENGTH
 
 
 @kernel
-def rest(model, alpha, strength, q, v):
+def rest(model, alpha, member_state, q, v):
     """Put scales, modes and sets of members at rest at q (n,): v (n,) becomes 0, what is driven is put in place."""
-    scale_general(model.block, model.power, alpha, strength)
+    scale_general(model.block, model.power, alpha, member_state)
     drive_state(model, np.int64(0), model.times[0], q, v)
     v[:] = 0.0
     n_pair = model.pair.shape[0]
     rel = np.empty((n_pair, POSE))
     relative_pose(model.pair, model.home, q, v, rel)
-    set_modes(model, strength, rel, np.zeros((n_pair, 3)), np.bool_(True))
+    set_modes(model, member_state, rel, np.zeros((n_pair, 3)), np.bool_(True))
 
 
 @entry
-def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
+def statics(ints, floats, alpha, member_state, q, lam, force, stiffness, rows, phi):
     """Forces and their stiffness at rest; damping, rates and inerters have no part in it.
 
     Constant:
@@ -37,43 +37,43 @@ def statics(ints, floats, alpha, strength, q, lam, force, stiffness, rows, phi):
     In place:
       q (n,): coordinates (m, rad); the driven ones are put in place.
     Out:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       force (n,): F without the joints' part (N, N m).
       stiffness (n, n): -dF/dq + d(Phi_q^T lam)/dq.
       rows (n_row, n): Phi_q.
       phi (n_row,): Phi (m or rad).
     """
     model = unpack_general(ints, floats)
-    desk = make_desk(model)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     v = np.zeros(n)
-    rest(model, alpha, strength, q, v)
-    general_forces(model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk)
-    joint_state(model, q, v, desk)
-    joint_slopes(model, q, v, np.zeros(n), lam, desk)
+    rest(model, alpha, member_state, q, v)
+    general_forces(model, member_state, np.int64(0), model.times[0], q, v, np.bool_(True), workspace)
+    joint_state(model, q, v, workspace)
+    joint_slopes(model, q, v, np.zeros(n), lam, workspace)
     for d in range(n):
-        force[d] = desk.f[d]
+        force[d] = workspace.f[d]
         for c in range(n):
             stiffness[d, c] = 0.0
     for d in range(n):
-        stiffness[d, d - d % 3 + 2] -= desk.turn[d]
+        stiffness[d, d - d % 3 + 2] -= workspace.turn[d]
     for p in range(model.pair.shape[0]):
         for i in range(6):
             for j in range(6):
                 row = 3 * model.pair[p, i // 3] + i % 3
-                stiffness[row, 3 * model.pair[p, j // 3] + j % 3] += desk.k[p, i, j]
+                stiffness[row, 3 * model.pair[p, j // 3] + j % 3] += workspace.k[p, i, j]
     rows[:] = 0.0
     for j in range(model.joint.shape[0]):
         for r in range(3):
             own = model.row[j, r]
             if own >= 0:
-                phi[own] = desk.phi[j, r]
+                phi[own] = workspace.phi[j, r]
                 for i in range(6):
-                    rows[own, 3 * model.joint[j, 1 + i // 3] + i % 3] += desk.jac[j, r, i]
+                    rows[own, 3 * model.joint[j, 1 + i // 3] + i % 3] += workspace.jac[j, r, i]
 
 
 @entry
-def unit_forces(ints, floats, alpha, strength, q, out):
+def unit_forces(ints, floats, alpha, member_state, q, out):
     """What the alpha^mu of each design member adds to the forces at rest: -f_i B_i^T.
 
     Constant:
@@ -82,7 +82,7 @@ def unit_forces(ints, floats, alpha, strength, q, out):
     In place:
       q (n,): coordinates (m, rad); the driven ones are put in place.
     Out:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       out (M_padded, n): dF/d(alpha^mu) (N, N m); zero for what is no design member, does not act, or is an inerter.
     """
     model = unpack_general(ints, floats)
@@ -90,7 +90,7 @@ def unit_forces(ints, floats, alpha, strength, q, out):
     v = np.zeros(n)
     row = np.empty(6)
     row_rate = np.empty(6)
-    rest(model, alpha, strength, q, v)
+    rest(model, alpha, member_state, q, v)
     for i in range(out.shape[0]):
         for d in range(n):
             out[i, d] = 0.0
@@ -99,13 +99,13 @@ def unit_forces(ints, floats, alpha, strength, q, out):
             continue
         p = model.block[k, 0]
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            f = own_force(model, k, i, np.int64(0), model.times[0], strength, q, v, v, row, row_rate)
+            f = own_force(model, k, i, np.int64(0), model.times[0], member_state, q, v, v, row, row_rate)
             for r in range(6):
                 out[i, 3 * model.pair[p, r // 3] + r % 3] -= f * row[r]
 
 
 @entry
-def value_forces(ints, floats, alpha, strength, q, out):
+def value_forces(ints, floats, alpha, member_state, q, out):
     """What each value of the laws' variables adds to the forces at rest: -sum s f_p B^T over its members.
 
     Times at which laws begin or end to act add nothing, nor does what multiplies rates.
@@ -116,7 +116,7 @@ def value_forces(ints, floats, alpha, strength, q, out):
     In place:
       q (n,): coordinates (m, rad); the driven ones are put in place.
     Out:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       out (P, n): dF/dp (N, N m by the unit of each value).
     """
     model = unpack_general(ints, floats)
@@ -125,7 +125,7 @@ def value_forces(ints, floats, alpha, strength, q, out):
     v = np.zeros(n)
     row = np.empty(6)
     row_rate = np.empty(6)
-    rest(model, alpha, strength, q, v)
+    rest(model, alpha, member_state, q, v)
     out[:] = 0.0
     for e in range(model.varied.shape[0]):
         k = model.varied[e, 0]
@@ -134,7 +134,7 @@ def value_forces(ints, floats, alpha, strength, q, out):
             continue
         p = model.block[k, 0]
         for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            slope, _ = parameter_slopes(model, k, i, place, start, model.times[0], strength, q, v, v, row, row_rate)
-            slope *= strength[0, i]
+            slope, _ = parameter_slopes(model, k, i, place, start, model.times[0], member_state, q, v, v, row, row_rate)
+            slope *= member_state[0, i]
             for r in range(6):
                 out[model.varied[e, 2], 3 * model.pair[p, r // 3] + r % 3] -= slope * row[r]

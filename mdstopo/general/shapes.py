@@ -1,8 +1,8 @@
 """How the value of a response comes from what it is formed of: as it is, as an absolute value, or as a norm."""
 
 from mdstopo.evaluation import Shape
-from mdstopo.general.landings import INTEGRALS
 from mdstopo.general.model import GeneralModel
+from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.general.responses import LISTED, has_norm
 
 

@@ -18,7 +18,7 @@ across it; then steps become shorter until the joints count as singular.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.balance import solve_unknowns
+from mdstopo.general.accelerations import solve_unknowns
 from mdstopo.general.joint_matrix import growth
 from mdstopo.general.switches import OF_JOINTS
 
@@ -37,14 +37,14 @@ SAFE = 1e-3
 
 
 @kernel
-def least_singular_value(model, desk):
-    """An estimate of sigma, at the state whose joints were factorised last on the desk.
+def least_singular_value(model, workspace):
+    """An estimate of sigma, at the state whose joints were factorised last in the workspace.
 
     1 where it is not known: where the factors there are not those of the joints' matrix, or there are no joints.
     """
-    if desk.switches[OF_JOINTS] == 0 or model.envelope.shape[0] == 0:
+    if workspace.switches[OF_JOINTS] == 0 or model.envelope.shape[0] == 0:
         return 1.0
-    size, _ = growth(model.envelope, desk.gram, desk.diagonal, desk.x)
+    size, _ = growth(model.envelope, workspace.gram, workspace.diagonal, workspace.x)
     return np.sqrt(model.envelope.shape[0] / size) if size > 0.0 else 1.0
 
 
@@ -90,7 +90,7 @@ def crosses(h, way):
 
 
 @kernel
-def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):
+def error_along(model, workspace, vectors, s, h, a, weight, whole, sigma):
     """Estimated error of a step across a pose without its part across the joints, relative to the motion.
 
     Constant:
@@ -98,7 +98,7 @@ def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):
       vectors (7 or more, 17): C, BB, B, E_Q, E_V, E2_Q, E2_V of the method (`integrators.runge_kutta_tables`).
       s: number of its stages.
     In:
-      desk: workspace with the factors of the joints' matrix at the end of the step.
+      workspace: workspace with the factors of the joints' matrix at the end of the step.
       h: length of the step (s).
       a (s or more, n): accelerations at its stages (m/s^2, rad/s^2).
       weight (n,): weights of the coordinates (1/m, 1/rad; `integrators.steps.motion_weights`).
@@ -120,7 +120,7 @@ def error_along(model, desk, vectors, s, h, a, weight, whole, sigma):
                 value += vectors[3 + m, j] * a[j, d]
             off[d] = model.mass[d] * value
         rows[:] = 0.0
-        solve_unknowns(model, desk, off, rows)
+        solve_unknowns(model, workspace, off, rows)
         for d in range(n):
             size[m] = max(size[m], h * h * weight[d] * abs(off[d]))
     worst = max(size[0], size[1])

@@ -69,7 +69,7 @@ class SettledStart:
         slopes: FloatArray = np.ascontiguousarray(forces @ self.settled.inverse.T)
         return slopes
 
-    def pull(self, start: FloatArray, out: FloatArray) -> None:
+    def vjp(self, start: FloatArray, out: FloatArray) -> None:
         """out (N + P,) += what the start's positions, with cotangents start (n,), have of the design's derivative."""
         assert self.settled is not None
         driver = self._driver
@@ -88,8 +88,8 @@ class SettledStart:
         from mdstopo.general.settle_entry import unit_forces
 
         out = np.zeros((self._driver.scene.model.member.shape[1], len(self._stated)))
-        ints, floats, alpha, strength, q = self._at_rest()
-        unit_forces(ints, floats, alpha, strength, q, out)
+        ints, floats, alpha, member_state, q = self._at_rest()
+        unit_forces(ints, floats, alpha, member_state, q, out)
         return out
 
     def _value_forces(self) -> FloatArray:
@@ -97,15 +97,15 @@ class SettledStart:
         from mdstopo.general.settle_entry import value_forces
 
         out = np.zeros((len(self._driver.values), len(self._stated)))
-        ints, floats, alpha, strength, q = self._at_rest()
-        value_forces(ints, floats, alpha, strength, q, out)
+        ints, floats, alpha, member_state, q = self._at_rest()
+        value_forces(ints, floats, alpha, member_state, q, out)
         return out
 
     def _at_rest(self) -> tuple[IndexArray, FloatArray, FloatArray, FloatArray, FloatArray]:
         """The packed scene, alpha (N,), room for the members' strengths, and the equilibrium (n,)."""
         assert self.settled is not None
         driver = self._driver
-        return driver.ints, driver.floats, driver.alpha, np.zeros_like(driver.strength), self.settled.q.copy()
+        return driver.ints, driver.floats, driver.alpha, np.zeros_like(driver.member_state), self.settled.q.copy()
 
     def _refuse(self) -> None:
         """Refuse a case whose initial design has nowhere to settle, or whose start velocities do not fit there."""

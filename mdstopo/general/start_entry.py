@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import entry
-from mdstopo.general.balance import balance, joint_state, make_desk
+from mdstopo.general.accelerations import joint_state, make_workspace, solve_accelerations
 from mdstopo.general.forces import drive_state, turn_bodies
 from mdstopo.general.members import scale_general
 from mdstopo.general.model import unpack_general
@@ -41,20 +41,20 @@ def assemble(ints, floats, q, v, move, phi, rates):
       phi, rates (n_joint, 3): Phi (m or rad) and Phi_q v (m/s or rad/s), as many rows as each joint has.
     """
     model = unpack_general(ints, floats)
-    desk = make_desk(model)
+    workspace = make_workspace(model)
     drive_state(model, 0, model.times[0], q, v)
     if move:
         push = np.zeros((2, model.size[0]))
         for _ in range(20):
-            project(model, scene_size(model), q, v, desk, push[0], push[1])
-    turn_bodies(q, desk.turned)
-    joint_state(model, q, v, desk)
+            project(model, scene_size(model), q, v, workspace, push[0], push[1])
+    turn_bodies(q, workspace.turned)
+    joint_state(model, q, v, workspace)
     for j in range(model.joint.shape[0]):
         for r in range(model.joint[j, 4]):
-            phi[j, r] = desk.phi[j, r]
+            phi[j, r] = workspace.phi[j, r]
             rates[j, r] = 0.0
             for i in range(6):
-                rates[j, r] += desk.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
+                rates[j, r] += workspace.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
 
 
 @entry
@@ -80,7 +80,7 @@ def reactions(joint, joint_par, home, row, q, lam, out):
 
 
 @entry
-def linearise(ints, floats, alpha, strength, stiffness, mass, rows):
+def linearise(ints, floats, alpha, member_state, stiffness, mass, rows):
     """Stiffness, mass and constraints of small undamped motion about the start.
 
     Constant:
@@ -88,32 +88,32 @@ def linearise(ints, floats, alpha, strength, stiffness, mass, rows):
     In:
       alpha (N,): the design.
     Out:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       stiffness, mass (n, n): zero before.
       rows (n_row, n): Phi_q; zero before.
     """
     model = unpack_general(ints, floats)
-    desk = make_desk(model)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     q = model.q0.copy()
     v = model.v0.copy()
     a = np.zeros(n)
     lam = np.zeros(model.size[0])
-    scale_general(model.block, model.power, alpha, strength)
-    start_modes(model, strength, desk, q, v, a, lam, np.bool_(True))
-    balance(model, strength, np.int64(0), model.times[0], q, v, np.bool_(True), desk, a, lam)
+    scale_general(model.block, model.power, alpha, member_state)
+    start_modes(model, member_state, workspace, q, v, a, lam, np.bool_(True))
+    solve_accelerations(model, member_state, np.int64(0), model.times[0], q, v, np.bool_(True), workspace, a, lam)
     for d in range(n):
         mass[d, d] = model.mass[d]
-        stiffness[d, d - d % 3 + 2] -= desk.turn[d]
+        stiffness[d, d - d % 3 + 2] -= workspace.turn[d]
     for p in range(model.pair.shape[0]):
         for i in range(6):
             for j in range(6):
                 row = 3 * model.pair[p, i // 3] + i % 3
                 column = 3 * model.pair[p, j // 3] + j % 3
-                stiffness[row, column] += desk.k[p, i, j]
-                mass[row, column] += desk.mass[p, i, j]
+                stiffness[row, column] += workspace.k[p, i, j]
+                mass[row, column] += workspace.mass[p, i, j]
     for j in range(model.joint.shape[0]):
         for r in range(3):
             if model.row[j, r] >= 0:
                 for i in range(6):
-                    rows[model.row[j, r], 3 * model.joint[j, 1 + i // 3] + i % 3] += desk.jac[j, r, i]
+                    rows[model.row[j, r], 3 * model.joint[j, 1 + i // 3] + i % 3] += workspace.jac[j, r, i]

@@ -3,21 +3,21 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.balance import (
+from mdstopo.general.accelerations import (
+    accelerations_jvp,
+    accelerations_vjp,
+    carried_vjp,
     factor_matrix,
     joint_slopes,
     joint_state,
-    pull_back,
-    pull_carried,
-    pull_joints,
-    push_forward,
+    joints_vjp,
     solve_unknowns,
 )
 from mdstopo.general.forces import turn_bodies
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.projection import project_back, project_forward
+from mdstopo.general.step_history import has_factors, mass_of
 from mdstopo.general.switches import DAMPED
-from mdstopo.general.track import has_factors, mass_of
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.geometry import copy_rows
@@ -27,104 +27,108 @@ SETTLED = 1e-12
 
 
 @kernel
-def lay_out(model, track, o, desk):
-    """Put the joints of stage o on the desk, with their slopes. Returns K and C of the stage."""
-    q = track.stage[o, 0]
-    v = track.stage[o, 1]
-    k = track.K[o]
-    c = track.C[o]
-    if has_factors(track):
-        copy_rows(track.turned[o], desk.turned)
-        desk.k[:] = 0.0
+def lay_out(model, history, o, workspace):
+    """Put the joints of stage o in the workspace, with their slopes. Returns K and C of the stage."""
+    q = history.stage[o, 0]
+    v = history.stage[o, 1]
+    k = history.K[o]
+    c = history.C[o]
+    if has_factors(history):
+        copy_rows(history.turned[o], workspace.turned)
+        workspace.k[:] = 0.0
         for p in range(k.shape[0]):
-            if desk.carries[p] != 0:
-                copy_rows(k[p], desk.k[p])
-                if desk.switches[DAMPED] != 0:
-                    copy_rows(c[p], desk.c[p])
-        k = desk.k
-        c = desk.c
+            if workspace.carries[p] != 0:
+                copy_rows(k[p], workspace.k[p])
+                if workspace.switches[DAMPED] != 0:
+                    copy_rows(c[p], workspace.c[p])
+        k = workspace.k
+        c = workspace.c
     else:
-        turn_bodies(q, desk.turned)
-        joint_state(model, q, v, desk)
-    joint_slopes(model, q, v, track.stage[o, 2], track.lam[o], desk)
+        turn_bodies(q, workspace.turned)
+        joint_state(model, q, v, workspace)
+    joint_slopes(model, q, v, history.stage[o, 2], history.lam[o], workspace)
     return k, c
 
 
 @kernel
-def solve_stage(model, track, o, w_q, w_v, transposed, desk, a, lam):
+def solve_stage(model, history, o, w_q, w_v, transposed, workspace, a, lam):
     """Solve with W(w_q, w_v) of a stage, or with its transpose.
 
     Where factors are kept, weights are 0 and the matrix is symmetric.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage, which is laid out on the desk (`lay_out`).
+      o: number of the stage, which is laid out in the workspace (`lay_out`).
       w_q, w_v: weights of the stiffness (s^2) and the damping (s).
       transposed: whether the transpose is meant.
     In place:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       a (n,), lam (n_row,): the right side, then the solution; driven parts become 0.
     """
-    if has_factors(track):
-        solve_joints(model, desk.inverse, track.pull[o], track.gram[o], track.diagonal[o], desk.x, a, lam)
+    if has_factors(history):
+        solve_joints(
+            model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, a, lam
+        )
         return
-    factor_matrix(model, desk, track.K[o], track.C[o], track.turn[o], mass_of(track, o), w_q, w_v, transposed)
-    solve_unknowns(model, desk, a, lam)
+    factor_matrix(
+        model, workspace, history.K[o], history.C[o], history.turn[o], mass_of(history, o), w_q, w_v, transposed
+    )
+    solve_unknowns(model, workspace, a, lam)
 
 
 @kernel
-def prepare_stage_back(model, track, o, w_q, w_v, desk):
+def prepare_stage_back(model, history, o, w_q, w_v, workspace):
     """Prepare a stage for `stage_back`: once for any number of rows.
 
     model: the compiled scene.
-    track: the history of steps (`Track`).
+    history: the history of steps (`StepHistory`).
     o: number of the stage.
     w_q, w_v: weights of the stiffness (s^2) and the damping (s); 0 where factors are kept.
-    desk: workspace of a balance, which takes what is prepared.
+    workspace: workspace of a balance, which takes what is prepared.
     """
-    if has_factors(track):
-        copy_rows(track.turned[o], desk.turned)
+    if has_factors(history):
+        copy_rows(history.turned[o], workspace.turned)
         return
-    k, c = lay_out(model, track, o, desk)
-    factor_matrix(model, desk, k, c, track.turn[o], mass_of(track, o), w_q, w_v, np.bool_(True))
+    k, c = lay_out(model, history, o, workspace)
+    factor_matrix(model, workspace, k, c, history.turn[o], mass_of(history, o), w_q, w_v, np.bool_(True))
 
 
 @kernel
-def stage_back(model, track, o, desk, z, y, bar_q, bar_v):
+def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
     """Pull cotangents of a stage's accelerations and multipliers back to its coordinates and velocities.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       o: number of the stage, the one that was prepared last (`prepare_stage_back`).
-      desk: workspace of a balance, with what was prepared.
+      workspace: workspace of a balance, with what was prepared.
     In place:
       z (n,), y (n_row,): cotangents of accelerations and multipliers, then the virtual displacement of the balance and
         what belongs to it in the rows.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
-    if has_factors(track):
-        stage = track.stage[o]
-        solve_joints(model, desk.inverse, track.pull[o], track.gram[o], track.diagonal[o], desk.x, z, y)
-        pull_carried(model, desk, track.K[o], track.C[o], track.turn[o], z, bar_q, bar_v)
-        pull_joints(model, desk, stage[0], stage[1], stage[2], track.lam[o], z, y, bar_q, bar_v)
+    if has_factors(history):
+        stage = history.stage[o]
+        solve_joints(model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, z, y)
+        carried_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, bar_q, bar_v)
+        joints_vjp(model, workspace, stage[0], stage[1], stage[2], history.lam[o], z, y, bar_q, bar_v)
         return
-    solve_unknowns(model, desk, z, y)
-    pull_back(model, desk, track.K[o], track.C[o], track.turn[o], z, y, bar_q, bar_v)
+    solve_unknowns(model, workspace, z, y)
+    accelerations_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, y, bar_q, bar_v)
 
 
 @kernel
-def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work):
+def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work):
     """Pull R cotangents of the end of an explicit step back to its start.
 
     Constant:
       model: the compiled scene.
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       w: number of the step.
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, the same for
@@ -134,46 +138,46 @@ def explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, d
     Out:
       z (R, s or more, n): virtual displacements of the stages' balances.
       y (n_row,): scratch.
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       work (WORK,): counts of work, added to.
     """
     count, n = lam_q.shape
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     table = tables[method]
-    o = track.index[w, 0]
-    h = track.t[w + 1] - track.t[w]
+    o = history.index[w, 0]
+    h = history.t[w + 1] - history.t[w]
     work[REVERSE] += count
-    state = track.state[w + 1]
-    push = track.push[w + 1]
-    project_back(model, state[0], state[1], push[0], push[1], desk, lam_q, lam_v)
+    state = history.state[w + 1]
+    push = history.push[w + 1]
+    project_back(model, state[0], state[1], push[0], push[1], workspace, lam_q, lam_v)
     u = np.zeros((count, s, n))
     g = np.zeros((count, s, n))
     for back in range(s):
         j = s - 1 - back
-        prepare_stage_back(model, track, o + j, 0.0, 0.0, desk)
+        prepare_stage_back(model, history, o + j, 0.0, 0.0, workspace)
         for m in range(count):
             _explicit_stage_back(
-                model, table, track, o, j, h, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m], desk
+                model, table, history, o, j, h, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m], workspace
             )
     for m in range(count):
         _gather_start(model, table, s, h, u[m], g[m], lam_q[m], lam_v[m])
 
 
 @part
-def _explicit_stage_back(model, table, track, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, desk):
+def _explicit_stage_back(model, table, history, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, workspace):
     """One stage of `explicit_back`, for one row of cotangents.
 
     Constant:
       model: the compiled scene.
       table (3, 17, 17): coefficients of the method.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       o, j: number of the step's first stage, and of this one counted from it; it has been prepared.
       h: length of the step (s).
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows: none.
       lam_q, lam_v (n,): cotangents of the end's coordinates and velocities.
-      desk: workspace of a balance, with what was prepared.
+      workspace: workspace of a balance, with what was prepared.
     Out:
       z (s or more, n): z[j], the virtual displacement of the stage's balance.
       y (n_row,): scratch.
@@ -198,7 +202,7 @@ def _explicit_stage_back(model, table, track, o, j, h, bars, rows_bar, lam_q, la
             g[j, d] = bars[j, 1, d]
         for r in range(y.shape[0]):
             y[r] = rows_bar[j, r]
-    stage_back(model, track, o + j, desk, z[j], y, u[j], g[j])
+    stage_back(model, history, o + j, workspace, z[j], y, u[j], g[j])
     for i in range(model.driven.shape[0]):
         u[j, model.driven[i]] = 0.0
         g[j, model.driven[i]] = 0.0
@@ -229,13 +233,13 @@ def _gather_start(model, table, s, h, u, g, lam_q, lam_v):
 
 
 @kernel
-def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_changes, desk):
+def explicit_forward(model, tables, history, w, dq, dv, force, stage_changes, row_changes, workspace):
     """Push changes of the start of an explicit step, and of the forces at its stages, to its end.
 
     Constant:
       model: the compiled scene.
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       w: number of the step.
       force (s, n): changes of the forces at the stages (N, N m).
@@ -244,14 +248,14 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
     Out:
       stage_changes (s, 3, n): of the stages' coordinates, velocities, accelerations.
       row_changes (s, n_row): of their multipliers.
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = dq.shape[0]
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     table = tables[method]
-    o = track.index[w, 0]
-    h = track.t[w + 1] - track.t[w]
+    o = history.index[w, 0]
+    h = history.t[w + 1] - history.t[w]
     for i in range(s):
         x = stage_changes[i]
         for d in range(n):
@@ -264,7 +268,7 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
             x[1, d] = speed if model.free[d] != 0 else 0.0
             x[2, d] = force[i, d]
         row_changes[i] = 0.0
-        stage_forward(model, track, o + i, 0.0, 0.0, 0, desk, x[0], x[1], x[2], row_changes[i])
+        stage_forward(model, history, o + i, 0.0, 0.0, 0, workspace, x[0], x[1], x[2], row_changes[i])
     for d in range(n):
         dq[d] += h * dv[d]
         for j in range(s):
@@ -273,18 +277,18 @@ def explicit_forward(model, tables, track, w, dq, dv, force, stage_changes, row_
         if model.free[d] == 0:
             dq[d] = 0.0
             dv[d] = 0.0
-    state = track.state[w + 1]
-    push = track.push[w + 1]
-    project_forward(model, state[0], state[1], push[0], push[1], desk, dq, dv)
+    state = history.state[w + 1]
+    push = history.push[w + 1]
+    project_forward(model, state[0], state[1], push[0], push[1], workspace, dq, dv)
 
 
 @kernel
-def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):
+def stage_forward(model, history, o, w_q, w_v, sweeps, workspace, dq, dv, force, row):
     """Changes of a stage's accelerations and multipliers from those of its state and of the forces on it.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       o: number of the stage.
       w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its own accelerations.
@@ -295,39 +299,39 @@ def stage_forward(model, track, o, w_q, w_v, sweeps, desk, dq, dv, force, row):
       force (n,): changes of the forces, then of the accelerations.
       row (n_row,): changes of the right side of the rows, then of the multipliers.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
 
     Returns whether the sweeps have settled; True without any.
     """
-    k, c = lay_out(model, track, o, desk)
-    push_forward(model, desk, k, c, track.turn[o], dq, dv, force, row)
+    k, c = lay_out(model, history, o, workspace)
+    accelerations_jvp(model, workspace, k, c, history.turn[o], dq, dv, force, row)
     if sweeps > 0 and (w_q != 0.0 or w_v != 0.0):
-        return _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row)
-    solve_stage(model, track, o, w_q, w_v, np.bool_(False), desk, force, row)
+        return _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row)
+    solve_stage(model, history, o, w_q, w_v, np.bool_(False), workspace, force, row)
     return True
 
 
 @kernel
-def _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row):
+def _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row):
     """Solve [M Phi_q^T; Phi_q 0] x = rhs - (w_q K + w_v C) x by fixed-point sweeps; G_q, G_v stand below K, C.
 
     Constant:
       model: the compiled scene.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
-      o: number of the stage, which is laid out on the desk (`lay_out`).
+      o: number of the stage, which is laid out in the workspace (`lay_out`).
       w_q, w_v: weights of the stiffness (s^2) and the damping (s).
       sweeps: how many at most.
     In place:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       force (n,), row (n_row,): the right side, then x.
 
     Returns whether the sweeps have settled.
     """
     n = force.shape[0]
     n_row = row.shape[0]
-    none = track.K[o]
-    factor_matrix(model, desk, none, none, track.turn[o], mass_of(track, o), 0.0, 0.0, np.bool_(False))
+    none = history.K[o]
+    factor_matrix(model, workspace, none, none, history.turn[o], mass_of(history, o), 0.0, 0.0, np.bool_(False))
     x = np.zeros(n)
     y = np.zeros(n_row)
     dq = np.empty(n)
@@ -342,8 +346,8 @@ def _sweep(model, track, o, w_q, w_v, sweeps, desk, force, row):
             force[d] = right[d]
         for r in range(n_row):
             row[r] = right_row[r]
-        push_forward(model, desk, track.K[o], track.C[o], track.turn[o], dq, dv, force, row)
-        solve_unknowns(model, desk, force, row)
+        accelerations_jvp(model, workspace, history.K[o], history.C[o], history.turn[o], dq, dv, force, row)
+        solve_unknowns(model, workspace, force, row)
         change = 0.0
         size = 0.0
         for d in range(n):

@@ -6,15 +6,15 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.model import INERTER
 from mdstopo.mechanics.laws.table import SPRING
 
-#: places of a desk's `switches`: whether the mass is diagonal; whether the factors on the desk are those of the joints'
-#: matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small eigenvalue;
-#: whether tangents leave out the joints' part
+#: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
+#: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
+#: eigenvalue; whether tangents leave out the joints' part
 DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART = range(5)
 
 
 @kernel
 def switches_of(model):
-    """The switches (5,) of a new desk."""
+    """The switches (5,) of a new workspace."""
     switches = np.zeros(5, np.int64)
     switches[DIAGONAL] = 1 if is_diagonal(model) else 0
     switches[DAMPED] = 1 if is_damped(model) else 0

@@ -28,12 +28,12 @@ def each_member(case: Case, group: MemberGroup, place: int) -> bool:
 
 
 def lasting_times(case: Case, fine: bool) -> list[float]:
-    """Times at which laws have steps end, without those that vary; fine: as of `laws.landings`."""
+    """Times at which laws have steps end, without those that vary; fine: as of `laws.breakpoints`."""
     return [
         time
         for group in case.members
         for place, law in enumerate(group.laws)
-        for time in laws.landings(law, fine, frozenset(each.parameter for each in of_law(case, group, place)))
+        for time in laws.breakpoints(law, fine, frozenset(each.parameter for each in of_law(case, group, place)))
     ]
 
 
@@ -117,7 +117,7 @@ class Placing:
                 member[4, part] = free
                 member[5, part] += (was - free) * (was + free)
             if changed.keys() & with_role(type(now), "is_time"):
-                times |= {t for t in laws.landings(now, self._fine) if start < t < end}
+                times |= {t for t in laws.breakpoints(now, self._fine) if start < t < end}
                 begin = -np.inf if now.active_from is None else now.active_from
                 until = np.inf if now.active_until is None else now.active_until
                 acts[k] = begin, until

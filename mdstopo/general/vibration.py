@@ -21,9 +21,9 @@ def natural_frequencies(driver: "GeneralDriver", alpha: FloatArray) -> FloatArra
     n = len(model.mass)
     stiffness, mass = np.zeros((n, n)), np.zeros((n, n))
     rows = np.zeros((int(model.size[0]), n))
-    driver.strength[:] = 0.0
+    driver.member_state[:] = 0.0
     driver.settle(alpha)
-    linearise(driver.ints, driver.floats, driver.alpha.copy(), driver.strength, stiffness, mass, rows)
+    linearise(driver.ints, driver.floats, driver.alpha.copy(), driver.member_state, stiffness, mass, rows)
     free = np.flatnonzero(model.free)
     k, m, j = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], rows[:, free]
     root = np.linalg.cholesky(m)

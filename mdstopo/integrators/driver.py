@@ -14,9 +14,9 @@ import numpy as np
 from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import holds_steps
 from mdstopo.evaluation import USUAL, Rows, Shape
-from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, landings
+from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
-from mdstopo.mechanics.carrying import ROOMY
+from mdstopo.mechanics.active_members import ROOMY
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.packing import Packed, aligned, pack
@@ -59,7 +59,7 @@ class Compiling(Protocol):
     def wait(self) -> None: ...
 
 
-class Looked(NamedTuple):
+class ResponseResult(NamedTuple):
     """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
 
     rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
@@ -86,7 +86,7 @@ class Driver:
         self,
         scene: Scene,
         method: Method,
-        looks: Callable[[], ModuleType],
+        responses: Callable[[], ModuleType],
         tolerance: float,
         step: float,
         reductions: IndexArray,
@@ -98,7 +98,7 @@ class Driver:
 
         scene: the compiled load case.
         method: the integrator.
-        looks: imports the compiled entries that look at steps (look, dense).
+        responses: imports the compiled entries that evaluate responses from the steps (`energy_responses`).
         tolerance: relative error that objectives and gradients may have.
         step: fixed step (s); 0: adaptive steps; negative: see `generalized_alpha.longest_step`.
         reductions (n_obj,): codes of `sensitivity.reductions`, one an objective.
@@ -109,8 +109,8 @@ class Driver:
         self.scene = scene
         self.method = method
         self._entry: Any = None
-        self._load_looking = looks
-        self._looking: Any = None
+        self._load_responses = responses
+        self._responses: Any = None
         self._beside = beside
         self.packed = self._plain = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
@@ -144,25 +144,26 @@ class Driver:
         return self._entry
 
     @property
-    def looking(self) -> Any:
+    def responses(self) -> Any:
         """The entries that look at steps; where they have never been compiled, another process is doing it."""
         if self._beside is not None:
             self._beside.wait()
             self._beside = None
-        return self._looking_entries
+        return self._response_entries
 
     @property
-    def _looking_entries(self) -> Any:
-        """As `looking`, without waiting; after the method's own entries, which enter its functions in `contract`."""
-        if self._looking is None and self.entry is not None:
-            self._looking = self._load_looking()
-        return self._looking
+    def _response_entries(self) -> Any:
+        """As `responses`, without waiting; after the method's own entries, which enter its functions in
+        `steps_interface`."""
+        if self._responses is None and self.entry is not None:
+            self._responses = self._load_responses()
+        return self._responses
 
-    def compile_looking(self) -> None:
+    def compile_responses(self) -> None:
         """Compile what looks at the steps, without running it."""
-        self._looking_entries.look.compile(*self._look_arguments(0, True))
+        self._response_entries.evaluate_responses.compile(*self._response_arguments(0, True))
         room = self.limits, self.room, self.room_ints, self.strength
-        self._looking_entries.dense.compile(*self._dense_arguments(0, *room))
+        self._response_entries.dense.compile(*self._dense_arguments(0, *room))
 
     def _make_rows(self, most: int) -> None:
         """Arrays for so many peaks of each objective."""
@@ -170,7 +171,7 @@ class Driver:
         self.padded = np.zeros((most, self._width))
         self.rows = np.zeros((count, most, 4))
         self.gradients = np.zeros((count, most, len(self._alpha)))
-        self._look: dict[bool, Callable[..., Any]] = {}
+        self._evaluate: dict[bool, Callable[..., Any]] = {}
 
     def _make_room(self, steps: int, stages: int) -> None:
         n, n_pair, damped, turning = self.shape
@@ -178,11 +179,12 @@ class Driver:
         self.limits = np.array([MAX_STEPS, steps, stages], dtype=np.int64)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)
-        # prepared calls with this room: `simulate` by whether tangents are wanted, `look` by whether gradients are
+        # prepared calls with this room: `simulate` by whether tangents are wanted, `evaluate_responses` by whether
+        # gradients are
         self._simulate: dict[bool, Callable[..., Any]] = {}
-        self._look = {}
+        self._evaluate = {}
 
-    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> Looked:
+    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate alpha (N,) and look at all objectives; `self.work` holds the counts of this call.
 
         Energies are no norms: `rows.cones` asks for nothing.
@@ -192,19 +194,23 @@ class Driver:
             self._make_rows(rows.most or ROWS)
         code, count, time = self.run(alpha, gradient)
         if code == OK:
-            self._look_at(count, gradient)
+            self._evaluate_responses(count, gradient)
         meeting, unresolved = self.meeting.item(0), self.meeting.item(2)
-        return Looked(status_of(code), time, self.rows, self.found, self.gradients, meeting, unresolved=unresolved)
+        return ResponseResult(
+            status_of(code), time, self.rows, self.found, self.gradients, meeting, unresolved=unresolved
+        )
 
     def met(self, count: int) -> int:
         """A member (padded) whose ends meet under force within the steps of the last run, or -1."""
-        self._look_at(count, False)
+        self._evaluate_responses(count, False)
         return int(self.meeting[0])
 
-    def _look_at(self, count: int, gradient: bool) -> None:
-        if gradient not in self._look:
-            self._look[gradient] = self.looking.look.prepare(*self._look_arguments(count, gradient))
-        self._look[gradient]((_COUNT, count))
+    def _evaluate_responses(self, count: int, gradient: bool) -> None:
+        if gradient not in self._evaluate:
+            self._evaluate[gradient] = self.responses.evaluate_responses.prepare(
+                *self._response_arguments(count, gradient)
+            )
+        self._evaluate[gradient]((_COUNT, count))
 
     def run(self, alpha: FloatArray, tangent: bool) -> tuple[int, int, float]:
         """Simulate alpha (N,) into the driver's own room: code, number of steps, time reached."""
@@ -216,7 +222,7 @@ class Driver:
 
     def _resolve(self, tangent: bool, found: tuple[int, int, float]) -> tuple[int, int, float]:
         """The run that was `found`, or one whose steps are short enough for the integral of the energy, too."""
-        more, first, left = landings(self, found[1])
+        more, first, left = quadrature_breakpoints(self, found[1])
         times, total, plain = list[float](), first, found
         for lap in range(ROUNDS):
             if not more or found[0] != OK:
@@ -224,7 +230,7 @@ class Driver:
             times += more
             self._take(pack(landed(self.scene.model, times)))
             before, found = left, self._run(tangent)
-            more, total, left = landings(self, found[1])
+            more, total, left = quadrature_breakpoints(self, found[1])
             if lap >= PATIENCE and left > VAIN * before:
                 total = first
                 break
@@ -237,7 +243,7 @@ class Driver:
         """Have the kernels compute a model, packed; calls that were prepared for another one are dropped."""
         if packed is not self.packed:
             self.packed = packed
-            self._simulate, self._look = {}, {}
+            self._simulate, self._evaluate = {}, {}
 
     def _run(self, tangent: bool) -> tuple[int, int, float]:
         while True:
@@ -263,7 +269,7 @@ class Driver:
             self.settings, self.limits, self.room, self.room_ints, self.strength, self.work,
         )  # fmt: skip
 
-    def _look_arguments(self, count: int, gradient: bool) -> tuple[Any, ...]:
+    def _response_arguments(self, count: int, gradient: bool) -> tuple[Any, ...]:
         return (
             self.entry.TAG, self.packed.ints, self.packed.floats, self.method.tables, self._alpha, self.scene.damped,
             self.settings, self.limits, count, self.reductions, gradient, self.room, self.room_ints, self.strength,
@@ -331,7 +337,7 @@ class DenseSteps:
             self.count, self._limits, self._room, self._ints, self._strength, np.array(times, dtype=np.float64),
             self._packed,
         )  # fmt: skip
-        self._driver.looking.dense(*arguments)
+        self._driver.responses.dense(*arguments)
         out: FloatArray = arguments[-2]
         return out
 

@@ -18,7 +18,7 @@ from collections import namedtuple
 import numpy as np
 
 from mdstopo.compiler.jit import entry, part
-from mdstopo.integrators.gauss_balance import ABOUT, Room, balance, dense_rows, fastest_rate
+from mdstopo.integrators.gauss_equations import ABOUT, Room, balance, dense_rows, fastest_rate
 from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.rows import (
     copy_row,
@@ -55,11 +55,11 @@ from mdstopo.integrators.steps import (
     rounding_of_pairs,
     solved_to,
 )
+from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import add_loads, forces
-from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose
 from mdstopo.mechanics.passes import SUMS, scale_members
-from mdstopo.mechanics.rough import may_be_rough, rough_forces
+from mdstopo.mechanics.single_precision import may_use_single_precision, single_precision_forces
 from mdstopo.scene.packing import unpack
 
 GaussSteps = namedtuple("GaussSteps", FIELDS)  # type: ignore[misc]
@@ -95,14 +95,15 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
       limits (3,): windows allowed, room for windows, room for stages.
     Out:
       room, room_ints: the steps (`steps.carve`).
-      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `carrying` on further rows.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `active_members` on further
+        rows.
       work (WORK,): counts of work, added to.
 
     Returns the code, the number of windows and the time reached (s); NEEDS_ROOM asks for more room.
     """
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
-    model, strength, _ = carrying(whole, strength, np.bool_(True))
+    model, strength, _ = active_members(whole, strength, np.bool_(True))
     n = model.q0.shape[0]
     n_pair = model.pair.shape[0]
     turning = model.load_body.shape[0] > 0
@@ -202,7 +203,9 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         q_base[d] = q0[d]
         v_base[d] = v0[d]
         load_base[d] = 0.0
-    may_begin_roughly = fixed_step <= 0.0 and newton_tolerance >= ROUGH_TOLERANCE and may_be_rough(model)
+    may_begin_in_single_precision = (
+        fixed_step <= 0.0 and newton_tolerance >= ROUGH_TOLERANCE and may_use_single_precision(model)
+    )
     t = times[0]
     t_node[0] = t
     forces(model, strength, np.int64(0), np.int64(1), t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn)
@@ -272,10 +275,12 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
             # nothing has moved yet: what the start's forces alone would do is the scale of the prediction
             integrate_to_nodes(planes[2], s, s, h * h, q0, hv0, planes[0, 0], a, q)
             relative_pose(pair, model.home, q[s - 1], v0, rel[s - 1])
-            rough = may_begin_roughly
+            single_precision = may_begin_in_single_precision
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
-                rough = rough and scale[p] > ROUGH * (np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p])
+                single_precision = single_precision and scale[p] > ROUGH * (
+                    np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]
+                )
             motion_weights(pair, rel0, reach, scale, weight)
             accepted = False
             estimate = 0.0
@@ -286,12 +291,14 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                     # one pass over the members at all nodes
                     take_rows(q, s, ref[0])
                     take_rows(v, s, ref[1])
-                    rough = (
-                        rough
+                    single_precision = (
+                        single_precision
                         and newton == 1
-                        and rough_forces(model, strength, segment, s, t_node, ref[0], ref[1], rel, sums, f, k, c, turn)
+                        and single_precision_forces(
+                            model, strength, segment, s, t_node, ref[0], ref[1], rel, sums, f, k, c, turn
+                        )
                     )
-                    if not rough:
+                    if not single_precision:
                         forces(
                             model, strength, segment, s, t_node, ref[0], ref[1], yes, damped, rel, sums, f, k, c, turn
                         )
@@ -327,7 +334,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 estimate *= caution(coef, weight, s) * lasting(h, longest)
                 if estimate <= tolerance or fixed_step > 0.0:
                     # the last clause: rounding is all that is left
-                    if not rough and (e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11)):
+                    if not single_precision and (e <= newton_tolerance or (e >= 0.5 * previous and e < 1e-11)):
                         accepted = True
                         break
                     previous = e

@@ -1,4 +1,4 @@
-"""Gauss collocation, linearised: dense output, the reverse step, the tangent step (`contract`).
+"""Gauss collocation, linearised: dense output, the reverse step, the tangent step (`steps_interface`).
 
 All three work on the stages that `gauss.simulate` kept. Reverse and tangent steps solve the same linear balance of a
 window, transposed or not, by sweeps that contract as the forward ones did.
@@ -7,9 +7,8 @@ window, transposed or not, by sweeps that contract as the forward ones did.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.integrators.contract import implement
 from mdstopo.integrators.gauss import COUNTS, TAG, GaussSteps
-from mdstopo.integrators.gauss_balance import dense_rows, fill_dense, pull_back
+from mdstopo.integrators.gauss_equations import accelerations_vjp, dense_rows, fill_dense
 from mdstopo.integrators.rows import (
     combine_rows,
     copy_row,
@@ -22,6 +21,7 @@ from mdstopo.integrators.rows import (
     take_rows,
 )
 from mdstopo.integrators.steps import REVERSE, SWEEPS
+from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
     add_turning,
     subtract_products,
@@ -200,7 +200,7 @@ def reverse_step(
     last = np.inf
     for _ in range(200):
         work[SWEEPS] += 1
-        pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z_row, u, y)
+        accelerations_vjp(pair, k, c, turn, dense, inverse, x, s, damped, turning, z_row, u, y)
         if damped:
             combine_rows(back_v, s, s, h, rhs, y, value)
             change, size = renew_rows(back_q, s, h * h, value, u, root, x)

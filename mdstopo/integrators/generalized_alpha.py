@@ -21,7 +21,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.integrators.banded import factorise, half_width, solve
-from mdstopo.integrators.gauss_balance import CLOSELY, fastest_rate
+from mdstopo.integrators.gauss_equations import CLOSELY, fastest_rate
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,

@@ -2,7 +2,7 @@
 
 In all of them: the packed model; tables (1,) the spectral radius; settings (tolerance, not used here; Newton
 tolerance; step, see `generalized_alpha.longest_step`; closeness); limits (steps allowed, room for steps, room for
-stages); room, room_ints for the steps; strength (3 or more, M_padded), see `carrying`; work counts, added to.
+stages); room, room_ints for the steps; strength (3 or more, M_padded), see `active_members`; work counts, added to.
 """
 
 import numpy as np
@@ -12,7 +12,7 @@ from mdstopo.compiler.jit import entry
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, integrate, longest_step
 from mdstopo.integrators.generalized_alpha import rate_at_start as _rate_at_start
 from mdstopo.integrators.steps import carve
-from mdstopo.mechanics.carrying import carrying
+from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.passes import scale_members
 from mdstopo.scene.packing import unpack
 
@@ -35,14 +35,15 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
       limits (3,): steps allowed, room for steps, room for stages.
     Out:
       room, room_ints: the steps (`steps.carve`).
-      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `carrying` on further rows.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `active_members` on further
+        rows.
       work (WORK,): counts of work, added to.
 
     Returns the code, the number of steps and the time reached (s); NEEDS_ROOM asks for more room.
     """
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
-    model, strength, _ = carrying(whole, strength, np.bool_(True))
+    model, strength, _ = active_members(whole, strength, np.bool_(True))
     turning = model.load_body.shape[0] > 0
     steps = AlphaSteps(
         *carve(room, room_ints, model.q0.shape[0], model.pair.shape[0], limits[1], limits[2], damped, turning)

@@ -1,4 +1,4 @@
-"""Generalized-alpha, linearised: dense output, the reverse step, the tangent step (`contract`).
+"""Generalized-alpha, linearised: dense output, the reverse step, the tangent step (`steps_interface`).
 
 Between two steps q is the cubic through both ends with their velocities, and v is its derivative, so that a peak of a
 response is a stationary point of the very motion it is read from. What a step takes over from the one before beside
@@ -10,9 +10,9 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.banded import half_width, solve
-from mdstopo.integrators.contract import implement
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, effective_matrix, weights_of
 from mdstopo.integrators.steps import REVERSE
+from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,

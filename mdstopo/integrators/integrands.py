@@ -42,7 +42,7 @@ def landed(model: Model, times: list[float]) -> Model:
     return model._replace(times=whole, force=force, load_force=turning)
 
 
-def landings(driver: "Driver", count: int) -> tuple[list[float], float, float]:
+def quadrature_breakpoints(driver: "Driver", count: int) -> tuple[list[float], float, float]:
     """Middles of those of the last run's `count` steps whose energy their rule does not integrate; its integral, and
     what all steps leave of it by their terms."""
     n, n_pair, damped, turning = driver.shape

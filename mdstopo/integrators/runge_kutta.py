@@ -36,8 +36,8 @@ from mdstopo.integrators.steps import (
     noise_of,
     rounding_of_pairs,
 )
+from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import forces
-from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, scale_members, springs_of
 from mdstopo.scene.packing import unpack
@@ -192,14 +192,15 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
       limits (3,): steps allowed, room for steps, room for stages.
     Out:
       room, room_ints: the steps (`steps.carve`); there has to be room for two more than are taken (`point_of`).
-      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `carrying` on further rows.
+      strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu; see `active_members` on further
+        rows.
       work (WORK,): counts of work, added to.
 
     Returns the code, the number of steps and the time reached (s); NEEDS_ROOM asks for more room.
     """
     whole = unpack(ints, floats)
     scale_members(whole, alpha, strength)
-    model, strength, _ = carrying(whole, strength, np.bool_(True))
+    model, strength, _ = active_members(whole, strength, np.bool_(True))
     tolerance = MARGIN * settings[0]
     fixed_step = settings[2]
     n = model.q0.shape[0]

@@ -1,12 +1,12 @@
-"""Explicit Runge-Kutta methods: partial steps, the reverse step, the tangent step (`contract`)."""
+"""Explicit Runge-Kutta methods: partial steps, the reverse step, the tangent step (`steps_interface`)."""
 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.integrators.contract import implement
 from mdstopo.integrators.runge_kutta import MOST, TAG, RungeKuttaSteps, advance
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
+from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
     add_turning,
     add_turning_transposed,

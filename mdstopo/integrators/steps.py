@@ -17,7 +17,8 @@ C         (S, n_pair, 6, 6)       -dF/dv, no rows where nothing is damped
 turn      (S, n)                  derivative of the loads by each body's angle, no rows where no load turns
 ========  ======================  ==================================================================
 
-Each integrator names its own tuple of these arrays (`FIELDS`), by whose type its functions are found (`contract`).
+Each integrator names its own tuple of these arrays (`FIELDS`), by whose type its functions are found
+(`steps_interface`).
 """
 
 from collections.abc import Sequence

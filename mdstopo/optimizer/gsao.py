@@ -1,6 +1,6 @@
 """The driver loop, as the paper's Figure 2: evaluate, judge, adapt, approximate, solve, and again.
 
-The duties are those of `interface`.
+The interface is that of `interface`.
 """
 
 import time

@@ -1,4 +1,4 @@
-"""The duties of an optimiser, and what is alike for all: making one, driving it, its first state. No mechanics.
+"""The interface of an optimiser, and what is alike for all: making one, driving it, its first state. No mechanics.
 
 One step is one evaluation. Between two steps everything is in `State`, so that the loop can be stopped, stored and
 resumed anywhere without a difference in any bit.

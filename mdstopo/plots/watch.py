@@ -36,7 +36,7 @@ def response_history(engine: "Evaluator", alpha: Floats, load_case: str, times: 
     t = motion.t
     step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 2)
     places = np.stack([step.astype(np.float64), (times - t[step]) / (t[step + 1] - t[step])], axis=1)
-    return {each.name: driver.visit(j, places, True, len(t) - 1)[2][:, 0] for j, each in enumerate(looked)}
+    return {each.name: driver.sample_response(j, places, True, len(t) - 1)[2][:, 0] for j, each in enumerate(looked)}
 
 
 def stored_energy(case: Case, alpha: Floats, q: Floats) -> Floats:

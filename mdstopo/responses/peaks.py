@@ -9,8 +9,8 @@ earlier first where equal. For minima everything is done to -g.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.integrators.contract import point_of, sample
 from mdstopo.integrators.steps import step_at
+from mdstopo.integrators.steps_interface import point_of, sample
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of
 from mdstopo.responses.energy import energy_at, energy_of

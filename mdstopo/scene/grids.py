@@ -13,8 +13,8 @@ from mdstopo.scene.model import CHUNK, COUNT, LENGTH, START, WIDTH, IndexArray
 
 #: places in a row at least: fewer vectors than two are not worth a row's own sums
 NARROWEST = 2 * WIDE
-#: places for each member at most: kernels for grids take some 0.7 of the others' time for a place (`carrying` weighs
-#: members of grids and others by the same share), and padding costs memory and the passes that know no grids too
+#: places for each member at most: kernels for grids take some 0.7 of the others' time for a place (`active_members`
+#: weighs members of grids and others by the same share), and padding costs memory and the passes that know no grids too
 WASTE = 1.25
 #: rows at least, whose sums a column shares
 FEWEST = 4

@@ -9,7 +9,7 @@ inside. The peak's time is held fixed (envelope theorem).
 import numpy as np
 
 from mdstopo.compiler.jit import part
-from mdstopo.integrators.contract import carried, parent_of, reach, reverse_step, stage_weights
+from mdstopo.integrators.steps_interface import carried, parent_of, reach, reverse_step, stage_weights
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
@@ -89,7 +89,7 @@ def energy_rows(
 
     Constant:
       model: the compiled scene, with all members.
-      motion: the same with the members that the motion was computed with (`carrying`).
+      motion: the same with the members that the motion was computed with (`active_members`).
       tables: constant arrays of the integrator.
       strength (3, M_padded): of the members of `motion`, times alpha^mu (N/m, N s/m, N).
     In:

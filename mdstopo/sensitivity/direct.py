@@ -8,8 +8,8 @@ time. O(N) memory; with the histories of the response, dg/dalpha at every step's
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.integrators.contract import carried, parent_of, reach, stage_weights, steps_of
 from mdstopo.integrators.steps import carve
+from mdstopo.integrators.steps_interface import carried, parent_of, reach, stage_weights, steps_of
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, energy_gradient, springs_of, unscale_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
@@ -46,7 +46,7 @@ def slope_at(model, strength, q, v, rel, sums, out):
 
 @kernel
 def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, sums, mu_q, work):
-    """Find the state of a row that `look` found, and the slope of the stored energy there.
+    """Find the state of a row that `evaluate_responses` found, and the slope of the stored energy there.
 
     Constant:
       model: the compiled scene.
@@ -164,10 +164,11 @@ def direct(
     history,
     work,
 ):
-    """Gradients of the rows that `look` found, by one forward sweep over the steps left in room, with tangents.
+    """Gradients of the rows that `evaluate_responses` found, by one forward sweep over the steps left in room, with
+    tangents.
 
     Constant:
-      tag: of the integrator (`contract.steps_of`).
+      tag: of the integrator (`steps_interface.steps_of`).
       ints, floats: the packed model.
       tables: constant arrays of the integrator.
     In:
@@ -178,7 +179,7 @@ def direct(
       reductions (n_obj,): codes of the objectives' reductions.
       room, room_ints: the steps, with tangents (`steps.carve`).
       strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
-      rows (n_obj, R, 4): time, value, step, fraction of it, of what `look` found.
+      rows (n_obj, R, 4): time, value, step, fraction of it, of what `evaluate_responses` found.
       found (n_obj,): how many rows each objective has.
     Out:
       gradients (n_obj, R, N): by alpha, for the rows that were found.

@@ -10,10 +10,10 @@ where not, that is said, and `direct` is the method to take.
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, member_kernel
-from mdstopo.integrators.contract import steps_of
 from mdstopo.integrators.generalized_alpha import weights_of
 from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import SWEEPS, carve
+from mdstopo.integrators.steps_interface import steps_of
 from mdstopo.mechanics.assembly import add_turning, subtract_products
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
@@ -200,10 +200,10 @@ def iterative(
     gradients,
     work,
 ):
-    """Gradients of the rows that `look` found, by fixed-point sweeps of the linearised steps.
+    """Gradients of the rows that `evaluate_responses` found, by fixed-point sweeps of the linearised steps.
 
     Constant:
-      tag: of the integrator (`contract.steps_of`).
+      tag: of the integrator (`steps_interface.steps_of`).
       ints, floats: the packed model.
       tables (1,): the spectral radius.
     In:
@@ -214,7 +214,7 @@ def iterative(
       reductions (n_obj,): codes of the objectives' reductions.
       room, room_ints: the steps, with tangents (`steps.carve`).
       strength (3 or more, M_padded): as the run left them (N/m, N s/m, N).
-      rows (n_obj, R, 4): time, value, step, fraction of it, of what `look` found.
+      rows (n_obj, R, 4): time, value, step, fraction of it, of what `evaluate_responses` found.
       found (n_obj,): how many rows each objective has.
     Out:
       gradients (n_obj, R, N): by alpha, for the rows that were found.

@@ -15,7 +15,7 @@ from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.integrators.driver import Driver, Looked
+    from mdstopo.integrators.driver import Driver, ResponseResult
 
 #: nodes of the rule by which constant_load forms a mean or an integral over time
 NODES = 201
@@ -36,7 +36,7 @@ class Differentiated:
     across: FloatArray | None = None
 
 
-def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: "Looked") -> Differentiated:
+def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: "ResponseResult") -> Differentiated:
     """Gradients of the rows that `driver.evaluate(alpha, ...)` found, by `direct`, `iterative` or `constant_load`.
 
     alpha: (N,). Counts are added to `driver.work`. Raises ValueError for a name that is none of the three, and for
@@ -90,7 +90,9 @@ def histories(driver: "Driver", alpha: FloatArray) -> tuple[Status, FloatArray, 
     return Status.OK, driver.room[: count + 1].copy(), lines
 
 
-def _constant_load(driver: "Driver", alpha: FloatArray, looked: "Looked", gradients: FloatArray) -> Differentiated:
+def _constant_load(
+    driver: "Driver", alpha: FloatArray, looked: "ResponseResult", gradients: FloatArray
+) -> Differentiated:
     from mdstopo.sensitivity.constant_load import constant_load
 
     before = driver.work.copy()

@@ -12,7 +12,7 @@ tangent step; one pass over the members then applies it to all of them,
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, member_kernel
-from mdstopo.integrators.contract import carried, tangent_step
+from mdstopo.integrators.steps_interface import carried, tangent_step
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
 from mdstopo.scene.model import DAMPING, EXCESS, L0, PRELOAD, STIFFNESS

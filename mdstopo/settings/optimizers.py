@@ -1,6 +1,6 @@
 """The optimisers that a case file may name: what is declared of each, one record an optimiser.
 
-The duties of what a record names are those of `optimizer.interface`. Imports nothing heavy: the reader uses it too.
+What a record names has the interface of `optimizer.interface`. Imports nothing heavy: the reader uses it too.
 """
 
 from typing import NamedTuple

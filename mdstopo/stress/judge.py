@@ -18,7 +18,7 @@ def judge(scene: Scene) -> Outcome:
         try:
             measured = scene.measure(read_case(scene.text))
             found, note = measured if isinstance(measured, tuple) else (measured, "")
-            right = found <= scene.bound and not scene.culprit  # a number where none can be right is wrong
+            right = found <= scene.bound and not scene.refusal  # a number where none can be right is wrong
             outcome = "right" if right else "wrong" if math.isfinite(found) else "not finite"
         except (Refused, CaseError) as refusal:
             outcome, message = "refused", str(refusal)

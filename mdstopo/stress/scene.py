@@ -13,7 +13,7 @@ LIMIT = 120.0
 
 
 class Refused(Exception):  # noqa: N818 - a refusal is an outcome, not an error
-    """The engine refused to compute a scene; the text is the status with its culprit."""
+    """The engine refused to compute a scene; the text is the status with its message."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Scene:
 
     data: the case. measure: the error of what the engine computes of it, relative to the independent value, and what
     else is to be reported; it raises Refused where there is a refusal. A scene has to be right within `bound`, or,
-    where `culprit` names words, to be refused in a message that has them all. limit: seconds until it counts as one
+    where `refusal` has words, to be refused in a message that has them all. limit: seconds until it counts as one
     that hangs. long: only on demand.
     """
 
@@ -31,14 +31,14 @@ class Scene:
     data: dict[str, Any]
     measure: "Callable[[Case], float | tuple[float, str]]"
     bound: float = 0.0
-    culprit: tuple[str, ...] = ()
+    refusal: tuple[str, ...] = ()
     limit: float = LIMIT
     long: bool = False
 
     @property
     def expected(self) -> str:
         """How it has to end."""
-        return "refused" if self.culprit else "right"
+        return "refused" if self.refusal else "right"
 
     @property
     def integrator(self) -> str:
@@ -65,5 +65,5 @@ class Outcome:
     @property
     def ok(self) -> bool:
         """Whether it ended as it had to."""
-        named = all(word in self.message for word in self.scene.culprit)
+        named = all(word in self.message for word in self.scene.refusal)
         return self.outcome == self.scene.expected and named

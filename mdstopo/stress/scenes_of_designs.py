@@ -223,14 +223,14 @@ def scenes() -> list[Scene]:
             "alpha = 0 allowed with a power below 1, where there is no slope",
             parallel(0.5, 0.0),
             partial(_parallel, 0.5),
-            culprit=("design", "> 0 where power is below 1"),
+            refusal=("design", "> 0 where power is below 1"),
         ),
         Scene(
             "zero-alpha-power-0.5",
             "a gradient asked for at alpha = 0 with a power below 1",
             parallel(0.5, 0.5, 0.01),
             _without_slope,
-            culprit=("no gradient", "group gone", "power 0.5"),
+            refusal=("no gradient", "group gone", "power 0.5"),
         ),
         Scene(
             "zero-alpha-optimized",
@@ -265,7 +265,7 @@ def scenes() -> list[Scene]:
             "a weighted product with an objective that is zero throughout",
             beside_something("weighted_product"),
             _beside_something,
-            culprit=("objective G", "weighted_product"),
+            refusal=("objective G", "weighted_product"),
         ),
     ]
     found += [

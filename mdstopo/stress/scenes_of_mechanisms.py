@@ -153,7 +153,7 @@ def scenes() -> list[Scene]:
                 f"a four-bar linkage stretched out at {when:.6g} s, before its crank lies flat",
                 four_bar(1.0, base, **solver),
                 partial(_four_bar, 1.0, base, False),
-                culprit=("singular", "joint", f"at t = {when - 5e-4:.3f}"),
+                refusal=("singular", "joint", f"at t = {when - 5e-4:.3f}"),
             )
         )
     for exponent in (2, 4, 6):
@@ -182,7 +182,7 @@ def scenes() -> list[Scene]:
                 "a parallelogram that begins flat: nothing says which way its rocker turns",
                 four_bar(1.0, 2.0, np.pi / 2, integrator=integrator, **more),
                 partial(_four_bar, 1.0, 2.0, True),
-                culprit=("singular", "joint"),
+                refusal=("singular", "joint"),
             ),
         ]
         found.append(
@@ -200,7 +200,7 @@ def scenes() -> list[Scene]:
             "a door whose third hinge is a millimetre off",
             door(1e-3),
             _door,
-            culprit=("hinge2", "does not fit"),
+            refusal=("hinge2", "does not fit"),
         )
     )
     return found

@@ -149,14 +149,14 @@ def scenes() -> list[Scene]:
                 "the ends of a spring meet while it carries 10 N: no direction",
                 passing(pull, **solver),
                 _refused,
-                culprit=("meet", "member 0 of group through"),
+                refusal=("meet", "member 0 of group through"),
             ),
             Scene(
                 f"meeting-motion-under-force-{tag}",
                 "the motion alone through such a place",
                 passing(pull, **solver),
                 _moved,
-                culprit=("meet", "member 0 of group through"),
+                refusal=("meet", "member 0 of group through"),
             ),
             Scene(
                 f"meeting-without-force-{tag}",
@@ -187,21 +187,21 @@ def scenes() -> list[Scene]:
             "the ends of a cubic spring meet while it carries a force",
             passing({"type": "cubic", "stiffness": 1.0, "cubic": 0.1}, **solver),
             _refused,
-            culprit=("meet", "member 0 of group through"),
+            refusal=("meet", "member 0 of group through"),
         ),
         Scene(
             "meeting-actuator-under-force",
             "the ends of an actuator meet while it pulls",
             passing({"type": "table", "table": [[0.0, 1.0], [1.0, 2.0]]}, **solver),
             _refused,
-            culprit=("meet", "member 0 of group through"),
+            refusal=("meet", "member 0 of group through"),
         ),
         Scene(
             "meeting-at-the-start",
             "a member without length at the start",
             {**passing(pull), "members": {"none": spring([1.0, 0.0], "ball", [1.0, 0.0], stiffness=1.0)}},
             _free_flight,
-            culprit=("members.none", "zero length"),
+            refusal=("members.none", "zero length"),
         ),
     ]
     for integrator in ADAPTIVE:

@@ -80,14 +80,14 @@ def scenes() -> list[Scene]:
         ("pendulum", "steps of a period of a rod that swings far", pendulum(step=3.0, **coarse), _pendulum),
         ("whirling", "steps of half a turn about a pole", whirling(step=0.1, **coarse), _whirling),
     ):
-        found.append(Scene(f"step-too-large-{name}", words, data, measure, culprit=("step",)))
+        found.append(Scene(f"step-too-large-{name}", words, data, measure, refusal=("step",)))
     found.append(
         Scene(
             "step-too-small",
             "fixed steps of 1e-12 s over a second",
             swing(1.0, step=1e-12, **coarse),
             partial(_swing, 1.0),
-            culprit=("solver.step", "steps in 1 s"),
+            refusal=("solver.step", "steps in 1 s"),
         )
     )
     for integrator in ADAPTIVE:
@@ -108,7 +108,7 @@ def scenes() -> list[Scene]:
             f"a tolerance of {tolerance:g}, which nothing can keep or which says nothing",
             swing(1.3, tolerance=tolerance),
             partial(_swing, 1.3),
-            culprit=("solver.tolerance", "allowed"),
+            refusal=("solver.tolerance", "allowed"),
         )
         for tolerance in (0.0, 2.0)
     ]

@@ -97,7 +97,7 @@ def scenes() -> list[Scene]:
                 "stiffness ratio 1e12 over ten slow periods, 1.4e7 fast ones: more steps than a motion may have",
                 chain(1e12, 20.0 * np.pi, integrator=integrator, tolerance=1e-8),
                 partial(_chain_motion, 1e12),
-                culprit=("more steps than it may take", "the fastest body is"),
+                refusal=("more steps than it may take", "the fastest body is"),
             )
         )
     return found + [

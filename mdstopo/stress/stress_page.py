@@ -30,7 +30,7 @@ def _row(each: Outcome) -> str:
     if each.note:
         ended += f"; {each.note}"
     error = "" if each.error is None else f"{each.error:.1e}"
-    bound = "" if scene.culprit else f"{scene.bound:.0e}"
+    bound = "" if scene.refusal else f"{scene.bound:.0e}"
     cells = f"`{scene.name}`", scene.integrator, scene.checks, ended, error, bound, f"{each.seconds:.2g}"
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 

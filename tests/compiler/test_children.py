@@ -80,7 +80,7 @@ def test_a_folder_that_is_gone_is_no_hindrance(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     os.rmdir(tmp_path / "gone")
-    assert command("mdstopo.compile_looking", "gauss")[-3:] == ["-m", "mdstopo.compile_looking", "gauss"]
+    assert command("mdstopo.compile_responses", "gauss")[-3:] == ["-m", "mdstopo.compile_responses", "gauss"]
 
 
 def test_vectors_are_those_of_the_processor_that_numba_compiles_for(tmp_path: Path) -> None:

@@ -261,22 +261,22 @@ def test_with_settling_a_block_begins_at_its_depth():
 
 
 @numba.njit
-def _add(ints, floats, strength, q, v, tangent, f, k, c):
-    add_contacts(unpack_general(ints, floats), strength, q, v, tangent, f, k, c)
+def _add(ints, floats, member_state, q, v, tangent, f, k, c):
+    add_contacts(unpack_general(ints, floats), member_state, q, v, tangent, f, k, c)
 
 
 def test_tangents_are_the_slopes_of_the_forces():
     scene = Evaluator(read_case(HIT.format(damping=60, friction=0.4))).scenes["default"]
     ints, floats = pack_general(scene.model)
-    strength = np.zeros((3, 3))
-    strength[1, :2] = CLOSED
+    member_state = np.zeros((3, 3))
+    member_state[1, :2] = CLOSED
     rng = np.random.default_rng(3)
     q, v = scene.model.q0 + 0.05 * rng.normal(size=9), 0.02 * rng.normal(size=9)
     q[:3], v[6:] = [0.2, 0.05, 0.1], 0.0  # both points are inside
 
     def at(q, v, tangent=False):
         f, k, c = np.zeros(9), np.zeros((1, 6, 6)), np.zeros((1, 6, 6))
-        _add(ints, floats, strength, q, v, tangent, f, k, c)
+        _add(ints, floats, member_state, q, v, tangent, f, k, c)
         return f, k[0], c[0]
 
     _, stiffness, damping = at(q, v, True)

@@ -6,7 +6,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.general.balance import balance, make_desk
+from mdstopo.general.accelerations import balance, make_workspace
 from mdstopo.general.compile import compile_general
 from mdstopo.general.first_step import FIRST, PROBES, first_step
 from mdstopo.general.model import pack_general, unpack_general
@@ -40,18 +40,18 @@ def found(tolerance, **values):
 
 
 @numba.njit
-def _first(ints, floats, strength, tolerance, order, noise, work):
+def _first(ints, floats, member_state, tolerance, order, noise, work):
     model = unpack_general(ints, floats)
-    desk = make_desk(model)
+    workspace = make_workspace(model)
     n, n_pair = model.mass.shape[0], model.pair.shape[0]
     q0, v0, a0, lam = model.q0.copy(), model.v0.copy(), np.zeros(n), np.zeros(model.size[0])
-    balance(model, strength, np.int64(0), model.times[0], q0, v0, np.bool_(True), desk, a0, lam)
+    balance(model, member_state, np.int64(0), model.times[0], q0, v0, np.bool_(True), workspace, a0, lam)
     rel = np.empty((n_pair, POSE))
     relative_pose(model.pair, model.home, q0, v0, rel)
     scratch = np.empty((3, n))
     return first_step(
-        model, strength, model.times[1], q0, v0, a0, rel, np.zeros(n_pair), np.full(n_pair, noise), tolerance, order,
-        desk, lam, scratch[0], scratch[1], scratch[2], work,
+        model, member_state, model.times[1], q0, v0, a0, rel, np.zeros(n_pair), np.full(n_pair, noise), tolerance,
+        order, workspace, lam, scratch[0], scratch[1], scratch[2], work,
     )  # fmt: skip
 
 
@@ -59,10 +59,10 @@ def first(text, tolerance, order, noise=1e-15):
     """Length of the first step, and how many balances it took; noise: of positions, m."""
     case = read_case(text)
     model = compile_general(case, case.load_cases[0]).model
-    strength = np.zeros((3, model.member.shape[1] + 1))
-    strength[0, :1] = 1.0  # one member, then padding
+    member_state = np.zeros((3, model.member.shape[1] + 1))
+    member_state[0, :1] = 1.0  # one member, then padding
     work = np.zeros(WORK, np.int64)
-    return _first(*pack_general(model), strength, tolerance, order, noise, work), work[FORCES]
+    return _first(*pack_general(model), member_state, tolerance, order, noise, work), work[FORCES]
 
 
 @pytest.mark.parametrize("tolerance", [2e-5, 2e-11])

@@ -301,10 +301,10 @@ def means_by_quadrature(case):
     left = [(low, high, panel(low, high)) for low, high in pairwise(edges)]
     total = np.zeros(3)
     while left:
-        low, high, rough = left.pop()
+        low, high, single_precision = left.pop()
         middle = 0.5 * (low + high)
         halves = panel(low, middle), panel(middle, high)
-        if np.abs(sum(halves) - rough).max() < 1e-14 or high - low < 1e-7:
+        if np.abs(sum(halves) - single_precision).max() < 1e-14 or high - low < 1e-7:
             total += sum(halves)
         else:
             left += [(low, middle, halves[0]), (middle, high, halves[1])]
@@ -428,7 +428,7 @@ def test_what_joints_hold_at_zero_takes_no_more_steps():
 
 
 def test_rounding_is_not_halved_on_and_on():
-    from mdstopo.general.landings import halves
+    from mdstopo.general.quadrature_breakpoints import halves
 
     rng = np.random.default_rng(0)
     nodes, weights = np.polynomial.legendre.leggauss(5)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.general.balance import factor_matrix, joint_state, make_desk, solve_unknowns
+from mdstopo.general.accelerations import factor_matrix, joint_state, make_workspace, solve_unknowns
 from mdstopo.general.compile import compile_general
 from mdstopo.general.forces import turn_bodies
 from mdstopo.general.joint_matrix import decompose, substitute, weakest
@@ -55,15 +55,17 @@ joints:
 @numba.njit
 def _solve(ints, floats, q, transposed, a, lam, jac, factors):
     model = unpack_general(ints, floats)
-    desk = make_desk(model)
-    turn_bodies(q, desk.turned)
-    joint_state(model, q, np.zeros_like(q), desk)
-    singular = factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, transposed)
-    jac[:] = desk.jac
-    factors[:] = desk.switches
+    workspace = make_workspace(model)
+    turn_bodies(q, workspace.turned)
+    joint_state(model, q, np.zeros_like(q), workspace)
+    singular = factor_matrix(
+        model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, transposed
+    )
+    jac[:] = workspace.jac
+    factors[:] = workspace.switches
     if singular < 0:
-        solve_unknowns(model, desk, a, lam)
-        solve_unknowns(model, desk, a, lam)  # the factors stay
+        solve_unknowns(model, workspace, a, lam)
+        solve_unknowns(model, workspace, a, lam)  # the factors stay
     return singular
 
 

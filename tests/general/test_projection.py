@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from mdstopo.general.balance import factor_matrix, joint_state, make_desk
+from mdstopo.general.accelerations import factor_matrix, joint_state, make_workspace
 from mdstopo.general.forces import turn_bodies
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.projection import swept
@@ -14,12 +14,12 @@ from tests.general.test_joint_matrix import MECHANISM, model_of
 @numba.njit
 def _swept(ints, floats, h, x, y, jac):
     model = unpack_general(ints, floats)
-    desk = make_desk(model)
-    turn_bodies(model.q0, desk.turned)
-    joint_state(model, model.q0, np.zeros_like(model.q0), desk)
-    factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, True)
-    jac[:] = desk.jac
-    return swept(model, desk, h, x, y)
+    workspace = make_workspace(model)
+    turn_bodies(model.q0, workspace.turned)
+    joint_state(model, model.q0, np.zeros_like(model.q0), workspace)
+    factor_matrix(model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, True)
+    jac[:] = workspace.jac
+    return swept(model, workspace, h, x, y)
 
 
 @pytest.mark.parametrize(("size", "settles"), [(0.0, True), (1e-6, True), (1e-3, True), (1e2, False)])

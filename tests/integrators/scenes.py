@@ -12,7 +12,7 @@ from mdstopo.integrators.runge_kutta_tables import runge_kutta_tables
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, WORK, carve, room_for
 from mdstopo.scene.model import MEMBER, STIFFNESS, VECTOR, Model
 from mdstopo.scene.packing import pack
-from mdstopo.sensitivity.look import dense, look
+from mdstopo.sensitivity.energy_responses import dense, evaluate_responses
 from mdstopo.sensitivity.reductions import MAX
 
 
@@ -178,7 +178,7 @@ class Bench:
                 break
             self.size *= 2
         if code == OK:
-            look(
+            evaluate_responses(
                 self.entry.TAG, *self.packed, self.tables, self.alpha, self.scene.damped, settings, self.limits,
                 self.count, self.reductions, gradient, self.room, self.room_ints, self.strength,
                 np.zeros((ROWS, padded)), self.rows, self.found, self.gradients, np.zeros(2, dtype=np.int64), self.work,

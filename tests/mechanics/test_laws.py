@@ -33,7 +33,8 @@ from mdstopo.case.model import (
     TableLaw,
 )
 from mdstopo.mechanics.laws import actuator, gap, table
-from mdstopo.mechanics.laws.table import CODES, PARAMETERS, landings, parameters
+from mdstopo.mechanics.laws.table import CODES, PARAMETERS, parameters
+from mdstopo.mechanics.laws.table import breakpoints as law_breakpoints
 from mdstopo.scene.signals import breakpoints
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -793,7 +794,7 @@ def test_a_pulse_is_finite_and_within_its_peak_at_any_time(rate):
 
 def inside(law, start, end):
     """Where integrators land on behalf of a law between start and end, both included."""
-    return breakpoints(SimpleNamespace(loads=(), start=start, end=end), landings(law))
+    return breakpoints(SimpleNamespace(loads=(), start=start, end=end), law_breakpoints(law))
 
 
 @pytest.mark.parametrize("rate", [4.0, 1e6, 1e12])
@@ -810,14 +811,14 @@ def test_no_step_passes_over_a_narrow_pulse(rate):
 def test_landings_stay_within_the_simulated_time():
     law = PulseLaw(peak=1.0, rate=1.0, time=0.0, active_from=-5.0, active_until=2.0)
     assert inside(law, 0.0, 3.0) == pytest.approx([0.0, 1.0, 2.0, 2.5, 3.0])
-    assert landings(PulseLaw(peak=1.0, rate=0.0, time=0.5)) == []
+    assert law_breakpoints(PulseLaw(peak=1.0, rate=0.0, time=0.5)) == []
 
 
 @every_kind
 def test_every_law_lands_on_the_ends_of_its_activity(kind):
     law = dataclasses.replace(MAKERS[kind](np.random.default_rng(5)), active_from=0.25, active_until=0.75)
-    assert {0.25, 0.75} <= set(landings(law))
-    assert not {0.25, 0.75} & set(landings(dataclasses.replace(law, active_from=None, active_until=None)))
+    assert {0.25, 0.75} <= set(law_breakpoints(law))
+    assert not {0.25, 0.75} & set(law_breakpoints(dataclasses.replace(law, active_from=None, active_until=None)))
 
 
 def test_a_table_lands_on_its_rows():

@@ -1,4 +1,4 @@
-"""A second optimiser: a record and a class with three duties, and runs, files and refusals know it."""
+"""A second optimiser: a record and a class with three functions, and runs, files and refusals know it."""
 
 import numpy as np
 import pytest

@@ -40,11 +40,11 @@ def crashing(_: object) -> float:
         ({"measure": lambda _: float("nan")}, "not finite", False),
         ({"measure": lambda _: (0.05, "late by 1 s")}, "right", True),
         ({"measure": refused}, "refused", False),
-        ({"measure": refused, "culprit": ("singular", "joint hip")}, "refused", True),
-        ({"measure": refused, "culprit": ("singular", "joint knee")}, "refused", False),
-        ({"culprit": ("singular",)}, "wrong", False),
+        ({"measure": refused, "refusal": ("singular", "joint hip")}, "refused", True),
+        ({"measure": refused, "refusal": ("singular", "joint knee")}, "refused", False),
+        ({"refusal": ("singular",)}, "wrong", False),
         ({"measure": crashing}, "crashes", False),
-        ({"data": {"time": {"end": 1}, "bodies": {}, "members": 3}, "culprit": ("members",)}, "refused", True),
+        ({"data": {"time": {"end": 1}, "bodies": {}, "members": 3}, "refusal": ("members",)}, "refused", True),
     ],
 )
 def test_verdicts(changes: dict[str, object], outcome: str, ok: bool) -> None:

@@ -43,7 +43,7 @@ def test_a_case_that_shares_nothing_hands_the_optimiser_alpha_itself():
     assert space.identity
     assert space.expand(alpha) is alpha
     assert space.reduce(alpha) is alpha
-    assert space.pull(alpha) is alpha
+    assert space.vjp(alpha) is alpha
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ def revolute_acceleration_slopes(par, w, wd, wdd, by_q, by_v):
 
 
 @part
-def revolute_pull(par, w, wd, wdd, lam, y0, y1, z_first, z_second):
+def revolute_vjp(par, w, wd, wdd, lam, y0, y1, z_first, z_second):
     """What `revolute_acceleration_slopes` and `revolute_stiffness` give, transposed, times two vectors.
 
     (d(Phi_q a + gamma)/dq)^T y + (d(Phi_q^T lam)/dq)^T z and (d(gamma)/dv)^T y, of which only those by the angles are

@@ -17,10 +17,10 @@ def given_table(record: TableLaw) -> Table:
     return record.table
 
 
-def given_landings(record: TableLaw, _: bool) -> list[float]:
+def given_breakpoints(record: TableLaw, _: bool) -> list[float]:
     """The times of its rows."""
     times: list[float] = record.table.times.tolist()
     return times
 
 
-KERNELS = LawKernels(force=given_force, signal=given_table, landings=given_landings)
+KERNELS = LawKernels(force=given_force, signal=given_table, breakpoints=given_breakpoints)

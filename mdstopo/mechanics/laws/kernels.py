@@ -77,7 +77,8 @@ class LawKernels:
     linear: the force is p[0] x + p[1] xd + p[2], for which there are vectors over many members.
     inertial: the force is p[0] d2Delta/dt2: part of the mass (`general.forces`), with no kernel here.
     signal (record): of a force that is given over time, the table.
-    landings (record, fine): times at which steps have to end: kinks, jumps, narrow peaks; fine: see `pulse.landings`.
+    breakpoints (record, fine): times at which steps have to end: kinks, jumps, narrow peaks; fine: see
+    `pulse.breakpoints`.
     data (record, at): parameters and numbers for `curves`, of which the first will stand at place `at`; a law that has
     it does not use `Law.row`, and its parameters do not vary.
     """
@@ -90,5 +91,5 @@ class LawKernels:
     linear: bool = False
     inertial: bool = False
     signal: Callable[[Any], Table] | None = None
-    landings: Callable[[Any, bool], list[float]] | None = None
+    breakpoints: Callable[[Any, bool], list[float]] | None = None
     data: Callable[[Any, int], tuple[list[float], list[float]]] | None = None

@@ -30,7 +30,7 @@ def pulse_slopes(p, place, t):
 FINE = 16
 
 
-def pulse_landings(record: PulseLaw, fine: bool) -> list[float]:
+def pulse_breakpoints(record: PulseLaw, fine: bool) -> list[float]:
     """Times that integrators land on, so that no step passes over a narrow pulse.
 
     fine: for steps of low order and given length, which have to follow the pulse itself.
@@ -49,4 +49,6 @@ def pulse_unstretched(p):
     return abs(p[0])
 
 
-KERNELS = LawKernels(force=pulse_force, slopes=pulse_slopes, unstretched=pulse_unstretched, landings=pulse_landings)
+KERNELS = LawKernels(
+    force=pulse_force, slopes=pulse_slopes, unstretched=pulse_unstretched, breakpoints=pulse_breakpoints
+)

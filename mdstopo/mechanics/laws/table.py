@@ -312,15 +312,15 @@ def place_of(law: type[Law], parameter: str) -> int:
     return COMMON[parameter] if parameter in COMMON else numbers(law).index(parameter)
 
 
-def landings(record: Law, fine: bool = False, varying: frozenset[str] = frozenset()) -> list[float]:
-    """Times at which a law's force has a kink, a jump or a narrow peak; fine: see `pulse.landings`.
+def breakpoints(record: Law, fine: bool = False, varying: frozenset[str] = frozenset()) -> list[float]:
+    """Times at which a law's force has a kink, a jump or a narrow peak; fine: see `pulse.breakpoints`.
 
     varying: parameters whose values may become others; times that depend on them are left out.
     """
     kind = type(record)
     ends = {"active_from": record.active_from, "active_until": record.active_until}
     times = [time for name, time in ends.items() if time is not None and name not in varying]
-    own = kernels_of(kind).landings
+    own = kernels_of(kind).breakpoints
     if own is None or varying & (set(with_role(kind, "is_time")) - ends.keys()):
         return times
     return times + own(record, fine)

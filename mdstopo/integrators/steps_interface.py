@@ -1,4 +1,4 @@
-"""The duties of an integrator, resolved by the type of its steps when a kernel is compiled.
+"""The interface of an integrator, resolved by the type of its steps when a kernel is compiled.
 
 An integrator is a NamedTuple of steps and these compiled functions; `implement` enters them in the table below.
 
@@ -33,7 +33,7 @@ from mdstopo.compiler.jit import by_type, kernel
 
 Implementation = Any  # a compiled function
 
-_DUTIES: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}}
+_IMPLEMENTED: dict[str, dict[type, Implementation]] = {"reach": {}, "sample": {}}
 _MAKERS: dict[int, Implementation] = {}
 
 
@@ -169,11 +169,11 @@ def steps_of(tag, arrays):
     raise NotImplementedError
 
 
-def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, **duties: Implementation) -> None:
+def implement(steps_type: type, tag: tuple[int, ...], steps_of: Implementation, **functions: Implementation) -> None:
     """Enter an integrator's compiled functions for its type of steps, and the one that makes them for its tag."""
     _MAKERS[len(tag)] = steps_of
-    for name, function in duties.items():
-        _DUTIES.setdefault(name, {})[steps_type] = function
+    for name, function in functions.items():
+        _IMPLEMENTED.setdefault(name, {})[steps_type] = function
 
 
 def _implementation(name: str, steps: Any) -> Implementation | None:
@@ -181,9 +181,9 @@ def _implementation(name: str, steps: Any) -> Implementation | None:
     kind = getattr(steps, "instance_class", None)  # of a named tuple's type
     if kind is None:
         return None
-    chosen = _DUTIES[name].get(kind)
+    chosen = _IMPLEMENTED[name].get(kind)
     if chosen is None and name == "reach":
-        chosen = _DUTIES["point_of"].get(kind)
+        chosen = _IMPLEMENTED["point_of"].get(kind)
     if chosen is None and name == "sample":
         chosen = sample_stages
     return chosen

@@ -29,8 +29,8 @@ from mdstopo.mechanics.assembly import (
 )
 
 #: what the windows of one simulation work in: at nodes (first index), of pairs, of the state at the start; rows (10,
-#: nodes, W) and vectors (11, W) as in `rows`: those that `balance` works in are rows 2 to 4, `gauss` names the others.
-#: Made once, by a function of its own: arrays that a kernel is given cost it no counting of references
+#: nodes, W) and vectors (11, W) as in `rows`: those that `solve_accelerations` works in are rows 2 to 4, `gauss` names
+#: the others. Made once, by a function of its own: arrays that a kernel is given cost it no counting of references
 Room = namedtuple("Room", "t rel sums K C turn dense rows vectors motion noise scale rel0 K0 C0")
 
 #: relative change at which the estimate of the fastest rate is settled: closely, and for a first window's length
@@ -224,7 +224,7 @@ def fastest_rate(pair, inv_mass, k, c, damped, settled):
 
 
 @part
-def pull_back(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):
+def accelerations_vjp(pair, k, c, turn, dense, inverse, x, s, damped, turning, z, u, y):
     """Multiply by the transposed tangents: u = (load tangent - K)^T M^-1 x and, if damped, y = -C^T M^-1 x, at s nodes.
 
     In:

@@ -18,7 +18,7 @@ turn      (S, n)                slope of the turning loads
 turned    (S, n_body, 2)        cos and sin of the bodies' angles; pull (S, n_joint, 3, 6), gram (S, size[3]), diagonal
                                 (S, 2, n_row): the factors of the joints' matrix (`joint_matrix`); one row of each where
                                 they are not kept
-salt      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
+saltation      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
 kept      (E, 3)                the permanent set of its member before and after an event; slope of its time by it
 event     (E, 5) integers       the state at which it happened, member (padded), mode before and after; whether it
                                 only just happened, so that forces at it have no derivative
@@ -36,23 +36,23 @@ from mdstopo.scene.model import IndexArray
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES = range(5)
 
-TRACK = (
+FIELDS = (
     "t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "turned", "pull", "gram",
-    "diagonal", "salt", "kept", "event",
+    "diagonal", "saltation", "kept", "event",
 )  # fmt: skip
 
 
-class Track:
-    """The history of steps inside kernels, made by `carve_track`; the fields are those of the table above."""
+class StepHistory:
+    """The history of steps inside kernels, made by `carve_history`; the fields are those of the table above."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(Track, TRACK)
+bundle(StepHistory, FIELDS)
 
 
-def track_room(model: GeneralModel, limits: IndexArray) -> tuple[int, int]:
-    """Lengths of the flat arrays of floats and integers that `carve_track` needs."""
+def history_room(model: GeneralModel, limits: IndexArray) -> tuple[int, int]:
+    """Lengths of the flat arrays of floats and integers that `carve_history` needs."""
     n, n_pair, n_row = len(model.mass), len(model.pair), int(model.size[0])
     _, steps, stages, events, inertial, factors = limits.tolist()
     per_stage = 1 + 4 * n + n_row + 72 * n_pair
@@ -62,9 +62,9 @@ def track_room(model: GeneralModel, limits: IndexArray) -> tuple[int, int]:
 
 
 @kernel
-def carve_track(model, limits, floats, ints):
-    """A `Track` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are inerters,
-    whether the factors of the joints' matrix are kept.
+def carve_history(model, limits, floats, ints):
+    """A `StepHistory` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are
+    inerters, whether the factors of the joints' matrix are kept.
     """
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
@@ -104,53 +104,53 @@ def carve_track(model, limits, floats, ints):
     f += entries * rows
     diagonal = floats[f : f + 2 * n_row * rows].reshape((rows, 2, n_row))
     f += 2 * n_row * rows
-    salt = floats[f : f + 3 * n * events].reshape((events, 3, n))
+    saltation = floats[f : f + 3 * n * events].reshape((events, 3, n))
     f += 3 * n * events
     kept = floats[f : f + 3 * events].reshape((events, 3))
     f += 3 * events
     rows = stages if limits[4] != 0 else 1
     mass = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
-    return Track(
-        t, state, push, index, when, stage, lam, k, c, mass, turn, turned, pull, gram, diagonal, salt, kept, event
+    return StepHistory(
+        t, state, push, index, when, stage, lam, k, c, mass, turn, turned, pull, gram, diagonal, saltation, kept, event
     )  # fmt: skip
 
 
 @kernel
-def keep_stage(track, o, t, q, v, a, lam, desk, tangent):
+def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     """Store a stage.
 
-    track: the history of steps (`Track`).
+    history: the history of steps (`StepHistory`).
     o: number of the stage.
     t: time (s).
     q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
     lam (n_row,): multipliers of the joints.
-    desk: workspace as the balance of the stage has left it.
+    workspace: workspace as the balance of the stage has left it.
     tangent: whether its tangents are stored, and the factors of the joints' matrix where these are kept.
     """
-    track.when[o] = t
-    stage = track.stage[o]
+    history.when[o] = t
+    stage = history.stage[o]
     for d in range(q.shape[0]):
         stage[0, d] = q[d]
         stage[1, d] = v[d]
         stage[2, d] = a[d]
-    copy_vector(lam, track.lam[o])
+    copy_vector(lam, history.lam[o])
     if not tangent:
         return
-    copy_vector(desk.turn, track.turn[o])
-    damped = desk.switches[DAMPED] != 0  # else nobody reads C
-    apart = has_factors(track)
-    for p in range(desk.k.shape[0]):
-        if desk.carries[p] != 0 or not apart:
-            _copy(desk.k[p], track.K[o, p])
+    copy_vector(workspace.turn, history.turn[o])
+    damped = workspace.switches[DAMPED] != 0  # else nobody reads C
+    apart = has_factors(history)
+    for p in range(workspace.k.shape[0]):
+        if workspace.carries[p] != 0 or not apart:
+            _copy(workspace.k[p], history.K[o, p])
             if damped:
-                _copy(desk.c[p], track.C[o, p])
-    if track.mass.shape[0] > 1:
-        _copy(desk.mass, track.mass[o])
+                _copy(workspace.c[p], history.C[o, p])
+    if history.mass.shape[0] > 1:
+        _copy(workspace.mass, history.mass[o])
     if apart:
-        _copy(desk.turned, track.turned[o])
-        _copy(desk.pull, track.pull[o])
-        copy_vector(desk.gram, track.gram[o])
-        _copy(desk.diagonal, track.diagonal[o])
+        _copy(workspace.turned, history.turned[o])
+        _copy(workspace.pull, history.pull[o])
+        copy_vector(workspace.gram, history.gram[o])
+        _copy(workspace.diagonal, history.diagonal[o])
 
 
 @kernel
@@ -160,67 +160,67 @@ def _copy(source, target):
 
 
 @kernel
-def has_factors(track):
+def has_factors(history):
     """Whether the stages' factors of the joints' matrix are kept."""
-    return track.turned.shape[0] == track.when.shape[0]
+    return history.turned.shape[0] == history.when.shape[0]
 
 
 @kernel
-def mass_of(track, o):
+def mass_of(history, o):
     """The inerters' mass at stage o."""
-    return track.mass[o if track.mass.shape[0] > 1 else 0]
+    return history.mass[o if history.mass.shape[0] > 1 else 0]
 
 
 @kernel
-def keep_state(track, k, t, q, v, mu, nu):
+def keep_state(history, k, t, q, v, mu, nu):
     """Store a state.
 
-    track: the history of steps (`Track`).
+    history: the history of steps (`StepHistory`).
     k: number of the state.
     t: time (s).
     q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
     mu, nu (n_row,): multipliers that put them on the joints (`projection`).
     """
-    track.t[k] = t
+    history.t[k] = t
     for d in range(q.shape[0]):
-        track.state[k, 0, d] = q[d]
-        track.state[k, 1, d] = v[d]
+        history.state[k, 0, d] = q[d]
+        history.state[k, 1, d] = v[d]
     for r in range(mu.shape[0]):
-        track.push[k, 0, r] = mu[r]
-        track.push[k, 1, r] = nu[r]
+        history.push[k, 0, r] = mu[r]
+        history.push[k, 1, r] = nu[r]
 
 
 @kernel
-def restore_modes(track, happened, strength):
+def restore_modes(history, happened, member_state):
     """The modes and sets of members as they were after so many events."""
-    e = strength_cursor(strength)
+    e = events_included(member_state)
     while e > happened:
         e -= 1
-        if track.event[e, 1] >= 0:
-            strength[1, track.event[e, 1]] = track.event[e, 2]
-            strength[2, track.event[e, 1]] = track.kept[e, 0]
+        if history.event[e, 1] >= 0:
+            member_state[1, history.event[e, 1]] = history.event[e, 2]
+            member_state[2, history.event[e, 1]] = history.kept[e, 0]
     while e < happened:
-        if track.event[e, 1] >= 0:
-            strength[1, track.event[e, 1]] = track.event[e, 3]
-            strength[2, track.event[e, 1]] = track.kept[e, 1]
+        if history.event[e, 1] >= 0:
+            member_state[1, history.event[e, 1]] = history.event[e, 3]
+            member_state[2, history.event[e, 1]] = history.kept[e, 1]
         e += 1
-    strength[1, strength.shape[1] - 1] = e
+    member_state[1, member_state.shape[1] - 1] = e
 
 
 @kernel
-def strength_cursor(strength):
-    """How many events the modes in `strength` include: kept in its last column, which belongs to no member."""
-    return int(strength[1, strength.shape[1] - 1])
+def events_included(member_state):
+    """How many events the modes in `member_state` include: kept in its last column, which belongs to no member."""
+    return int(member_state[1, member_state.shape[1] - 1])
 
 
 @kernel
-def step_at(track, count, t):
+def step_at(history, count, t):
     """The step that holds time t: the last one that begins before it."""
     low = 0
     high = count - 1
     while low < high:
         middle = (low + high + 1) // 2
-        if track.t[middle] < t:
+        if history.t[middle] < t:
             low = middle
         else:
             high = middle - 1

@@ -15,7 +15,7 @@ from mdstopo.status import Status
 COLLAPSED = 1e-4
 
 
-class Culprits:
+class Diagnosis:
     """Names for the indices of one scene."""
 
     def __init__(self, case: Case, scene: Scene) -> None:

@@ -25,7 +25,7 @@ from mdstopo.mechanics.passes import springs_of
 
 
 @kernel
-def may_be_rough(model):
+def may_use_single_precision(model):
     """Whether all members lie in grids, and there are few."""
     found = model.threads == 0
     for k in range(model.block.shape[0]):
@@ -88,7 +88,7 @@ def _add(own, seen, k, kl):
 
 
 @part
-def rough_sums(springs, strength, rel, m, sums):
+def single_precision_sums(springs, strength, rel, m, sums):
     """As `passes.member_sums` with tangents, of grids alone; without energies and their slopes."""
     block = springs.block
     sums[:m] = 0.0
@@ -97,7 +97,7 @@ def rough_sums(springs, strength, rel, m, sums):
         tall, wide = tile_of((block[k, 2] - block[k, 1]) // width, width)
         room = np.empty((tall, 2), np.float32)
         own = _aligned_rows(2 * tall + 2, wide)
-        _sum_roughly(block[k], wide, springs.member, strength[0], rel, m, sums, room, own[2:], own[:2])
+        _sum_in_single_precision(block[k], wide, springs.member, strength[0], rel, m, sums, room, own[2:], own[:2])
 
 
 @part
@@ -111,7 +111,7 @@ def _aligned_rows(count, width):
 
 
 @part
-def _sum_roughly(block, wide, member, stiffness, rel, m, sums, room, own, q):
+def _sum_in_single_precision(block, wide, member, stiffness, rel, m, sums, room, own, q):
     """Add the sums over a grid in single precision, tile by tile.
 
     In:
@@ -170,8 +170,9 @@ def _shorten_products(k, l0, own, product):
 
 
 @part
-def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):
-    """Generalised forces on the bodies and their tangents at m states, in single precision, where `may_be_rough`.
+def single_precision_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_out, turn):
+    """Generalised forces on the bodies and their tangents at m states, in single precision, where
+    `may_use_single_precision`.
 
     Constant:
       model: the compiled scene.
@@ -192,7 +193,7 @@ def rough_forces(model, strength, segment, m, t, q, v, rel, sums, f, k_out, c_ou
     Returns whether all forces are finite.
     """
     place_bodies(model.pair, model.home, q, v, m, rel)
-    rough_sums(springs_of(model), strength, rel, m, sums)
+    single_precision_sums(springs_of(model), strength, rel, m, sums)
     sum_bodies(model, segment, m, t, q, np.bool_(True), np.bool_(False), rel, sums, f, k_out, c_out, turn)
     lost = 0.0
     for j in range(m):

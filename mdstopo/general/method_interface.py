@@ -15,7 +15,7 @@ from typing import Any
 
 from mdstopo.compiler.jit import by_type
 
-DUTIES: dict[str, dict[int, Any]] = {
+IMPLEMENTED: dict[str, dict[int, Any]] = {
     "point_of": {},
     "step_back": {},
     "step_forward": {},
@@ -25,21 +25,22 @@ DUTIES: dict[str, dict[int, Any]] = {
 }
 
 
-def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
+def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
     """The state inside a step.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
       count: how many steps the run has.
       k, c: the step, and a fraction of it above 0 and below 1.
       keep: whether the state is to be an end from which the reverse sweep can start.
     In and out:
-      track: the history of steps; with `keep` a partial step may come behind the others.
-      strength (3, columns): state of the members; where forces are summed, modes and sets are put to those of the step.
+      history: the history of steps; with `keep` a partial step may come behind the others.
+      member_state (3, columns): state of the members; where forces are summed, modes and sets are put to those of the
+        step.
     Out:
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
     Returns the step at whose end (or at whose fraction c, if it is k) the reverse sweep starts; k without `keep`.
@@ -47,13 +48,13 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
     raise NotImplementedError
 
 
-def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
+def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
     """Pull R cotangents of the end of a step back to its start, in place; what a stage needs is formed once for all R.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, w: the history of steps, and the step.
+      history, w: the history of steps, and the step.
       c (R,): the fraction of the step to which each cotangent belongs; 1: its end.
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, the same for all
         R; no rows where there are none.
@@ -63,19 +64,19 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
     Out:
       z (R, s or more, n): the virtual displacements of the stages' balances.
       y (n_row,): scratch.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
     """
     raise NotImplementedError
 
 
-def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
+def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
     """Push changes through a step.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
+      history, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
       sweeps: above 0, implicit stages are solved by so many fixed-point sweeps at most (`iterative`).
       force (s, n): changes of the force at each stage.
     In and out:
@@ -83,19 +84,19 @@ def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, cha
       dx (2, n): those of what the method carries from step to step beside the state.
     Out:
       changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
 
     Returns whether all sweeps settled.
     """
     raise NotImplementedError
 
 
-def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
+def beside(tag, history, k, c, e, q, v, a, q_out, v_out):
     """The motion a little later than at fraction c of step k.
 
     Constant:
       tag: the integrator.
-      track, k, c: the history of steps, the step, and a fraction of it.
+      history, k, c: the history of steps, the step, and a fraction of it.
       e: how much later (s); below 0: earlier.
       q, v, a (n,): coordinates, velocities, accelerations at c (m, rad; per s; per s^2).
     Out:
@@ -109,27 +110,27 @@ def derivatives(tag):
     raise NotImplementedError
 
 
-def weights_of(tag, model, tables, track, w, out):
+def weights_of(tag, model, tables, history, w, out):
     """Weights of the stages in the integral over a step.
 
     Constant:
-      tag, tables: the integrator (`duties`) and its coefficients.
+      tag, tables: the integrator (`method_interface`) and its coefficients.
       model: the compiled scene.
-      track, w: the history of steps, and the step.
+      history, w: the history of steps, and the step.
     Out:
       out (s or more,): the weights (s).
     """
     raise NotImplementedError
 
 
-def implement(tag: tuple[int, ...], **duties: Callable[..., Any]) -> None:
+def implement(tag: tuple[int, ...], **functions: Callable[..., Any]) -> None:
     """Enter a method's compiled functions."""
-    for name, function in duties.items():
-        DUTIES[name][len(tag)] = function
+    for name, function in functions.items():
+        IMPLEMENTED[name][len(tag)] = function
 
 
 def _of(name: str, tag: Any) -> Any:
-    return DUTIES[name][len(tag)]
+    return IMPLEMENTED[name][len(tag)]
 
 
 for _stub in (point_of, step_back, step_forward, beside, derivatives, weights_of):

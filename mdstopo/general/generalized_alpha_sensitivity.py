@@ -1,4 +1,5 @@
-"""The duties of generalized-alpha in general scenes: cubic motion between steps, reverse and tangent steps, weights.
+"""The interface functions of generalized-alpha in general scenes: cubic motion between steps, reverse and tangent
+steps, weights.
 
 Between two steps q is the cubic through both ends with their velocities, and v its derivative. What a step takes over
 beside q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x and dx), unless it makes its own.
@@ -7,8 +8,8 @@ beside q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.duties import implement
 from mdstopo.general.generalized_alpha import TAG
+from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
 from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
@@ -17,34 +18,34 @@ from mdstopo.integrators.steps import REVERSE
 
 
 @kernel
-def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
+def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
     """The cubic between the ends of step k, and its derivative; returns k.
 
     Constant:
-      track, k, c: the history of steps, the step, and a fraction of it.
+      history, k, c: the history of steps, the step, and a fraction of it.
     Out:
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
 
-    Not needed here: tag, model, tables, strength, count, keep, desk, work.
+    Not needed here: tag, model, tables, member_state, count, keep, workspace, work.
     """
-    cubic(track.state[k], track.state[k + 1], track.t[k + 1] - track.t[k], c, q, v)
+    cubic(history.state[k], history.state[k + 1], history.t[k + 1] - history.t[k], c, q, v)
     return k
 
 
 @kernel
-def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
+def beside(tag, history, k, c, e, q, v, a, q_out, v_out):
     """The cubic of step k, a little later than at fraction c.
 
     Constant:
-      track, k, c: the history of steps, the step, and a fraction of it.
+      history, k, c: the history of steps, the step, and a fraction of it.
       e: how much later (s); below 0: earlier.
     Out:
       q_out, v_out (n,): coordinates and velocities then (m, rad; m/s, rad/s).
 
     Not needed here: tag; q, v, a, which are those at c.
     """
-    h = track.t[k + 1] - track.t[k]
-    cubic(track.state[k], track.state[k + 1], h, c + e / h, q_out, v_out)
+    h = history.t[k + 1] - history.t[k]
+    cubic(history.state[k], history.state[k + 1], h, c + e / h, q_out, v_out)
 
 
 @kernel
@@ -54,35 +55,35 @@ def derivatives(tag):
 
 
 @kernel
-def weights_of(tag, model, tables, track, w, out):
+def weights_of(tag, model, tables, history, w, out):
     """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion.
 
     Constant:
-      track, w: the history of steps, and the step.
+      history, w: the history of steps, and the step.
     Out:
       out (3 or more,): weights of the step's stages (s); zero behind them.
 
     Not needed here: tag, model, tables.
     """
-    h = track.t[w + 1] - track.t[w]
+    h = history.t[w + 1] - history.t[w]
     out[:] = 0.0
-    last = track.index[w + 1, 0] - track.index[w, 0] - 1
+    last = history.index[w + 1, 0] - history.index[w, 0] - 1
     out[last] = 0.5 * h
     if last > 0:
         out[0] = 0.5 * h
     # a following step without a stage at its start leaves that half to this step's end
-    if track.index[w + 2, 0] - track.index[w + 1, 0] == 1:
-        out[last] += 0.5 * (track.t[w + 2] - track.t[w + 1])
+    if history.index[w + 2, 0] - history.index[w + 1, 0] == 1:
+        out[last] += 0.5 * (history.t[w + 2] - history.t[w + 1])
 
 
 @kernel
-def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
-    """Pull R cotangents of step w back to its start, in place (`duties`).
+def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
+    """Pull R cotangents of step w back to its start, in place (`method_interface`).
 
     Constant:
       tag, tables (1,): the integrator; the spectral radius.
       model: the compiled scene.
-      track, w: the history of steps, and the step.
+      history, w: the history of steps, and the step.
       c (R,): the fraction of the step to which each cotangent belongs; 1: its end.
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows where
         there are none.
@@ -92,13 +93,13 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
     Out:
       z (R, s or more, n): the virtual displacements of the stages' balances.
       y (n_row,): scratch.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
     """
     count, n = lam_q.shape
-    o = track.index[w, 0]
-    last = track.index[w + 1, 0] - 1 - o
-    h = track.t[w + 1] - track.t[w]
+    o = history.index[w, 0]
+    last = history.index[w + 1, 0] - 1 - o
+    h = history.t[w + 1] - history.t[w]
     weights = alpha_weights(tables[0])
     bar_q = np.zeros((count, n))
     bar_v = np.zeros((count, n))
@@ -114,18 +115,18 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
             start_v[m, d] = h * v0 * lam_q[m, d] + dv0 * lam_v[m, d]
             bar_q[m, d] = q1 * lam_q[m, d] + dq1 / h * lam_v[m, d]
             bar_v[m, d] = h * v1 * lam_q[m, d] + dv1 * lam_v[m, d]
-    state = track.state[w + 1]
-    push = track.push[w + 1]
-    project_back(model, state[0], state[1], push[0], push[1], desk, bar_q, bar_v)
+    state = history.state[w + 1]
+    push = history.push[w + 1]
+    project_back(model, state[0], state[1], push[0], push[1], workspace, bar_q, bar_v)
     for j in range(last, -1, -1):
         e1, _, _, beta, gamma, _ = weights
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
-        prepare_stage_back(model, track, o + j, w_q, w_v, desk)
+        prepare_stage_back(model, history, o + j, w_q, w_v, workspace)
         for m in range(count):
             _stage_row_back(
-                model, track, o, j, last, h, weights, bars, rows_bar, lam_x[m], z[m, j], y, bar_q[m], bar_v[m],
-                bar_a[m], bar_x[m], start_q[m], start_v[m], desk,
+                model, history, o, j, last, h, weights, bars, rows_bar, lam_x[m], z[m, j], y, bar_q[m], bar_v[m],
+                bar_a[m], bar_x[m], start_q[m], start_v[m], workspace,
             )  # fmt: skip
     for m in range(count):
         for d in range(n):
@@ -138,14 +139,14 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
 
 @part
 def _stage_row_back(
-    model, track, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q, start_v,
-    desk,
+    model, history, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q, start_v,
+    workspace,
 ):  # fmt: skip
     """Stage j of `step_back`, which is prepared, for one row of cotangents.
 
     Constant:
       model: the compiled scene.
-      track, o, j, last: the history of steps, the first stage of the step, the number of this stage in it, and of its
+      history, o, j, last: the history of steps, the first stage of the step, the number of this stage in it, and of its
         last.
       h: length of the step (s).
       weights: of the method (`integrators.generalized_alpha.weights_of`).
@@ -155,7 +156,7 @@ def _stage_row_back(
       bar_q, bar_v, bar_a, bar_x (n,): cotangents of the stage's coordinates and velocities, and of the acceleration and
         the auxiliary one with which the step begins.
       start_q, start_v (n,): cotangents of the start of the step, added to.
-      desk: the workspace, with the stage prepared (`step_linear.prepare_stage_back`).
+      workspace: the workspace, with the stage prepared (`step_linear.prepare_stage_back`).
     Out:
       x (n,): the virtual displacement of the stage's balance.
       y (n_row,): adjoint variables of the joints' rows.
@@ -180,7 +181,7 @@ def _stage_row_back(
             x[d] = bar_a[d] if j == 0 else -bar_x[d]
         if spread:
             x[d] += bars[j, 2, d]
-    stage_back(model, track, o + j, desk, x, y, bar_q, bar_v)
+    stage_back(model, history, o + j, workspace, x, y, bar_q, bar_v)
     for i in range(model.driven.shape[0]):
         bar_q[model.driven[i]] = 0.0
         bar_v[model.driven[i]] = 0.0
@@ -205,13 +206,13 @@ def _stage_row_back(
 
 
 @kernel
-def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
-    """Push changes through step w (`duties`).
+def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
+    """Push changes through step w (`method_interface`).
 
     Constant:
       tag, tables (1,): the integrator; the spectral radius.
       model: the compiled scene.
-      track, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
+      history, w, c: the history of steps, the step, and the fraction of it at which it is taken to end.
       sweeps: above 0, the end is solved by so many fixed-point sweeps at most (`iterative`).
       force (s, n): changes of the force at each stage.
     In and out:
@@ -219,14 +220,14 @@ def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, cha
       dx (2, n): those of the acceleration and of the auxiliary one.
     Out:
       changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
-      desk: workspace of a balance, overwritten.
+      workspace: workspace of a balance, overwritten.
 
     Returns whether all sweeps settled.
     """
     n = dq.shape[0]
-    o = track.index[w, 0]
-    last = track.index[w + 1, 0] - 1 - o
-    h = track.t[w + 1] - track.t[w]
+    o = history.index[w, 0]
+    last = history.index[w + 1, 0] - 1 - o
+    h = history.t[w + 1] - history.t[w]
     e1, e2, e3, beta, gamma, lag = alpha_weights(tables[0])
     da = dx[0]
     aux = dx[1]
@@ -255,7 +256,7 @@ def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, cha
                 u[d] = 0.0
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
-        settled = stage_forward(model, track, o + j, w_q, w_v, sweeps, desk, x, u, f, rows[j]) and settled
+        settled = stage_forward(model, history, o + j, w_q, w_v, sweeps, workspace, x, u, f, rows[j]) and settled
         for d in range(n):
             if j == last:
                 x[d] += w_q * f[d]
@@ -270,9 +271,9 @@ def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, cha
     for d in range(n):
         end_q[d] = changes[last, 0, d]
         end_v[d] = changes[last, 1, d]
-    state = track.state[w + 1]
-    push = track.push[w + 1]
-    project_forward(model, state[0], state[1], push[0], push[1], desk, end_q, end_v)
+    state = history.state[w + 1]
+    push = history.push[w + 1]
+    project_forward(model, state[0], state[1], push[0], push[1], workspace, end_q, end_v)
     q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
     for d in range(n):
         start = dq[d]

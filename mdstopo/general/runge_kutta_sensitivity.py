@@ -1,22 +1,22 @@
-"""The duties of the explicit methods: partial steps, reverse and tangent steps, weights."""
+"""The interface functions of the explicit methods: partial steps, reverse and tangent steps, weights."""
 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.duties import implement
+from mdstopo.general.method_interface import implement
 from mdstopo.general.runge_kutta import TAG, advance, scene_size
+from mdstopo.general.step_history import keep_state, restore_modes
 from mdstopo.general.step_linear import explicit_back, explicit_forward
-from mdstopo.general.track import keep_state, restore_modes
 from mdstopo.integrators.runge_kutta import MOST
 from mdstopo.integrators.runge_kutta_tables import STAGES
 
 
 @kernel
-def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v, work):
+def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
     """The state inside a step: the end of a step of length c h from the same start.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables: coefficients of the method.
     In:
@@ -24,11 +24,11 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
       k, c: number of the step, and the fraction of it.
       keep: whether the partial step is kept, as number count + 1, for a reverse sweep.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes become those of step k.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       q, v (n,): the state (m, rad; m/s, rad/s).
       work (WORK,): counts of work, added to.
 
@@ -37,15 +37,15 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
     n = q.shape[0]
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
-    h = c * (track.t[k + 1] - track.t[k])
-    o = track.index[count, 0]
+    h = c * (history.t[k + 1] - history.t[k])
+    o = history.index[count, 0]
     ends = np.empty((2, n))
     push = np.empty((2, model.size[0]))
-    restore_modes(track, track.index[k, 3], strength)
+    restore_modes(history, history.index[k, 3], member_state)
     advance(
-        model, tables[method], s, strength, track.index[k, 2], track.t[k], h, track.state[k, 0], track.state[k, 1],
-        keep, o if keep else np.int64(-1), desk, np.empty(model.size[0]), np.empty((MOST, n)), np.empty((MOST, n)),
-        np.empty((MOST, n)), track, ends, push, scene_size(model), work,
+        model, tables[method], s, member_state, history.index[k, 2], history.t[k], h, history.state[k, 0],
+        history.state[k, 1], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]), np.empty((MOST, n)),
+        np.empty((MOST, n)), np.empty((MOST, n)), history, ends, push, scene_size(model), work,
     )  # fmt: skip
     for d in range(n):
         q[d] = ends[0, d]
@@ -53,25 +53,25 @@ def point_of(tag, model, tables, strength, track, count, k, c, keep, desk, q, v,
     if not keep:
         return k
     w = count + 1
-    track.t[w] = track.t[k]
-    track.index[w, 0] = o
-    track.index[w, 1] = k - 1
-    track.index[w, 2] = track.index[k, 2]
-    track.index[w, 3] = track.index[k, 3]
-    keep_state(track, w + 1, track.t[k] + h, q, v, push[0], push[1])
-    track.index[w + 1, 0] = o + s
+    history.t[w] = history.t[k]
+    history.index[w, 0] = o
+    history.index[w, 1] = k - 1
+    history.index[w, 2] = history.index[k, 2]
+    history.index[w, 3] = history.index[k, 3]
+    keep_state(history, w + 1, history.t[k] + h, q, v, push[0], push[1])
+    history.index[w + 1, 0] = o + s
     return w
 
 
 @kernel
-def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, desk, work):
+def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows_bar, z, y, workspace, work):
     """Pull R cotangents of the end of a step back to its start.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables: coefficients of the method.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       w: number of the step.
       c: not used: a point inside a step is the end of a partial one (`point_of`).
@@ -82,21 +82,21 @@ def step_back(tag, model, tables, track, w, c, lam_q, lam_v, lam_x, bars, rows_b
     Out:
       z (R, s or more, n): virtual displacements of the stages' balances.
       y (n_row,): scratch.
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       work (WORK,): counts of work, added to.
     """
-    explicit_back(model, tables, track, w, bars, rows_bar, lam_q, lam_v, z, y, desk, work)
+    explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work)
 
 
 @kernel
-def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, changes, rows, desk):
+def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, changes, rows, workspace):
     """Push changes of the state at the start of a step to its end.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables: coefficients of the method.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
     In:
       w: number of the step.
       c, sweeps, dx: not used: partial steps are steps of their own, no stage is implicit, nothing else is carried.
@@ -105,19 +105,19 @@ def step_forward(tag, model, tables, track, w, c, sweeps, dq, dv, dx, force, cha
       dq, dv (n,): changes of coordinates and velocities.
     Out:
       changes (s, 3, n), rows (s, n_row): changes of the stages' q, v, a and multipliers.
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
 
     Returns True: there are no sweeps that might not settle.
     """
-    explicit_forward(model, tables, track, w, dq, dv, force, changes, rows, desk)
+    explicit_forward(model, tables, history, w, dq, dv, force, changes, rows, workspace)
     return True
 
 
 @kernel
-def beside(tag, track, k, c, e, q, v, a, q_out, v_out):
+def beside(tag, history, k, c, e, q, v, a, q_out, v_out):
     """The motion a little later, on a parabola: it has the accelerations of its balance everywhere.
 
-    tag, track, k, c: method, history, step and fraction; not used.
+    tag, history, k, c: method, history, step and fraction; not used.
     e: how much later (s); below 0: earlier.
     q, v, a (n,): the motion here (m, rad; m/s, rad/s; m/s^2, rad/s^2).
     q_out, v_out (n,): coordinates and velocities there.
@@ -134,19 +134,19 @@ def derivatives(tag):
 
 
 @kernel
-def weights_of(tag, model, tables, track, w, out):
+def weights_of(tag, model, tables, history, w, out):
     """Weights of the stages in an integral over one step, as of the velocity of one more coordinate.
 
-    tag: the method of integration (`duties`).
+    tag: the method of integration (`method_interface`).
     model: the compiled scene.
     tables: coefficients of the method.
-    track: the history of steps (`Track`).
+    history: the history of steps (`StepHistory`).
     w: number of the step.
     out (s or more,): the weights (s).
     """
     method = 1 if model.size[2] != 0 else 0
     for j in range(STAGES[method]):
-        out[j] = (track.t[w + 1] - track.t[w]) * tables[method, 2, 2, j]
+        out[j] = (history.t[w + 1] - history.t[w]) * tables[method, 2, 2, j]
 
 
 implement(

@@ -1,7 +1,7 @@
 """What is done with finished steps, whatever integrator made them: objectives, gradients, dense output.
 
-`look` and `dense` are compiled entries (see `integrators.driver`): the packed model; tables, room and limits of the
-method; its tag.
+`evaluate_responses` and `dense` are compiled entries (see `integrators.driver`): the packed model; tables, room and
+limits of the method; its tag.
 """
 
 import math
@@ -9,11 +9,11 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import entry, part
-from mdstopo.integrators.contract import point_of, steps_of
 from mdstopo.integrators.gauss import TAG as GAUSS
 from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, deflection, solved_to, step_at
+from mdstopo.integrators.steps_interface import point_of, steps_of
+from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import add_loads
-from mdstopo.mechanics.carrying import carrying
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import elongation_of, meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
@@ -30,7 +30,7 @@ VISIBLE, ELONGATED = 1e-5, 100.0
 
 
 @entry
-def look(
+def evaluate_responses(
     tag,
     ints,
     floats,
@@ -55,7 +55,7 @@ def look(
     """Every objective of the load case, from the steps that `simulate` left in room.
 
     Constant:
-      tag: of the integrator (`contract.steps_of`).
+      tag: of the integrator (`steps_interface.steps_of`).
       ints, floats: the packed model.
       tables: constant arrays of the integrator.
     In:
@@ -78,7 +78,7 @@ def look(
       padded (R, M_padded): overwritten.
     """
     model = unpack(ints, floats)
-    motion, own, left = carrying(model, strength, np.bool_(False))
+    motion, own, left = active_members(model, strength, np.bool_(False))
     turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
@@ -118,7 +118,7 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
       steps: what the integrator kept.
       count: steps that were taken.
       pose (S, n_pair, POSE): relative poses of the stages.
-      settings (4,): of `look`; the tolerance and the fixed step are read.
+      settings (4,): of `evaluate_responses`; the tolerance and the fixed step are read.
     Out:
       meeting (2 or more,): index of the member in the padded arrays, or -1; where there is one, then the number of
         the stage before which its ends meet, or the number of stages where they meet after the last one.
@@ -284,7 +284,7 @@ def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, str
     """The motion at any times: q, v, and a by the equations of motion, right-continuous at kinks.
 
     Constant:
-      tag: of the integrator (`contract.steps_of`).
+      tag: of the integrator (`steps_interface.steps_of`).
       ints, floats: the packed model.
       tables: constant arrays of the integrator.
     In:

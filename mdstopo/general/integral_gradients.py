@@ -1,15 +1,15 @@
 """What Python calls for integrals over time and their gradients, by the adjoint sweep; rows: `row_sweep`."""
 
 from mdstopo.compiler.jit import entry
+from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import integral_gradient
-from mdstopo.general.balance import make_desk
 from mdstopo.general.members import unscale_general
 from mdstopo.general.model import unpack_general
-from mdstopo.general.track import carve_track
+from mdstopo.general.step_history import carve_history
 
 
 @entry
-def pull(
+def integral_with_gradient(
     tag,
     ints,
     floats,
@@ -22,7 +22,7 @@ def pull(
     gradient,
     room,
     room_ints,
-    strength,
+    member_state,
     padded,
     out,
     start,
@@ -31,19 +31,19 @@ def pull(
     """Integrate response j over time and, on demand, differentiate the integral by the design (adjoint).
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       ints, floats: the packed scene (`pack_general`).
       tables: coefficients of the method.
-      limits (6,): sizes of the history of steps (`carve_track`).
+      limits (6,): sizes of the history of steps (`carve_history`).
     In:
       alpha (N,): the design.
       count: number of steps.
       j: the response.
       integral: 1 for the integral of the response, 2 for that of its square.
       gradient: whether the derivatives are wanted.
-      room, room_ints: flat arrays of the history of steps (`carve_track`).
+      room, room_ints: flat arrays of the history of steps (`carve_history`).
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out:
       out (N + P,): derivatives by alpha, then by the values of the laws' variables; untouched without `gradient`.
       start (n,): what the integral pulls on the start's positions (cotangents); or no length: not wanted.
@@ -53,10 +53,10 @@ def pull(
     Returns the integral.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
     total = integral_gradient(
-        tag, model, tables, strength, track, count, j, integral == 2, gradient, desk, start, padded, work
+        tag, model, tables, member_state, history, count, j, integral == 2, gradient, workspace, start, padded, work
     )
     if gradient:
         unscale_general(model.block, model.power, alpha, padded, out)

@@ -3,16 +3,16 @@
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.balance import balance, make_desk
-from mdstopo.general.duties import beside, point_of
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.forces import drive_state
+from mdstopo.general.method_interface import beside, point_of
 from mdstopo.general.model import unpack_general
 from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
-from mdstopo.general.track import carve_track, copy_vector, restore_modes
+from mdstopo.general.step_history import carve_history, copy_vector, restore_modes
 
 
 @entry
-def visit(
+def sample_response(
     tag,
     ints,
     floats,
@@ -21,7 +21,7 @@ def visit(
     count,
     room,
     room_ints,
-    strength,
+    member_state,
     exact,
     rates,
     j,
@@ -35,13 +35,13 @@ def visit(
     """States, and values and rates of a response, at any places of a finished motion.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       ints, floats: the packed scene (`pack_general`).
       tables: coefficients of the method.
-      limits (6,): sizes of the history of steps (`carve_track`).
+      limits (6,): sizes of the history of steps (`carve_history`).
     In:
       count: number of steps.
-      room, room_ints: flat arrays of the history of steps (`carve_track`).
+      room, room_ints: flat arrays of the history of steps (`carve_history`).
       exact: whether states inside steps are those of the method's own motion; else of the quintic through the
         coordinates, velocities and accelerations at both ends.
       rates: whether rates are wanted; else, where response j needs no balance, there may be no a and lam_out either.
@@ -49,7 +49,7 @@ def visit(
       who: number of the member whose force is looked at; -1: at each place the one with the largest force.
       places (K, 2): steps, and fractions of them; 0 and 1 are the states at the ends as they are in that step.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out:
       out (3, K, n): coordinates, velocities, accelerations.
       lam_out (K, n_row + n_driven): multipliers of the solved rows, then those of the driven coordinates, what
@@ -58,8 +58,8 @@ def visit(
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     n_row = model.size[0]
     no = np.bool_(False)
@@ -75,52 +75,71 @@ def visit(
         v = out[1, i]
         a = out[2, i]
         lam = lam_out[i, :n_row]
-        segment = track.index[k, 2]
-        last = go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work)
-        t = time_at(track, k, c)
+        segment = history.index[k, 2]
+        last = go_to(
+            tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends, lam, q, v, work
+        )
+        t = time_at(history, k, c)
         seen[i, 2] = who
         if j >= 0 and model.response[j, 0] == MEMBER_FORCE and who < 0:
-            balance(model, strength, segment, t, q, v, no, desk, a, lam)
-            seen[i, 2] = largest_force(model, strength, segment, t, model.response[j, 5], q, v, a)
+            solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+            seen[i, 2] = largest_force(model, member_state, segment, t, model.response[j, 5], q, v, a)
         value, rate = rated(
-            tag, model, strength, track, k, c, j, int(seen[i, 2]), rates, t, q, v, desk, a, lam, bars, row_bar, near
+            tag,
+            model,
+            member_state,
+            history,
+            k,
+            c,
+            j,
+            int(seen[i, 2]),
+            rates,
+            t,
+            q,
+            v,
+            workspace,
+            a,
+            lam,
+            bars,
+            row_bar,
+            near,
         )
         seen[i, 0] = value
         seen[i, 1] = rate
         for m in range(model.driven.shape[0]):
             d = model.driven[m]
-            lam_out[i, n_row + m] = desk.f[d] - model.mass[d] * a[d] - held_back(model, desk, d, a, lam)
+            lam_out[i, n_row + m] = workspace.f[d] - model.mass[d] * a[d] - held_back(model, workspace, d, a, lam)
 
 
 @entry
 def compare(
-    tag, ints, floats, tables, limits, count, room, room_ints, strength, exact, j, places, who, top, seen, work
+    tag, ints, floats, tables, limits, count, room, room_ints, member_state, exact, j, places, who, top, seen, work
 ):
     """Forces of the members of a group beside each other, at any places of a finished motion.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       ints, floats: the packed scene (`pack_general`).
       tables: coefficients of the method.
-      limits (6,): sizes of the history of steps (`carve_track`).
+      limits (6,): sizes of the history of steps (`carve_history`).
     In:
       count: number of steps.
-      room, room_ints: flat arrays of the history of steps (`carve_track`).
-      exact: whether states inside steps are those of the method's own motion; else of a quintic (`visit`).
+      room, room_ints: flat arrays of the history of steps (`carve_history`).
+      exact: whether states inside steps are those of the method's own motion; else of a quintic (`sample_response`).
       j: the response, which says which group.
       places (K, 2): steps, and fractions of them.
       who (C,): numbers within the group of the members whose forces and rates are wanted; without any no rates are
         computed.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out:
       top (M,): the largest |f*| of each member of the group over all places (N).
       seen (C, K, 2): f* of the members who (N) and its rate (N/s), by differences along the motion.
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
-    track = carve_track(model, limits, room, room_ints)
-    desk = make_desk(model)
+    history = carve_history(model, limits, room, room_ints)
+    workspace = make_workspace(model)
     n = model.mass.shape[0]
     n_row = model.size[0]
     no = np.bool_(False)
@@ -138,11 +157,13 @@ def compare(
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
-        segment = track.index[k, 2]
-        last = go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work)
-        t = time_at(track, k, c)
-        balance(model, strength, segment, t, q, v, no, desk, a, lam)
-        group_forces(model, strength, segment, t, group, q, v, a, force)
+        segment = history.index[k, 2]
+        last = go_to(
+            tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends, lam, q, v, work
+        )
+        t = time_at(history, k, c)
+        solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+        group_forces(model, member_state, segment, t, group, q, v, a, force)
         for m in range(top.shape[0]):
             top[m] = max(top[m], abs(force[m]))
         for m in range(who.shape[0]):
@@ -150,30 +171,30 @@ def compare(
             seen[m, i, 1] = 0.0
         if who.shape[0] == 0:
             continue
-        apart = APART * (track.t[k + 1] - track.t[k])
+        apart = APART * (history.t[k + 1] - history.t[k])
         for side in (-1.0, 1.0):
             e = side * apart
-            beside(tag, track, k, c, e, q, v, a, near[0], near[1])
-            balance(model, strength, segment, t + e, near[0], near[1], no, desk, near[2], lam)
-            group_forces(model, strength, segment, t + e, group, near[0], near[1], near[2], force)
+            beside(tag, history, k, c, e, q, v, a, near[0], near[1])
+            solve_accelerations(model, member_state, segment, t + e, near[0], near[1], no, workspace, near[2], lam)
+            group_forces(model, member_state, segment, t + e, group, near[0], near[1], near[2], force)
             for m in range(who.shape[0]):
                 seen[m, i, 1] += side * force[who[m]] / (2.0 * apart)
 
 
 @kernel
-def time_at(track, k, c):
+def time_at(history, k, c):
     """The time at fraction c of step k."""
     if c >= 1.0:
-        return track.t[k + 1]
-    return track.t[k] + c * (track.t[k + 1] - track.t[k])
+        return history.t[k + 1]
+    return history.t[k] + c * (history.t[k + 1] - history.t[k])
 
 
 @kernel
-def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, ends, lam, q, v, work):
+def go_to(tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends, lam, q, v, work):
     """The state at a fraction of a step, with the modes of that step.
 
     Constant:
-      tag: the method of integration (`duties`).
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables: coefficients of the method.
       count: number of steps.
@@ -182,12 +203,12 @@ def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, e
       exact: whether the state inside it is that of the method's own motion; else of a quintic.
       last: number of the step whose ends are in `ends`; -1: none.
     In place:
-      strength (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes become those of step k.
-      track: the history of steps (`Track`).
+      history: the history of steps (`StepHistory`).
       ends (6, n): coordinates, velocities, accelerations of the quintic's start, then of its end.
     Out:
-      desk: workspace of a balance (`balance.Desk`).
+      workspace: workspace of a balance (`accelerations.Workspace`).
       lam (n_row,): scratch.
       q, v (n,): the state (m, rad; m/s, rad/s).
       work (WORK,): counts of work, added to.
@@ -195,27 +216,27 @@ def go_to(tag, model, tables, strength, track, count, k, c, exact, last, desk, e
     Returns the number of the step whose ends are in `ends` now.
     """
     no = np.bool_(False)
-    h = track.t[k + 1] - track.t[k]
-    segment = track.index[k, 2]
-    restore_modes(track, track.index[k, 3], strength)
+    h = history.t[k + 1] - history.t[k]
+    segment = history.index[k, 2]
+    restore_modes(history, history.index[k, 3], member_state)
     if c <= 0.0 or c >= 1.0:
-        state = track.state[k if c <= 0.0 else k + 1]
+        state = history.state[k if c <= 0.0 else k + 1]
         copy_vector(state[0], q)
         copy_vector(state[1], v)
     elif exact:
-        point_of(tag, model, tables, strength, track, count, k, c, no, desk, q, v, work)
+        point_of(tag, model, tables, member_state, history, count, k, c, no, workspace, q, v, work)
     else:
         if k != last:
             for e in range(2):
-                copy_vector(track.state[k + e, 0], ends[3 * e])
-                copy_vector(track.state[k + e, 1], ends[3 * e + 1])
-                balance(
-                    model, strength, segment, track.t[k + e], ends[3 * e], ends[3 * e + 1], no, desk, ends[3 * e + 2],
-                    lam,
+                copy_vector(history.state[k + e, 0], ends[3 * e])
+                copy_vector(history.state[k + e, 1], ends[3 * e + 1])
+                solve_accelerations(
+                    model, member_state, segment, history.t[k + e], ends[3 * e], ends[3 * e + 1], no, workspace,
+                    ends[3 * e + 2], lam,
                 )  # fmt: skip
             last = k
         quintic(c, h, ends, q, v)
-    drive_state(model, segment, time_at(track, k, c), q, v)
+    drive_state(model, segment, time_at(history, k, c), q, v)
     return last
 
 
@@ -236,18 +257,18 @@ def quintic(c, h, ends, q, v):
 
 
 @kernel
-def held_back(model, desk, d, a, lam):
+def held_back(model, workspace, d, a, lam):
     """What inerters and joints take at coordinate d: (sum s b B^T B a + Phi_q^T lam)_d."""
     total = 0.0
     for p in range(model.pair.shape[0]):
         for i in range(6):
             if 3 * model.pair[p, i // 3] + i % 3 == d:
                 for j in range(6):
-                    total += desk.mass[p, i, j] * a[3 * model.pair[p, j // 3] + j % 3]
+                    total += workspace.mass[p, i, j] * a[3 * model.pair[p, j // 3] + j % 3]
     for j in range(model.joint.shape[0]):
         for i in range(6):
             if 3 * model.joint[j, 1 + i // 3] + i % 3 == d:
                 for r in range(3):
                     if model.row[j, r] >= 0:
-                        total += desk.jac[j, r, i] * lam[model.row[j, r]]
+                        total += workspace.jac[j, r, i] * lam[model.row[j, r]]
     return total

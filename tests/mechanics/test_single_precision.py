@@ -8,7 +8,7 @@ from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.passes import SUMS, member_sums
-from mdstopo.mechanics.rough import may_be_rough, rough_sums
+from mdstopo.mechanics.single_precision import may_use_single_precision, single_precision_sums
 from mdstopo.scene import compile as scenes
 from mdstopo.scene.grids import STRIDE
 from mdstopo.scene.model import STIFFNESS, Springs
@@ -19,10 +19,10 @@ with_vectors()
 
 
 @numba.njit
-def _sums(block, member, chunk, strength, rel, exact, rough):
+def _sums(block, member, chunk, strength, rel, exact, single_precision):
     springs = Springs(block, member, chunk, 0, np.zeros((block.shape[0], 2)))
     member_sums(springs, strength, rel, rel.shape[0], True, exact)
-    rough_sums(springs, strength, rel, rel.shape[0], rough)
+    single_precision_sums(springs, strength, rel, rel.shape[0], single_precision)
 
 
 def web(p, q, scale=1.0, **more):
@@ -49,25 +49,33 @@ def model_of(case):
 )
 def test_sums_in_single_precision_are_near_the_exact_ones(p, q):
     model = model_of(read(web(p, q)))
-    assert may_be_rough.py_func(model)
+    assert may_use_single_precision.py_func(model)
     rng = np.random.default_rng(p)
     strength = rng.uniform(0.5, 1.0, (3, model.member.shape[1])) * model.member[STIFFNESS]
     turns = rng.uniform(-1.0, 1.0, (9, 1))
     rel = np.zeros((9, 1, POSE))
     rel[:, :, :2] = rng.uniform(-1.0, 1.0, (9, 1, 2))
     rel[:, :, 2], rel[:, :, 3] = np.cos(turns), np.sin(turns)
-    exact, rough = np.empty((2, 9, 1, SUMS))
-    _sums(np.array(model.block), np.array(model.member), np.zeros((0, 3), np.int64), strength, rel, exact, rough)
+    exact, single_precision = np.empty((2, 9, 1, SUMS))
+    _sums(
+        np.array(model.block),
+        np.array(model.member),
+        np.zeros((0, 3), np.int64),
+        strength,
+        rel,
+        exact,
+        single_precision,
+    )
     # a sum's rounding is that of its largest terms: forces, tangents
     for part in (slice(0, 3), slice(7, 16)):
         size = np.abs(exact[..., part]).max()
         assert size > 0.0
-        assert np.abs(rough[..., part] - exact[..., part]).max() <= 2e-6 * size
+        assert np.abs(single_precision[..., part] - exact[..., part]).max() <= 2e-6 * size
 
 
 def test_only_grids_alone_are_summed_in_single_precision():
-    assert not may_be_rough.py_func(model_of(read(grids(20, 51))))  # members beside
-    assert not may_be_rough.py_func(model_of(read(web(3, 51))))  # no grid
+    assert not may_use_single_precision.py_func(model_of(read(grids(20, 51))))  # members beside
+    assert not may_use_single_precision.py_func(model_of(read(web(3, 51))))  # no grid
 
 
 @pytest.mark.parametrize("seed", range(6))

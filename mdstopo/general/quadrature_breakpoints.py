@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
 #: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
-#: how often an evaluation looks for landings
+#: how often an evaluation looks for breakpoints
 ROUNDS = 3
 #: how far both sums over a step may differ, relative to the tolerance and the whole integral: derivatives bend more
 #: sharply than values near a zero of a norm, where they were off by some hundred times as much (at 0.1 by up to 800
@@ -46,20 +46,21 @@ APART = 1e-10
 Look = Callable[[FloatArray], FloatArray]
 
 
-def landings(driver: "GeneralDriver", count: int) -> list[float]:
-    """Times at which steps are to end, beside `driver.landings`, from the `count` steps of its last run."""
+def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
+    """Times at which steps are to end, beside `driver.quadrature_breakpoints`, from the `count` steps of its last
+    run."""
     model, found = driver.scene.model, list[float]()
     looked = [(j, name) for j, name in enumerate(driver.scene.reductions) if name in INTEGRALS]
     if not looked:
         return found
     t = driver.states()[0][: count + 1].copy()
-    if not driver.landings:
+    if not driver.quadrature_breakpoints:
         for j, _ in looked:
             if has_kinks(model, j):
                 found += kinks(driver, j, t)
     if not driver.method.kind.adaptive or driver.settings[2] > 0.0:
         return found
-    ends = np.unique(np.concatenate([t, found, driver.landings]))
+    ends = np.unique(np.concatenate([t, found, driver.quadrature_breakpoints]))
     ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
     method = 1 if model.size[2] != 0 else 0
     vectors = driver.method.tables[method, 2, :, : STAGES[method]]
@@ -68,7 +69,7 @@ def landings(driver: "GeneralDriver", count: int) -> list[float]:
     for j, name in looked:
 
         def look(places: FloatArray, j: int = j, square: bool = INTEGRALS[name] == 2) -> FloatArray:
-            value = driver.see(j, count, places, False, rates=False)[:, 0]
+            value = driver.evaluate_at(j, count, places, False, rates=False)[:, 0]
             return value * value if square else value
 
         nothing = _rounding(driver, j, float(t[-1] - t[0]))
@@ -81,7 +82,7 @@ def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
     """What response j may be by rounding alone, where that can be said: what joints hold at zero is never more."""
     kind, _, _, _, order, _ = driver.scene.model.response[j].tolist()
     kernels = LISTED[kind]
-    if kernels.needs_balance:
+    if kernels.needs_accelerations:
         return 0.0
     return float(NOUGHT * (1.0 if kernels.vector is None else size_of(driver.case)) / span**order)
 

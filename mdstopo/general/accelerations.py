@@ -30,7 +30,7 @@ from mdstopo.general.structures import bundle
 from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.mechanics.geometry import POSE, turned_from
-from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_pull
+from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.table import (
     joint_acceleration_slopes,
     joint_gamma,
@@ -52,23 +52,23 @@ DESK = (
 )  # fmt: skip
 
 
-class Desk:
-    """The workspace of a balance, whose arrays DESK names; made in kernels only, by `make_desk`."""
+class Workspace:
+    """The workspace of a balance, whose arrays DESK names; made in kernels only, by `make_workspace`."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(Desk, DESK)
+bundle(Workspace, DESK)
 
 
 @kernel
-def make_desk(model):
+def make_workspace(model):
     """A workspace for one balance."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
     total = model.place.shape[0]
-    return Desk(
+    return Workspace(
         np.zeros((n // 3, 2)),
         np.zeros((n_pair, POSE)),
         np.zeros((n_pair, SUMS)),
@@ -126,19 +126,19 @@ def gather_multipliers(model, j, lam, out):
 
 
 @kernel
-def joint_state(model, q, v, desk):
-    """Phi, Phi_q and gamma of all joints of bodies that are turned on the desk (`forces.turn_bodies`)."""
-    w = desk.own[0]
-    wd = desk.own[1]
+def joint_state(model, q, v, workspace):
+    """Phi, Phi_q and gamma of all joints of bodies that are turned in the workspace (`forces.turn_bodies`)."""
+    w = workspace.own[0]
+    wd = workspace.own[1]
     for j in range(model.joint.shape[0]):
-        gather_turned(model, j, q, desk.turned, w)
+        gather_turned(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
-        joint_rows(model.joint[j, 0], model.joint_par[j], w, desk.phi[j], desk.jac[j])
-        joint_gamma(model.joint[j, 0], model.joint_par[j], w, wd, desk.gamma[j])
+        joint_rows(model.joint[j, 0], model.joint_par[j], w, workspace.phi[j], workspace.jac[j])
+        joint_gamma(model.joint[j, 0], model.joint_par[j], w, wd, workspace.gamma[j])
 
 
 @kernel
-def joint_slopes(model, q, v, a, lam, desk):
+def joint_slopes(model, q, v, a, lam, workspace):
     """G_q and G_v of all joints, and their stiffness added to K.
 
     Constant:
@@ -146,25 +146,25 @@ def joint_slopes(model, q, v, a, lam, desk):
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
       lam (n_row,): multipliers (N, N m).
     In and out:
-      desk: the workspace, with the bodies turned (`forces.turn_bodies`); by_q, by_v are set, k is added to.
+      workspace: the workspace, with the bodies turned (`forces.turn_bodies`); by_q, by_v are set, k is added to.
     """
-    w = desk.own[0]
-    wd = desk.own[1]
-    wdd = desk.own[2]
-    mine = desk.own[3]
+    w = workspace.own[0]
+    wd = workspace.own[1]
+    wdd = workspace.own[2]
+    mine = workspace.own[3]
     for j in range(model.joint.shape[0]):
-        gather_turned(model, j, q, desk.turned, w)
+        gather_turned(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
         code = model.joint[j, 0]
         par = model.joint_par[j]
-        joint_acceleration_slopes(code, par, w, wd, wdd, desk.by_q[j], desk.by_v[j])
-        joint_stiffness(code, par, w, mine, desk.k[model.joint[j, 3]])
+        joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
+        joint_stiffness(code, par, w, mine, workspace.k[model.joint[j, 3]])
 
 
 @kernel
-def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
+def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
     """Factorise W(w_q, w_v), or its transpose, for `solve_unknowns`.
 
     Constant:
@@ -175,22 +175,31 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
       w_q, w_v: weights of K with G_q (s^2), and of C with G_v (s).
       transposed: whether the transpose is meant.
     In and out:
-      desk: the workspace, with the joints' Phi_q, G_q and G_v; the factors come onto it.
+      workspace: the workspace, with the joints' Phi_q, G_q and G_v; the factors come onto it.
 
     Returns the place of the unknown at which the matrix is singular, or -1.
     """
     tangent = w_q != 0.0 or w_v != 0.0
-    alone = not tangent and desk.switches[DIAGONAL] != 0
-    desk.switches[OF_JOINTS] = 1 if alone else 0
+    alone = not tangent and workspace.switches[DIAGONAL] != 0
+    workspace.switches[OF_JOINTS] = 1 if alone else 0
     if alone:
-        thorough = desk.switches[THOROUGH] != 0
-        return factor_joints(model, desk.spread, desk.jac, desk.pull, desk.gram, desk.diagonal, thorough, desk.x)
-    band = desk.band
+        thorough = workspace.switches[THOROUGH] != 0
+        return factor_joints(
+            model,
+            workspace.spread,
+            workspace.jac,
+            workspace.pull,
+            workspace.gram,
+            workspace.diagonal,
+            thorough,
+            workspace.x,
+        )
+    band = workspace.band
     half = model.size[1]
     n = model.mass.shape[0]
-    damped = desk.switches[DAMPED] != 0
+    damped = workspace.switches[DAMPED] != 0
     band[:] = 0.0
-    scale = desk.scale
+    scale = workspace.scale
     for d in range(n):
         scale[model.place[d]] = 1.0 / np.sqrt(model.mass[d]) if model.free[d] != 0 else 1.0
     for j in range(model.joint.shape[0]):
@@ -200,7 +209,7 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
                 for i in range(6):
                     column = 3 * model.joint[j, 1 + i // 3] + i % 3
                     if model.free[column] != 0:
-                        size += desk.jac[j, r, i] ** 2 / model.mass[column]
+                        size += workspace.jac[j, r, i] ** 2 / model.mass[column]
                 scale[model.place[n + model.row[j, r]]] = 1.0 / np.sqrt(size) if size > 0.0 else 1.0
     for d in range(n):
         p = model.place[d]
@@ -236,13 +245,13 @@ def factor_matrix(model, desk, k, c, turn, mass, w_q, w_v, transposed):
                 if model.free[column] == 0:
                     continue
                 there = model.place[column]
-                force = desk.jac[j, r, i]
+                force = workspace.jac[j, r, i]
                 value = force
                 if tangent:
-                    value += w_q * desk.by_q[j, r, i] + w_v * desk.by_v[j, r, i]
+                    value += w_q * workspace.by_q[j, r, i] + w_v * workspace.by_v[j, r, i]
                 put(band, half, scale, there, at, force, transposed)
                 put(band, half, scale, at, there, value, transposed)
-    return factorise_at(band, half, desk.pivots, tangent)
+    return factorise_at(band, half, workspace.pivots, tangent)
 
 
 @kernel
@@ -272,41 +281,42 @@ def factorise_at(band, half, pivots, tangent):
 
 
 @kernel
-def solve_unknowns(model, desk, a, lam):
-    """Solve with the factors on the desk for the right side a (n,), lam (n_row,), in place; driven parts become 0."""
-    if desk.switches[OF_JOINTS] != 0:
-        solve_joints(model, desk.inverse, desk.pull, desk.gram, desk.diagonal, desk.x, a, lam)
+def solve_unknowns(model, workspace, a, lam):
+    """Solve with the factors in the workspace for the right side a (n,), lam (n_row,), in place; driven parts become
+    0."""
+    if workspace.switches[OF_JOINTS] != 0:
+        solve_joints(model, workspace.inverse, workspace.pull, workspace.gram, workspace.diagonal, workspace.x, a, lam)
         return
     n = model.mass.shape[0]
-    x = desk.x
+    x = workspace.x
     for d in range(n):
         p = model.place[d]
-        x[p] = a[d] * desk.scale[p] if model.free[d] != 0 else 0.0
+        x[p] = a[d] * workspace.scale[p] if model.free[d] != 0 else 0.0
     for r in range(lam.shape[0]):
         p = model.place[n + r]
-        x[p] = lam[r] * desk.scale[p]
-    solve(desk.band, model.size[1], desk.pivots, x)
+        x[p] = lam[r] * workspace.scale[p]
+    solve(workspace.band, model.size[1], workspace.pivots, x)
     for d in range(n):
         p = model.place[d]
-        a[d] = x[p] * desk.scale[p]
+        a[d] = x[p] * workspace.scale[p]
     for r in range(lam.shape[0]):
         p = model.place[n + r]
-        lam[r] = x[p] * desk.scale[p]
+        lam[r] = x[p] * workspace.scale[p]
 
 
 @kernel
-def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):
+def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspace, a, lam):
     """Accelerations and multipliers at one state.
 
     Constant:
       model: the compiled scene.
-      strength (3, columns): state of the members: scale, mode, permanent set (`members`).
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       segment, t: segment of `model.times`, and time in it (s).
-      tangent: whether desk.k, .c, .turn, .by_q, .by_v are to hold the tangents of the whole balance (with the switch
-        APART those of members and loads alone).
+      tangent: whether workspace.k, .c, .turn, .by_q, .by_v are to hold the tangents of the whole balance (with the
+        switch APART those of members and loads alone).
     In and out:
       q, v (n,): coordinates and velocities (m, rad; m/s, rad/s); their driven part is put in place first.
-      desk: the workspace; forces, poses, the joints' rows and the factors stay on it.
+      workspace: the workspace; forces, poses, the joints' rows and the factors stay on it.
     Out:
       a (n,): accelerations (m/s^2, rad/s^2).
       lam (n_row,): multipliers (N, N m).
@@ -315,27 +325,29 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):
     """
     n = q.shape[0]
     drive_state(model, segment, t, q, v)
-    general_forces(model, strength, segment, t, q, v, tangent, desk)
-    if desk.switches[DIAGONAL] == 0:
-        add_inerters(model, segment, strength, q, v, desk.mass, desk.f)
-    joint_state(model, q, v, desk)
-    singular = factor_matrix(model, desk, desk.k, desk.c, desk.turn, desk.mass, 0.0, 0.0, np.bool_(False))
+    general_forces(model, member_state, segment, t, q, v, tangent, workspace)
+    if workspace.switches[DIAGONAL] == 0:
+        add_inerters(model, segment, member_state, q, v, workspace.mass, workspace.f)
+    joint_state(model, q, v, workspace)
+    singular = factor_matrix(
+        model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, np.bool_(False)
+    )
     if singular >= 0:
         return singular
-    known = desk.known  # zero but for what is driven
+    known = workspace.known  # zero but for what is driven
     drive_acceleration(model, segment, t, known)
     for d in range(n):
-        a[d] = desk.f[d]
-    if model.driven.shape[0] > 0 and desk.switches[DIAGONAL] == 0:
+        a[d] = workspace.f[d]
+    if model.driven.shape[0] > 0 and workspace.switches[DIAGONAL] == 0:
         for p in range(model.pair.shape[0]):
             for i in range(6):
                 row = 3 * model.pair[p, i // 3] + i % 3
                 for j in range(6):
-                    a[row] -= desk.mass[p, i, j] * known[3 * model.pair[p, j // 3] + j % 3]
+                    a[row] -= workspace.mass[p, i, j] * known[3 * model.pair[p, j // 3] + j % 3]
     joint = model.joint
     row = model.row
-    gamma = desk.gamma
-    jac = desk.jac
+    gamma = workspace.gamma
+    jac = workspace.jac
     for j in range(joint.shape[0]):
         one = 3 * joint[j, 1]
         two = 3 * joint[j, 2]
@@ -345,26 +357,26 @@ def balance(model, strength, segment, t, q, v, tangent, desk, a, lam):
                 for i in range(3):
                     value -= jac[j, r, i] * known[one + i] + jac[j, r, 3 + i] * known[two + i]
                 lam[row[j, r]] = value
-    solve_unknowns(model, desk, a, lam)
+    solve_unknowns(model, workspace, a, lam)
     for i in range(model.driven.shape[0]):
         a[model.driven[i]] = known[model.driven[i]]
     if tangent:
-        if desk.switches[APART] == 0:
-            joint_slopes(model, q, v, a, lam, desk)
-        if desk.switches[DIAGONAL] == 0:
-            add_inerter_tangents(model, segment, strength, q, v, a, desk.k, desk.c)
+        if workspace.switches[APART] == 0:
+            joint_slopes(model, q, v, a, lam, workspace)
+        if workspace.switches[DIAGONAL] == 0:
+            add_inerter_tangents(model, segment, member_state, q, v, a, workspace.k, workspace.c)
     return -1
 
 
 @kernel
-def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):
+def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
     """Cotangents of a state from those of its balance, which z and y hold.
 
     bar_q -= K^T z + G_q^T y (turning loads with their sign), bar_v -= C^T z + G_v^T y.
 
     Constant:
       model: the compiled scene.
-      desk: the workspace, with G_q and G_v.
+      workspace: the workspace, with G_q and G_v.
       k, c (n_pair, 6, 6): stiffness and damping of the balance. turn (n,): slopes of the turning loads.
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
@@ -373,12 +385,12 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):
     """
     pair = model.pair
     joint = model.joint
-    pull_matrices(pair, k, z, bar_q)
-    if desk.switches[DAMPED] != 0:
-        pull_matrices(pair, c, z, bar_v)
-    pull_turns(turn, z, bar_q)
-    by_q = desk.by_q
-    by_v = desk.by_v
+    matrices_vjp(pair, k, z, bar_q)
+    if workspace.switches[DAMPED] != 0:
+        matrices_vjp(pair, c, z, bar_v)
+    turns_vjp(turn, z, bar_q)
+    by_q = workspace.by_q
+    by_v = workspace.by_v
     row = model.row
     for j in range(joint.shape[0]):
         one = 3 * joint[j, 1]
@@ -394,14 +406,14 @@ def pull_back(model, desk, k, c, turn, z, y, bar_q, bar_v):
 
 
 @kernel
-def pull_matrices(pair, k, z, bar):
+def matrices_vjp(pair, k, z, bar):
     """bar (n,) -= K^T z, K by pairs (n_pair, 6, 6)."""
     for p in range(pair.shape[0]):
-        _pull_matrix(pair, p, k[p], z, bar)
+        _matrix_vjp(pair, p, k[p], z, bar)
 
 
 @part
-def _pull_matrix(pair, p, m, z, bar):
+def _matrix_vjp(pair, p, m, z, bar):
     """bar (n,) -= m^T z of pair p, m (6, 6)."""
     one = 3 * pair[p, 0]
     two = 3 * pair[p, 1]
@@ -417,37 +429,37 @@ def _pull_matrix(pair, p, m, z, bar):
 
 
 @kernel
-def pull_turns(turn, z, bar):
+def turns_vjp(turn, z, bar):
     """bar (n,) += (slope of the turning loads)^T z."""
     for d in range(z.shape[0]):
         bar[d - d % 3 + 2] += turn[d] * z[d]
 
 
 @kernel
-def pull_carried(model, desk, k, c, turn, z, bar_q, bar_v):
-    """`pull_back` without the joints, over the pairs between which members, bushings or contacts act.
+def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
+    """`accelerations_vjp` without the joints, over the pairs between which members, bushings or contacts act.
 
     Constant:
       model: the compiled scene.
-      desk: the workspace (`carries`, `switches`).
+      workspace: the workspace (`carries`, `switches`).
       k, c (n_pair, 6, 6): stiffness and damping of these pairs, without the joints'. turn (n,): slopes of the turning
         loads.
       z (n,): virtual displacements; driven parts are 0.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
-    damped = desk.switches[DAMPED] != 0
+    damped = workspace.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
-        if desk.carries[p] != 0:
-            _pull_matrix(model.pair, p, k[p], z, bar_q)
+        if workspace.carries[p] != 0:
+            _matrix_vjp(model.pair, p, k[p], z, bar_q)
             if damped:
-                _pull_matrix(model.pair, p, c[p], z, bar_v)
-    pull_turns(turn, z, bar_q)
+                _matrix_vjp(model.pair, p, c[p], z, bar_v)
+    turns_vjp(turn, z, bar_q)
 
 
 @kernel
-def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):
-    """`pull_back` of the joints alone.
+def joints_vjp(model, workspace, q, v, a, lam, z, y, bar_q, bar_v):
+    """`accelerations_vjp` of the joints alone.
 
     Constant:
       model: the compiled scene.
@@ -456,65 +468,63 @@ def pull_joints(model, desk, q, v, a, lam, z, y, bar_q, bar_v):
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
     In and out:
-      desk: the workspace, with the bodies turned (`forces.turn_bodies`); k of the joints' pairs and by_q, by_v are
+      workspace: the workspace, with the bodies turned (`forces.turn_bodies`); k of the joints' pairs and by_q, by_v are
         overwritten.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
-    w = desk.own[0]
-    wd = desk.own[1]
-    wdd = desk.own[2]
-    mine = desk.own[3]
+    w = workspace.own[0]
+    wd = workspace.own[1]
+    wdd = workspace.own[2]
+    mine = workspace.own[3]
     row = model.row
     for j in range(model.joint.shape[0]):
         code = model.joint[j, 0]
         par = model.joint_par[j]
         one = 3 * model.joint[j, 1]
         two = 3 * model.joint[j, 2]
-        gather_turned(model, j, q, desk.turned, w)
+        gather_turned(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
         if joint_is_point(code):  # what other rows have is constant
             y0 = y[row[j, 0]] if row[j, 0] >= 0 else 0.0
             y1 = y[row[j, 1]] if row[j, 1] >= 0 else 0.0
-            first, second, rate_first, rate_second = revolute_pull(
-                par, w, wd, wdd, mine, y0, y1, z[one + 2], z[two + 2]
-            )
+            first, second, rate_first, rate_second = revolute_vjp(par, w, wd, wdd, mine, y0, y1, z[one + 2], z[two + 2])
             bar_q[one + 2] -= first
             bar_q[two + 2] -= second
             bar_v[one + 2] -= rate_first
             bar_v[two + 2] -= rate_second
             continue
-        stiffness = desk.k[model.joint[j, 3]]
+        stiffness = workspace.k[model.joint[j, 3]]
         stiffness[:] = 0.0
-        joint_acceleration_slopes(code, par, w, wd, wdd, desk.by_q[j], desk.by_v[j])
+        joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
         joint_stiffness(code, par, w, mine, stiffness)
-        _pull_matrix(model.pair, model.joint[j, 3], stiffness, z, bar_q)
+        _matrix_vjp(model.pair, model.joint[j, 3], stiffness, z, bar_q)
         for r in range(3):
             if row[j, r] >= 0:
                 value = y[row[j, r]]
                 for i in range(6):
                     d = one + i if i < 3 else two + i - 3
-                    bar_q[d] -= desk.by_q[j, r, i] * value
-                    bar_v[d] -= desk.by_v[j, r, i] * value
+                    bar_q[d] -= workspace.by_q[j, r, i] * value
+                    bar_v[d] -= workspace.by_v[j, r, i] * value
 
 
 @kernel
-def push_forward(model, desk, k, c, turn, dq, dv, force, row):
+def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
     """What changes of a state do to the right side of the balance.
 
     force -= K dq + C dv (turning loads with their sign), row -= G_q dq + G_v dv.
 
     Constant:
       model: the compiled scene.
-      desk: the workspace, with G_q and G_v.
+      workspace: the workspace, with G_q and G_v.
       k, c (n_pair, 6, 6): stiffness and damping of the balance. turn (n,): slopes of the turning loads.
       dq, dv (n,): changes of coordinates and velocities.
     Out:
       force (n,), row (n_row,): changes of the right side, added to.
     """
-    damped = desk.switches[DAMPED] != 0
+    damped = workspace.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
         for i in range(6):
             value = 0.0
@@ -532,4 +542,4 @@ def push_forward(model, desk, k, c, turn, dq, dv, force, row):
             if own >= 0:
                 for i in range(6):
                     column = 3 * model.joint[j, 1 + i // 3] + i % 3
-                    row[own] -= desk.by_q[j, r, i] * dq[column] + desk.by_v[j, r, i] * dv[column]
+                    row[own] -= workspace.by_q[j, r, i] * dq[column] + workspace.by_v[j, r, i] * dv[column]

@@ -20,14 +20,14 @@ ROOMY = 12
 
 
 @part
-def carrying(model, strength, fill):
+def active_members(model, strength, fill):
     """The model without the members that carry nothing, its strengths, and how many members are left.
 
     In: strength (3, M_padded), or (ROOMY, M_padded) with room behind, to which the members that carry are written;
     fill: whether to do that, else they are there already, from the same strengths. The model itself comes back where
     there is no room, or too few carry nothing.
     """
-    springs, own, left = _that_carry(springs_of(model), strength, fill)
+    springs, own, left = _gather_active(springs_of(model), strength, fill)
     return (
         Model(
             model.inv_mass, model.q0, model.v0, model.home, model.pair, model.reach, model.shortest, springs.block,
@@ -40,8 +40,8 @@ def carrying(model, strength, fill):
 
 
 @kernel
-def _that_carry(springs, strength, fill):
-    """What `carrying` does, for a model's `Springs`: few arrays to choose between."""
+def _gather_active(springs, strength, fill):
+    """What `active_members` does, for a model's `Springs`: few arrays to choose between."""
     block = springs.block
     parts = springs.chunk.shape[0]
     count = np.zeros(parts, np.int64)

@@ -1,4 +1,4 @@
-"""What `warm.Beside` runs in another process: `python -m mdstopo.compile_looking INTEGRATOR [MODULE...]`.
+"""What `warm.Beside` runs in another process: `python -m mdstopo.compile_responses INTEGRATOR [MODULE...]`.
 
 It compiles what looks at the steps of an integrator; before that, the `compile_share` of each module.
 """
@@ -13,11 +13,11 @@ from mdstopo.integrators.driver import Driver
 from mdstopo.warm import tiny
 
 
-def compile_looking(integrator: str) -> None:
+def compile_responses(integrator: str) -> None:
     """Compile here what looks at the steps of an integrator: the work of the other process."""
     driver = Evaluator(tiny(integrator), beside=False).driver("default")
     assert isinstance(driver, Driver)
-    driver.compile_looking()
+    driver.compile_responses()
 
 
 if __name__ == "__main__":
@@ -25,5 +25,5 @@ if __name__ == "__main__":
     gc.disable()  # as in `session.compiling_apart`
     for module in sys.argv[2:]:
         importlib.import_module(module).compile_share()
-    compile_looking(sys.argv[1])
+    compile_responses(sys.argv[1])
     gc.freeze()  # it would be looked through at the end as well
