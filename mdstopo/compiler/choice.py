@@ -26,6 +26,7 @@ from types import FunctionType
 from typing import Any, Generic, TypeVar, cast
 
 from mdstopo.compiler.kernel import Kernel, compile_anew
+from mdstopo.compiler.written import written
 
 F = TypeVar("F", bound=Callable[..., Any])
 T = TypeVar("T")
@@ -83,7 +84,7 @@ class Choice(Kernel):
     def _branches(self) -> Callable[..., Any]:
         """The function with a branch for each thing in the list that has a kernel."""
         asked = list(inspect.signature(self._stub).parameters)
-        named: dict[str, Any] = {"__name__": self._stub.__module__, "otherwise": self._otherwise}
+        named: dict[str, Any] = {"otherwise": self._otherwise}
         lines = [f"def {self._stub.__name__}({', '.join(asked)}):"]
         for code, thing in enumerate(self._listed):
             found = self._pick(thing)
@@ -94,11 +95,7 @@ class Choice(Kernel):
                 found = f"kernel_{code}({', '.join(self._wanted(found, asked))})"
             lines += [f"    if {asked[0]} == {code}:", f"        return {found}"]
         lines.append(f"    return otherwise({', '.join(asked)})")
-        # under the stub's file and name, by which compiled functions are kept
-        exec(compile("\n".join(lines), self._stub.__code__.co_filename, "exec"), named)
-        function = named[self._stub.__name__]
-        function.__qualname__, function.__doc__ = self._stub.__qualname__, self._stub.__doc__
-        return cast(Callable[..., Any], function)
+        return written(self._stub, "\n".join(lines), named)
 
     def _wanted(self, kernel: Kernel, asked: list[str]) -> list[str]:
         """The arguments of a kernel; TypeError where one is none of ours."""

@@ -3,116 +3,102 @@
 A run is m steps. Step k leads from state k to state k + 1 and owns the stages index[k, FIRST] to index[k + 1, FIRST]:
 states at which the balance was imposed. Behind the steps there is room for a partial one (`index[w, PARENT]` is the
 step before step w).
-
-========  ====================  ======================================================================
-t         (m + 1,)              times of the states
-state     (m + 1, 2, n)         q, v, on the joints
-push      (m + 1, 2, n_row)     the multipliers mu, nu that put the state there (`projection`)
-index     (m + 1, 4) integers   first stage; step before; segment; how many events had happened
-when      (S,)                  times of the stages
-stage     (S, 3, n)             q, v, a
-lam       (S, n_row)            multipliers of the joints
-K, C      (S, n_pair, 6, 6)     tangents of the balance; mass (the same, or one of zeros) of the inerters; where
-                                factors are kept those of pairs that carry more than joints, without the joints' part
-turn      (S, n)                slope of the turning loads
-turned    (S, n_body, 2)        cos and sin of the bodies' angles; pull (S, n_joint, 3, 6), gram (S, size[3]), diagonal
-                                (S, 2, n_row): the factors of the joints' matrix (`joint_matrix`); one row of each where
-                                they are not kept
-saltation      (E, 3, n)             of an event: the slopes of its time by q and v, and the jump a- minus a+
-kept      (E, 3)                the permanent set of its member before and after an event; slope of its time by it
-event     (E, 5) integers       the state at which it happened, member (padded), mode before and after; whether it
-                                only just happened, so that forces at it have no derivative
-========  ====================  ======================================================================
 """
 
-from typing import Any
+from typing import Annotated, Any
 
+from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED
-from mdstopo.scene.model import IndexArray
+from mdstopo.scene.model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES = range(5)
 
-FIELDS = (
-    "t", "state", "push", "index", "when", "stage", "lam", "K", "C", "mass", "turn", "turned", "pull", "gram",
-    "diagonal", "saltation", "kept", "event",
-)  # fmt: skip
+#: what the lengths of arrays are, in terms of what `carve_history` is given
+SIZES = {
+    "n": "model.mass.shape[0]",
+    "n_pair": "model.pair.shape[0]",
+    "n_joint": "model.joint.shape[0]",
+    "n_row": "model.size[0]",
+    "entries": "model.size[3]",
+    "steps": "limits[1]",
+    "stages": "limits[2]",
+    "events": "limits[3]",
+    "inertial": "stages if limits[4] != 0 else 1",
+    "factored": "stages if limits[5] != 0 else 1",
+}
 
 
 class StepHistory:
-    """The history of steps inside kernels, made by `carve_history`; the fields are those of the table above."""
+    """The history of steps inside kernels, made by `carve_history`."""
+
+    t: Annotated[FloatArray, Field("steps + 1", "times of the states (s)")]
+    state: Annotated[FloatArray, Field("steps + 1, 2, n", "q, v, on the joints")]
+    push: Annotated[
+        FloatArray, Field("steps + 1, 2, n_row", "the multipliers mu, nu that put the state there (`projection`)")
+    ]
+    index: Annotated[
+        IndexArray, Field("steps + 1, 4", "first stage; step before; segment; how many events had happened")
+    ]
+    when: Annotated[FloatArray, Field("stages", "times of the stages (s)")]
+    stage: Annotated[FloatArray, Field("stages, 3, n", "q, v, a")]
+    lam: Annotated[FloatArray, Field("stages, n_row", "multipliers of the joints (N, N m)")]
+    K: Annotated[
+        FloatArray,
+        Field(
+            "stages, n_pair, 6, 6",
+            "-dF/dq of each pair; where factors are kept that of pairs which carry more than joints, without "
+            "the joints' part",
+        ),
+    ]
+    C: Annotated[FloatArray, Field("stages, n_pair, 6, 6", "-dF/dv, likewise")]
+    turn: Annotated[FloatArray, Field("stages, n", "slope of the turning loads")]
+    turned: Annotated[FloatArray, Field("factored, n // 3, 2", "cos and sin of the bodies' angles")]
+    pull: Annotated[
+        FloatArray,
+        Field("factored, n_joint, 3, 6", "of the joints' matrix (`joint_matrix`): Phi_q M⁻¹, by joint"),
+    ]
+    gram: Annotated[FloatArray, Field("factored, entries", "its entries, factorised")]
+    diagonal: Annotated[FloatArray, Field("factored, 2, n_row", "its diagonal; one row where factors are not kept")]
+    saltation: Annotated[
+        FloatArray, Field("events, 3, n", "of an event: the slopes of its time by q and v, and the jump a- minus a+")
+    ]
+    kept: Annotated[
+        FloatArray,
+        Field("events, 3", "the permanent set of its member before and after an event; slope of its time by it"),
+    ]
+    mass: Annotated[FloatArray, Field("inertial, n_pair, 6, 6", "mass of the inerters; without inerters one of zeros")]
+    event: Annotated[
+        IndexArray,
+        Field(
+            "events, 5",
+            "the state at which it happened, member (padded), mode before and after; whether it only just happened, so "
+            "that forces at it have no derivative",
+        ),
+    ]
 
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(StepHistory, FIELDS)
+FIELDS = Fields(StepHistory, SIZES)
+bundle(StepHistory, FIELDS.names)
 
 
 def history_room(model: GeneralModel, limits: IndexArray) -> tuple[int, int]:
     """Lengths of the flat arrays of floats and integers that `carve_history` needs."""
-    n, n_pair, n_row = len(model.mass), len(model.pair), int(model.size[0])
-    _, steps, stages, events, inertial, factors = limits.tolist()
-    per_stage = 1 + 4 * n + n_row + 72 * n_pair
-    floats = (steps + 1) * (1 + 2 * n + 2 * n_row) + stages * per_stage + events * (3 * n + 3)
-    floats += (2 * (n // 3) + 18 * len(model.joint) + int(model.size[3]) + 2 * n_row) * (stages if factors else 1)
-    return floats + 36 * n_pair * (stages if inertial else 1), 4 * (steps + 1) + 5 * events
+    return FIELDS.lengths(model=model, limits=limits)
 
 
-@kernel
+@views_of(FIELDS, StepHistory, kernel)
 def carve_history(model, limits, floats, ints):
-    """A `StepHistory` over flat arrays; limits: steps allowed, room for steps, stages, events, whether there are
-    inerters, whether the factors of the joints' matrix are kept.
+    """A `StepHistory` over flat arrays.
+
+    model: the compiled scene. limits (6,): steps allowed, room for steps, stages, events, whether there are inerters,
+    whether the factors of the joints' matrix are kept. floats, ints: as long as `history_room` says.
     """
-    n = model.mass.shape[0]
-    n_pair = model.pair.shape[0]
-    n_row = model.size[0]
-    steps = limits[1]
-    stages = limits[2]
-    events = limits[3]
-    index = ints[: 4 * (steps + 1)].reshape((steps + 1, 4))
-    event = ints[4 * (steps + 1) : 4 * (steps + 1) + 5 * events].reshape((events, 5))
-    t = floats[: steps + 1]
-    f = steps + 1
-    state = floats[f : f + 2 * n * (steps + 1)].reshape((steps + 1, 2, n))
-    f += 2 * n * (steps + 1)
-    push = floats[f : f + 2 * n_row * (steps + 1)].reshape((steps + 1, 2, n_row))
-    f += 2 * n_row * (steps + 1)
-    when = floats[f : f + stages]
-    f += stages
-    stage = floats[f : f + 3 * n * stages].reshape((stages, 3, n))
-    f += 3 * n * stages
-    lam = floats[f : f + n_row * stages].reshape((stages, n_row))
-    f += n_row * stages
-    size = 36 * n_pair * stages
-    k = floats[f : f + size].reshape((stages, n_pair, 6, 6))
-    f += size
-    c = floats[f : f + size].reshape((stages, n_pair, 6, 6))
-    f += size
-    turn = floats[f : f + n * stages].reshape((stages, n))
-    f += n * stages
-    rows = stages if limits[5] != 0 else 1
-    turned = floats[f : f + 2 * (n // 3) * rows].reshape((rows, n // 3, 2))
-    f += 2 * (n // 3) * rows
-    n_joint = model.joint.shape[0]
-    pull = floats[f : f + 18 * n_joint * rows].reshape((rows, n_joint, 3, 6))
-    f += 18 * n_joint * rows
-    entries = model.size[3]
-    gram = floats[f : f + entries * rows].reshape((rows, entries))
-    f += entries * rows
-    diagonal = floats[f : f + 2 * n_row * rows].reshape((rows, 2, n_row))
-    f += 2 * n_row * rows
-    saltation = floats[f : f + 3 * n * events].reshape((events, 3, n))
-    f += 3 * n * events
-    kept = floats[f : f + 3 * events].reshape((events, 3))
-    f += 3 * events
-    rows = stages if limits[4] != 0 else 1
-    mass = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
-    return StepHistory(
-        t, state, push, index, when, stage, lam, k, c, mass, turn, turned, pull, gram, diagonal, saltation, kept, event
-    )  # fmt: skip
 
 
 @kernel

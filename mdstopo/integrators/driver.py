@@ -13,13 +13,14 @@ import numpy as np
 
 from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import holds_steps
+from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.mechanics.active_members import ROOMY
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.packing import Packed, aligned, pack
+from mdstopo.scene.packing import Packed, pack
 from mdstopo.status import Status
 
 #: how near to the highest a peak competes, and how many are kept

@@ -3,28 +3,16 @@
 A run is m steps. Step k goes from the state k to the state k + 1 and owns the stages index[k, FIRST] up to
 index[k + 1, FIRST]: states at which the force balance was imposed, with the tangents there. A stage before
 index[0, FIRST] belongs to no step: it is the start. Everything that comes after (responses, reverse sweep, design
-gradient) works on these: states, never members.
-
-========  ======================  ==================================================================
-t         (m + 1,)                times of the states
-state     (m + 1, 2, n)           q, v
-index     (m + 1, 3) integers     first stage of the step; level (the method's own); segment of the loads
-scalar    (S, 3)                  t, stored energy, its rate, at each stage
-stage     (S, 3, n)               q, v, and a vector of the method's own, at each stage
-pull      (S, n_pair, 3)          E_xi, the energy's slope in the relative poses
-K         (S, n_pair, 6, 6)       -dF/dq of each pair
-C         (S, n_pair, 6, 6)       -dF/dv, no rows where nothing is damped
-turn      (S, n)                  derivative of the loads by each body's angle, no rows where no load turns
-========  ======================  ==================================================================
-
-Each integrator names its own tuple of these arrays (`FIELDS`), by whose type its functions are found
-(`steps_interface`).
+gradient) works on these: states, never members. Each integrator names its own tuple of these arrays (`FIELDS`), by
+whose type its functions are found (`steps_interface`).
 """
 
 from collections.abc import Sequence
+from typing import Annotated
 
 import numpy as np
 
+from mdstopo.compiler.fields import Field, Fields, FloatArray, IndexArray, views_of
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.status import Status
 
@@ -79,7 +67,33 @@ def status_of(code: int) -> Status:
     return _STATUS[code]
 
 
-FIELDS = ("t", "state", "index", "scalar", "stage", "pull", "K", "C", "turn")
+class StepArrays:
+    """What the steps of a run are kept in, and of which each integrator makes a named tuple of its own."""
+
+    t: Annotated[FloatArray, Field("steps + 1", "times of the states (s)")]
+    state: Annotated[FloatArray, Field("steps + 1, 2, n", "q, v")]
+    index: Annotated[
+        IndexArray, Field("steps + 1, 3", "first stage of the step; level (the method's own); segment of the loads")
+    ]
+    scalar: Annotated[FloatArray, Field("stages, 3", "t, stored energy (J), its rate (W), at each stage")]
+    stage: Annotated[FloatArray, Field("stages, 3, n", "q, v, and a vector of the method's own, at each stage")]
+    pull: Annotated[FloatArray, Field("stages, n_pair, 3", "E_xi, the energy's slope in the relative poses")]
+    K: Annotated[FloatArray, Field("stages, n_pair, 6, 6", "-dF/dq of each pair")]
+    C: Annotated[FloatArray, Field("velocity, n_pair, 6, 6", "-dF/dv, no rows where nothing is damped")]
+    turn: Annotated[
+        FloatArray, Field("rotation, n", "derivative of the loads by each body's angle, no rows where no load turns")
+    ]
+
+
+#: the arrays, and what their lengths are in terms of what `carve` is given
+ARRAYS = Fields(
+    StepArrays,
+    {
+        "velocity": "stages if damped else 0",
+        "rotation": "stages if turning else 0",
+    },
+)
+FIELDS = ARRAYS.names
 
 #: rad that the bodies of a pair may turn against each other in an adaptive step. The error of the motion does not see
 #: members that hardly move their bodies (a flywheel, a driven rotor); what is looked at does, and turns with them.
@@ -96,9 +110,9 @@ TIME, ENERGY, ENERGY_RATE = range(3)
 Q, V, OWN = range(3)
 
 
-@part
+@views_of(ARRAYS, None, part)
 def carve(floats, ints, n, n_pair, steps, stages, damped, turning):
-    """The arrays of `FIELDS` with room for so many steps and stages, as views of flat arrays.
+    """The arrays of `StepArrays` with room for so many steps and stages, as views of flat arrays.
 
     floats, ints: the flat arrays, at least as long as `room_for` says.
     n, n_pair: coordinates, and pairs of bodies.
@@ -106,25 +120,6 @@ def carve(floats, ints, n, n_pair, steps, stages, damped, turning):
     damped: whether any force depends on velocity: no rows of C otherwise.
     turning: whether loads turn: no rows of turn otherwise.
     """
-    index = ints[: 3 * (steps + 1)].reshape((steps + 1, 3))
-    t = floats[: steps + 1]
-    f = steps + 1
-    state = floats[f : f + (steps + 1) * 2 * n].reshape((steps + 1, 2, n))
-    f += (steps + 1) * 2 * n
-    scalar = floats[f : f + 3 * stages].reshape((stages, 3))
-    f += 3 * stages
-    stage = floats[f : f + 3 * n * stages].reshape((stages, 3, n))
-    f += 3 * n * stages
-    pull = floats[f : f + 3 * n_pair * stages].reshape((stages, n_pair, 3))
-    f += 3 * n_pair * stages
-    k = floats[f : f + 36 * n_pair * stages].reshape((stages, n_pair, 6, 6))
-    f += 36 * n_pair * stages
-    rows = stages if damped else 0
-    c = floats[f : f + 36 * n_pair * rows].reshape((rows, n_pair, 6, 6))
-    f += 36 * n_pair * rows
-    rows = stages if turning else 0
-    turn = floats[f : f + n * rows].reshape((rows, n))
-    return t, state, index, scalar, stage, pull, k, c, turn
 
 
 def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning: bool) -> tuple[int, int]:
@@ -135,8 +130,7 @@ def room_for(n: int, n_pair: int, steps: int, stages: int, damped: bool, turning
     damped: whether any force depends on velocity.
     turning: whether loads turn.
     """
-    per_stage = 3 + 3 * n + 39 * n_pair + (36 * n_pair if damped else 0) + (n if turning else 0)
-    return (steps + 1) * (1 + 2 * n) + stages * per_stage, 3 * (steps + 1)
+    return ARRAYS.lengths(n=n, n_pair=n_pair, steps=steps, stages=stages, damped=damped, turning=turning)
 
 
 # Numba's own assignment of an array to a slice brings code that formats its error messages into every kernel: seconds

@@ -9,13 +9,13 @@ which side of a kink it stands. All arrays are read-only; everything is a run-ti
 nothing anew.
 """
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
+from mdstopo.compiler.fields import Field
+from mdstopo.compiler.fields import FloatArray as FloatArray
+from mdstopo.compiler.fields import IndexArray as IndexArray
 
 #: rows of `Model.member`
 PX, PY, QX, QY, L0, EXCESS, STIFFNESS, DAMPING, PRELOAD = range(9)
@@ -50,50 +50,58 @@ class Springs(NamedTuple):
 
 
 class Model(NamedTuple):
-    """What is constant during every evaluation of one load case.
+    """What is constant during every evaluation of one load case."""
 
-    ============  ================  =====================================================================
-    inv_mass      (n,)              1/m, 1/m, 1/J of each body; 0 for ground
-    q0, v0        (n,)              state at the start: what bodies have moved since home, which is nothing; velocities
-    home          (n / 3, 5)        x, y, psi of each body where its q is zero, cos and sin of that psi
-    pair          (n_pair, 2)       the two bodies of each pair that members connect: P's, then Q's
-    reach         (n_pair,)         largest distance of an attachment point from its centre of mass, m
-    shortest      (n_pair,)         shortest initial length of a member, m (inf without members)
-    block         (n_block, 8)      pair, start, stop (padded), kind of law, first design variable or -1, count;
-                                    of a grid: places in a row, members in a row (otherwise 0)
-    power         (n_block,)        mu of Eq. 12
-    near          (n_block, 2)      squares of the shift (m^2) and of the turn up to which elongations come from
-                                    displacements (`mechanics.laws.spring.hardly_moved`)
-    member        (9, M_padded)     P, Q in body frames; free length l0; L^2 - l0^2 of the length L at home; stiffness,
-                                    damping, preload at alpha = 1
-    times         (n_seg + 1,)      start, kinks of the loads, end
-    force         (n_seg, n, 2)     generalised load at the segment's start, slope in time; with gravity
-    load_body     (n_load,)         loads whose effect depends on the body's rotation: which body,
-    load_follows  (n_load,)         1 where the force turns with it, 0 where it keeps its global direction,
-    load_arm      (n_load, 2)       point of attack in body coordinates,
-    load_force    (n_seg, n_load, 2, 2)   and components, value and slope
-    chunk         (n_chunk, 3)      block, start, stop of the parts that passes take: whole blocks of few members
-    threads                         that share a pass, if it is worth it; 0 of few members, in whole blocks. Chunk and
-                                    threads come from `packing`
-    ============  ================  =====================================================================
-    """
-
-    inv_mass: FloatArray
-    q0: FloatArray
-    v0: FloatArray
-    home: FloatArray
-    pair: IndexArray
-    reach: FloatArray
-    shortest: FloatArray
-    block: IndexArray
-    power: FloatArray
-    near: FloatArray
-    member: FloatArray
-    times: FloatArray
-    force: FloatArray
-    load_body: IndexArray
-    load_follows: IndexArray
-    load_arm: FloatArray
-    load_force: FloatArray
-    chunk: IndexArray = NO_CHUNK
-    threads: int = 0
+    inv_mass: Annotated[FloatArray, Field("n", "1/m, 1/m, 1/J of each body (1/kg, 1/(kg m²)); 0 for ground")]
+    q0: Annotated[FloatArray, Field("n", "coordinates at the start, from home: zero (m, rad)")]
+    v0: Annotated[FloatArray, Field("n", "velocities at the start (m/s, rad/s)")]
+    home: Annotated[FloatArray, Field(f"n // 3, {HOME}", "x, y, psi of each body where its q is zero; cos, sin of psi")]
+    pair: Annotated[IndexArray, Field("n_pair, 2", "the two bodies of each pair that members connect: P's, then Q's")]
+    reach: Annotated[FloatArray, Field("n_pair", "largest distance of an attachment point from its centre of mass (m)")]
+    shortest: Annotated[
+        FloatArray, Field("n_pair", "shortest initial length of a member (m), infinite without members")
+    ]
+    block: Annotated[
+        IndexArray,
+        Field(
+            f"n_block, {BLOCK}",
+            "pair, start, stop (padded), kind of law, first design variable or -1, members; of a grid: places in a "
+            "row, members in a row (otherwise 0)",
+        ),
+    ]
+    power: Annotated[FloatArray, Field("n_block", "mu of Eq. 12")]
+    near: Annotated[
+        FloatArray,
+        Field(
+            "n_block, 2",
+            "squares of the shift (m²) and of the turn up to which elongations come from displacements "
+            "(`mechanics.laws.spring.hardly_moved`)",
+        ),
+    ]
+    member: Annotated[
+        FloatArray,
+        Field(
+            f"{MEMBER}, padded",
+            "P, Q in body frames (m); free length l0 (m); L² - l0² of the length L at home (m²); stiffness (N/m), "
+            "damping (N s/m), preload (N) at alpha = 1",
+            on_a_line=True,
+        ),
+    ]
+    times: Annotated[FloatArray, Field("n_seg + 1", "start, kinks of the loads, end (s)")]
+    force: Annotated[
+        FloatArray, Field("n_seg, n, 2", "generalised load at the segment's start, its slope; with gravity (N, N m)")
+    ]
+    load_body: Annotated[IndexArray, Field("n_load", "of loads whose effect depends on a body's rotation: the body")]
+    load_follows: Annotated[IndexArray, Field("n_load", "1 where the load turns with it, else 0")]
+    load_arm: Annotated[FloatArray, Field("n_load, 2", "point of attack in the body's frame (m)")]
+    load_force: Annotated[FloatArray, Field("n_seg, n_load, 2, 2", "two components, value and slope (N)")]
+    chunk: Annotated[
+        IndexArray,
+        Field(
+            "n_chunk, 3",
+            "block, start, stop of the parts that passes take: whole blocks of few members (`packing.chunks_of`)",
+        ),
+    ] = NO_CHUNK
+    threads: Annotated[
+        int, Field("", "that share a pass, if it is worth it; 0 of few members, in whole blocks (`packing.pack`)")
+    ] = 0

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("mkdocs", reason="mkdocs is not installed: pip install -e '.[docs]'")
 
-from documentation import case_keys, command_pages, maths
+from documentation import array_tables, case_keys, command_pages, maths
 from documentation.hooks import expanded
 from mdstopo.case.schema_case import FORMAT, json_schema
 from mdstopo.cli.commands import COMMANDS, EXIT_STATUSES
@@ -48,6 +48,15 @@ def described(schema: Any, path: str = "") -> list[str]:
         elif key not in ("if", "not"):
             lacking += described(part, path)
     return lacking
+
+
+def test_every_array_of_a_scene_is_told_on_its_page() -> None:
+    page = expanded((DOCS / "arrays.md").read_text(encoding="utf-8"))
+    for name, fields in array_tables.TABLES.items():
+        assert array_tables.table_of(name) in page
+        assert all(what and shape for field, shape, what in fields.rows() if field not in fields.numbers)
+    with pytest.raises(ValueError, match="springs, general, steps, history"):
+        array_tables.table_of("nothing")
 
 
 def test_every_property_of_the_schema_has_a_description_for_editors() -> None:
