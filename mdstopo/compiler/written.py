@@ -17,7 +17,7 @@ def written(stub: FunctionType, source: str, names: Mapping[str, Any]) -> Callab
 
 
 class WrittenKernel(Kernel):
-    """A kernel with a text, which Python reads only when something is compiled.
+    """A kernel with a text, which Python reads only when it is compiled or called.
 
     stub: has its name, arguments and documentation. names: what the text knows. like: a kernel with its settings.
     """
@@ -25,12 +25,11 @@ class WrittenKernel(Kernel):
     def __init__(self, stub: FunctionType, source: str, names: Mapping[str, Any], like: Kernel) -> None:
         super().__init__(stub, like.fastmath, like.part)
         self._stub, self._source, self._names = stub, source, names
-        self._is_read = False
+        del self.py_func  # the stub does nothing
 
-    @property
-    def dispatcher(self) -> Any:
-        """Numba's object for what the text defines."""
-        if not self._is_read:
-            self._is_read = True
-            self.py_func = written(self._stub, self._source, self._names)
-        return super().dispatcher
+    def __getattr__(self, name: str) -> Any:
+        """What the text defines as `py_func`, read when it is first asked for."""
+        if name != "py_func":
+            raise AttributeError(f"{self._stub.__name__} has no {name}")
+        self.py_func = written(self._stub, self._source, self._names)
+        return self.py_func

@@ -448,7 +448,7 @@ class _Interior:
         d = np.where((x.z_upper > x.upper_gap) & (x.upper_gap < 1e-6), program.upper, d)
         by = self.scale[0]
         return Solution(
-            d=d,
+            d=self._on_rows(d),
             level=x.e * self.scale + self.base,
             lines=x.y_line * by / self.scale[program.lines.group],
             norms=x.y_norm[:, 0] * by / self.scale[program.norms.group],
@@ -458,3 +458,18 @@ class _Interior:
             gap=gap,
             residual=worst,
         )
+
+    def _on_rows(self, d: Floats) -> Floats:
+        """The nearest step, in widths of the box, on the linear rows: many variables put on their bounds leave them.
+
+        A row that holds as it is stays as it is; variables at bounds stay there, and others within the box.
+        """
+        linear = self.program.linear
+        missing = (linear.b - linear.A @ d) / self.row_scale
+        off = np.where(self.equal, np.abs(missing), -missing) > RESIDUAL
+        free = (d > self.program.lower) & (d < self.program.upper)
+        if not off.any() or not free.any():
+            return d
+        change = np.zeros(self.n)
+        change[free] = np.linalg.lstsq(self.A[off][:, free], missing[off], rcond=None)[0]
+        return np.clip(d + change * self.width, self.program.lower, self.program.upper)

@@ -43,6 +43,10 @@ def doubled(ints, floats, out):
     return record.threads
 
 
+def _stub(ints, floats):
+    """The record whose arrays are views."""
+
+
 def made(n: int) -> Record:
     return Record(
         mass=np.arange(1.0, n + 1.0),
@@ -64,6 +68,17 @@ def test_kernels_get_back_what_was_packed_as_views(n: int) -> None:
     assert doubled(ints, floats, out) == 5
     assert out.tolist() == [record.mass.sum(), 7.0, 10.0, 9.0, n + 2.0, 7.0]
     assert floats[:n].tolist() == (2.0 * record.mass).tolist()
+
+
+def test_views_are_found_in_python_too() -> None:
+    """Before anything is compiled: in a process that finds all its machine code on the disk nothing is."""
+    record = made(4)
+    fresh = views_of(RECORD, Record, kernel)(_stub)
+    found = fresh.py_func(*RECORD.packed(record))  # type: ignore[attr-defined]
+    assert all(np.array_equal(one, other) for one, other in zip(found, record, strict=True))
+    assert fresh.__name__ == "_stub"
+    with pytest.raises(AttributeError, match="_stub has no other"):
+        _ = fresh.other  # type: ignore[attr-defined]
 
 
 def test_sizes_come_first_and_arrays_on_a_line_begin_on_one() -> None:

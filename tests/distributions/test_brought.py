@@ -99,7 +99,7 @@ def kinetic(model, j, v, bars):
 
 
 KERNELS = LawKernels(force=force, slopes=slopes)
-KINETIC = ResponseKernels(value=kinetic, needs_balance=False, by_state=True)
+KINETIC = ResponseKernels(value=kinetic, needs_accelerations=False, by_state=True)
 """
 
 POINTS = """

@@ -6,7 +6,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
-from mdstopo.general.accelerations import balance, make_workspace
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.compile import compile_general
 from mdstopo.general.first_step import FIRST, PROBES, first_step
 from mdstopo.general.model import pack_general, unpack_general
@@ -45,7 +45,7 @@ def _first(ints, floats, member_state, tolerance, order, noise, work):
     workspace = make_workspace(model)
     n, n_pair = model.mass.shape[0], model.pair.shape[0]
     q0, v0, a0, lam = model.q0.copy(), model.v0.copy(), np.zeros(n), np.zeros(model.size[0])
-    balance(model, member_state, np.int64(0), model.times[0], q0, v0, np.bool_(True), workspace, a0, lam)
+    solve_accelerations(model, member_state, np.int64(0), model.times[0], q0, v0, np.bool_(True), workspace, a0, lam)
     rel = np.empty((n_pair, POSE))
     relative_pose(model.pair, model.home, q0, v0, rel)
     scratch = np.empty((3, n))
