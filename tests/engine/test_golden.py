@@ -34,7 +34,8 @@ def test_a_changed_bit_is_found() -> None:
     item["objectives"]["bytes"] = "0" * 24
     found = compare(name, item)
     assert not found.same
-    assert found.what == "objectives"
+    assert "objectives" in found.what.split(", ")
+    assert found.what == "objectives" or not SAME_BITS
     assert found.agrees  # as another processor may have it
 
 
