@@ -128,8 +128,12 @@ class Sizes:
         sample = self.problem.evaluate(self.design(x), gradient)
         if not len(sample.gradients):
             return sample
-        limits = sample.constraint_gradients.reshape(len(sample.constraint_rows), self.spread.shape[0])
-        return replace(sample, gradients=sample.gradients @ self.spread, constraint_gradients=limits @ self.spread)
+        slopes = {
+            name: rows.reshape(-1, self.spread.shape[0]) @ self.spread
+            for name in ("gradients", "constraint_gradients", "across", "constraint_across")
+            if (rows := getattr(sample, name)).size
+        }
+        return replace(sample, **slopes)
 
 
 def sized(case: Case, parts: list[tuple[str, list[int]]], score: Scalarisation) -> Floats:
