@@ -1,7 +1,7 @@
 """First use on a machine: the kernels are compiled side by side, in two processes.
 
 Compiled kernels are kept on disk (`compiler`), and their argument types are the same for every case. So while this
-process compiles an integrator and the optimiser, another one compiles what looks at the steps, on a case of its own: a
+process compiles an integrator and the optimiser, another one compiles what evaluates responses, on a case of its own: a
 body on a spring. Afterwards everything is read from the disk. If the other process fails, nothing is lost but time:
 what is missing is compiled here when it is called.
 """
@@ -37,7 +37,7 @@ def _marker(integrator: str) -> Path:
 
 
 def is_compiled(integrator: str) -> bool:
-    """Whether an integrator and what looks at its steps have been compiled for this source on this machine."""
+    """Whether an integrator and what evaluates responses have been compiled for this source on this machine."""
     return _marker(integrator).exists()
 
 
@@ -62,7 +62,7 @@ def compilation_due(case: Case) -> bool:
 
 
 class Beside:
-    """Another process that compiles what looks at an integrator's steps, if that has never been compiled here.
+    """Another process that compiles what evaluates responses, if that has never been compiled here.
 
     share: modules whose `compile_share` it calls before that.
     """

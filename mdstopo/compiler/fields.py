@@ -67,14 +67,12 @@ class Fields:
     """
 
     def __init__(self, record: type, sizes: Mapping[str, str] | None = None) -> None:
-        self.record = record
-        self.floats: dict[str, Field] = {}
-        self.ints: dict[str, Field] = {}
-        self.numbers: dict[str, Field] = {}
-        for name, kind in record.__annotations__.items():
-            number, (field,) = kind.__origin__, kind.__metadata__  # of `Annotated[number, field]`
-            of_kind = self.numbers if number is int else self.floats if number == FloatArray else self.ints
-            of_kind[name] = field
+        kinds = record.__annotations__  # each is `Annotated[kind, field]`
+        self.fields: dict[str, Field] = {name: kind.__metadata__[0] for name, kind in kinds.items()}
+        self.floats, self.ints, self.numbers = (
+            {name: field for name, field in self.fields.items() if kinds[name].__origin__ == kind}
+            for kind in (FloatArray, IndexArray, int)
+        )
         self.first = self._first_axes() if sizes is None else {}
         self.sizes = dict(sizes or {})
         for place, name in enumerate([*self.first, *self.numbers]):
@@ -85,13 +83,12 @@ class Fields:
     @property
     def names(self) -> tuple[str, ...]:
         """All fields, in the order of the class."""
-        return tuple(self.record.__annotations__)
+        return tuple(self.fields)
 
     def _first_axes(self) -> dict[str, tuple[str, int]]:
         """Of each size the field and axis that it is read from."""
         found: dict[str, tuple[str, int]] = {}
-        for name in self.names:
-            field = {**self.floats, **self.ints, **self.numbers}[name]
+        for name, field in self.fields.items():
             for axis, size in enumerate(field.axes):
                 if _SIZE.fullmatch(size):
                     found.setdefault(size, (name, axis))
@@ -125,8 +122,7 @@ class Fields:
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Name, shape and meaning of each field."""
-        fields = {**self.floats, **self.ints, **self.numbers}
-        return [(name, fields[name].shape, fields[name].what) for name in self.names]
+        return [(name, field.shape, field.what) for name, field in self.fields.items()]
 
     def source(self, name: str, arguments: str, made: str) -> str:
         """The kernel that gives the fields as views of `ints` and `floats`; made: what is called with them."""

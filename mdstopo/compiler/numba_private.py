@@ -391,12 +391,11 @@ def _is_array_arithmetic(inst: Any, typemap: Any) -> bool:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class _Closures(InlineClosureLikes):
-    """Only where a function holds another. The first pass of ours: here a function gets the number in its symbol."""
+    """Only where a function holds another."""
 
     _name = "mdstopo_closures"
 
     def run_pass(self, state: Any) -> bool:
-        state.func_id.unique_id = number_of(state.func_id.func)
         held = state.func_id.code.co_consts
         return any(isinstance(each, CodeType) for each in held) and super().run_pass(state)
 
@@ -410,25 +409,6 @@ class _Unannotated(AnnotateTypes):
     def run_pass(self, state: Any) -> bool:
         state.type_annotation = ""
         return False
-
-
-#: functions by the numbers in their symbols
-_NUMBERED: dict[int, Callable[..., Any]] = {}
-
-
-def number_of(function: Callable[..., Any]) -> int:
-    """The number in a function's symbol, the same in every process; Numba's own counts what was compiled before.
-
-    Two processes that compile side by side hand each other functions by the disk, and what several of these hold is
-    one function only where its symbol is the same.
-    """
-    code = function.__code__
-    constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
-    told = f"{function.__module__} {function.__qualname__} {code.co_firstlineno} {code.co_names} {constants!r}"
-    number = int.from_bytes(hashlib.sha256(told.encode() + code.co_code).digest()[:4], "little")
-    while _NUMBERED.setdefault(number, function) is not function:
-        number += 1
-    return number
 
 
 #: ours, by the pass of Numba's that it takes the place of; none where they do not fit
@@ -512,6 +492,25 @@ class Rolled(Optimised):
         full.run(self._final_module, builder)
 
 
+#: functions by the numbers in their symbols
+_NUMBERED: dict[int, Callable[..., Any]] = {}
+
+
+def number_of(function: Callable[..., Any]) -> int:
+    """The number in a function's symbol, the same in every process; Numba's own counts what was compiled before.
+
+    Two processes that compile side by side hand each other functions by the disk, and what several of these hold is
+    one function only where its symbol is the same.
+    """
+    code = function.__code__
+    constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
+    told = f"{function.__module__} {function.__qualname__} {code.co_firstlineno} {code.co_names} {constants!r}"
+    number = int.from_bytes(hashlib.sha256(told.encode() + code.co_code).digest()[:4], "little")
+    while _NUMBERED.setdefault(number, function) is not function:
+        number += 1
+    return number
+
+
 def _compiler(library: type[Optimised]) -> type[Compiler]:
     class Lean(Compiler):
         def __init__(self, typingctx: Any, targetctx: Any, given: Any, *rest: Any) -> None:
@@ -519,6 +518,7 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
             self.state.library = library(targetctx.codegen(), library.__name__)
 
         def define_pipelines(self) -> Any:
+            self.state.func_id.unique_id = number_of(self.state.func_id.func)
             found = super().define_pipelines()
             for manager in found:
                 manager.passes = [(_LEANER.get(each, each), told) for each, told in manager.passes]

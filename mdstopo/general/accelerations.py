@@ -40,30 +40,30 @@ from mdstopo.mechanics.joints.table import (
 )
 from mdstopo.mechanics.passes import SUMS
 
-#: what one balance needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope of turning loads,
-#: inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots, right side and the
-#: scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix the inverse masses,
-#: by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own coordinates, their
-#: derivatives and multipliers; the known accelerations of what is driven; which pairs carry more than joints, and the
-#: switches (`switches`)
-DESK = (
+#: what the solution at one state needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope
+#: of turning loads, inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots,
+#: right side and the scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix
+#: the inverse masses, by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own
+#: coordinates, their derivatives and multipliers; the known accelerations of what is driven; which pairs carry more
+#: than joints, and the switches (`switches`)
+FIELDS = (
     "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
     "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "known", "carries", "switches",
 )  # fmt: skip
 
 
 class Workspace:
-    """The workspace of a balance, whose arrays DESK names; made in kernels only, by `make_workspace`."""
+    """The workspace for one state, whose arrays `FIELDS` names; made in kernels only, by `make_workspace`."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
 
-bundle(Workspace, DESK)
+bundle(Workspace, FIELDS)
 
 
 @kernel
 def make_workspace(model):
-    """A workspace for one balance."""
+    """A workspace for one state."""
     n = model.mass.shape[0]
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]

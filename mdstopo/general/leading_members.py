@@ -34,7 +34,7 @@ BEND = 4.0 / 27.0
 #: the smallest part of a step that a member may lead for
 EDGE = 1e-9
 #: looks at a dip of a difference that may pass zero
-LOOKS = 4
+TRIALS = 4
 
 
 class Lead(NamedTuple):
@@ -214,7 +214,7 @@ def _roots(
         return
     c = low + c * (high - low)
     width = 0.02 * (high - low)
-    for _ in range(LOOKS):
+    for _ in range(TRIALS):
         near = np.clip(np.array([c - width, c, c + width]), low, high)
         f = exact(near, pair)
         values = f[0] - sign * f[1]

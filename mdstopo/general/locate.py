@@ -11,8 +11,8 @@ from mdstopo.general.members import stretch_of
 from mdstopo.mechanics.contact import contact_grazes
 from mdstopo.mechanics.laws.table import law_grazes
 
-#: looks at one event
-LOOKS = 100
+#: trials of the moment of one event
+TRIALS = 100
 #: cuts of one step, and how near to the ends of a piece none is worth making
 CUTS, EDGE = 24, 1e-7
 #: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
@@ -20,23 +20,23 @@ NEAR, AIM = 50.0, 5.0
 
 
 @kernel
-def next_trial(low, high, at_low, at_high, rounding, resolution, look):
-    """Where within a step to look next for the moment at which a margin vanishes; -1 where `high` is near enough.
+def next_trial(low, high, at_low, at_high, rounding, resolution, tries):
+    """Where within a step to try next for the moment at which a margin vanishes; -1 where `high` is near enough.
 
-    It is the secant through both ends, aimed behind the switch by more than rounding; after many looks every other one
+    It is the secant through both ends, aimed behind the switch by more than rounding; after many trials every other one
     is a bisection.
 
     low, high: lengths of the step between which it happens (s).
     at_low, at_high: the smallest margins there; at_high is negative.
     rounding: what rounding leaves of a margin.
     resolution: lengths that differ by no more than this are the same (s).
-    look: how many looks there have been.
+    tries: how many trials there have been.
     """
     if high - low <= resolution or at_high >= -NEAR * rounding:
         return -1.0
     aim = AIM * rounding
     middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
-    if (look > 15 and look % 2 == 0) or middle <= low or middle >= high:
+    if (tries > 15 and tries % 2 == 0) or middle <= low or middle >= high:
         middle = 0.5 * (low + high)
         if middle <= low or middle >= high:
             return -1.0

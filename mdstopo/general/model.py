@@ -11,7 +11,20 @@ from typing import Annotated, Any, NamedTuple
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.structures import bundle
-from mdstopo.scene.model import HOME, FloatArray, IndexArray
+from mdstopo.scene.model import (
+    FloatArray,
+    Force,
+    Home,
+    IndexArray,
+    LoadArm,
+    LoadBody,
+    LoadFollows,
+    LoadForce,
+    Power,
+    Reach,
+    StartCoordinates,
+    StartVelocities,
+)
 
 #: columns of `GeneralModel.block`; code -1 is an inerter. A block has all members of a group, or where each has a
 #: parameter of its own one of them, which is number OFFSET of the group
@@ -29,11 +42,11 @@ class GeneralModel(NamedTuple):
 
     free: Annotated[IndexArray, Field("n", "1 where a coordinate is an unknown, 0 where it is driven")]
     mass: Annotated[FloatArray, Field("n", "m, m, J of each body (kg, kg m²); 1 of ground")]
-    q0: Annotated[FloatArray, Field("n", "coordinates at the start: what bodies have moved since home (m, rad)")]
-    v0: Annotated[FloatArray, Field("n", "velocities at the start (m/s, rad/s)")]
-    home: Annotated[FloatArray, Field(f"n // 3, {HOME}", "x, y, psi of each body where its q is zero; cos, sin of psi")]
+    q0: StartCoordinates
+    v0: StartVelocities
+    home: Home
     pair: Annotated[IndexArray, Field("n_pair, 2", "the two bodies that members, joints or bushings connect")]
-    reach: Annotated[FloatArray, Field("n_pair", "largest distance of an attachment point from its centre of mass (m)")]
+    reach: Reach
     block: Annotated[
         IndexArray,
         Field(
@@ -45,20 +58,18 @@ class GeneralModel(NamedTuple):
     law: Annotated[FloatArray, Field("n_block, 8", "the law's parameters (`mechanics.laws.table`)")]
     active: Annotated[IndexArray, Field("n_seg, n_block", "1 where the law acts during a segment")]
     level: Annotated[FloatArray, Field("n_seg, n_block, 2", "a tabulated force at the segment's start (N), its slope")]
-    power: Annotated[FloatArray, Field("n_block", "mu of Eq. 12")]
+    power: Power
     member: Annotated[
         FloatArray,
         Field("6, padded", "P, Q in body frames (m); free length l0 (m); L² - l0² of the length L at home (m²)"),
     ]
     curves: Annotated[FloatArray, Field("n_curve", "what `curve` laws read")]
     times: Annotated[FloatArray, Field("n_seg + 1", "start, everything that has a kink in time, end (s)")]
-    force: Annotated[
-        FloatArray, Field("n_seg, n, 2", "generalised load at the segment's start, its slope; with gravity (N, N m)")
-    ]
-    load_body: Annotated[IndexArray, Field("n_load", "of loads whose effect depends on a body's rotation: the body")]
-    load_follows: Annotated[IndexArray, Field("n_load", "1 where the load turns with it, else 0")]
-    load_arm: Annotated[FloatArray, Field("n_load, 2", "point of attack in the body's frame (m)")]
-    load_force: Annotated[FloatArray, Field("n_seg, n_load, 2, 2", "two components, value and slope (N)")]
+    force: Force
+    load_body: LoadBody
+    load_follows: LoadFollows
+    load_arm: LoadArm
+    load_force: LoadForce
     bushing_pair: Annotated[IndexArray, Field("n_bushing", "the pair that a bushing connects")]
     bushing: Annotated[FloatArray, Field("n_bushing, 12", "P, Q, its stretch at home, stiffness, damping")]
     driven: Annotated[IndexArray, Field("n_driven", "coordinates that are driven")]

@@ -13,7 +13,7 @@ from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
 from mdstopo.general.forces import drive_state, pose_acceleration
-from mdstopo.general.locate import CUTS, LOOKS, cut_at, matters, narrowed, next_trial
+from mdstopo.general.locate import CUTS, TRIALS, cut_at, matters, narrowed, next_trial
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
@@ -554,8 +554,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
-                    for look in range(LOOKS):
-                        middle = next_trial(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), look)
+                    for tries in range(TRIALS):
+                        middle = next_trial(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), tries)
                         if middle < 0.0:
                             break
                         advance(

@@ -31,7 +31,7 @@ SIZES, TURN = 2.0, 2.0 * np.pi
 GROWTH, AGREES = 4.0, 0.25
 #: how large a force that points back at the end of a step may be, relative to that at its start; and how often at most
 #: a better end is looked for
-BACK, LOOKS = 0.1, 30
+BACK, TRIALS = 0.1, 30
 #: how near steps must have come for Newton's to take over, and when these have arrived, relative to the scene
 NEAR, ARRIVED = 1e-6, 1e-13
 #: stiffness, relative to the largest, below which a direction counts as free
@@ -123,7 +123,7 @@ def _stepped(
     own = scene.scaled(step)
     low, high, share, off = 0.0, 1.0, 1.0, 0.0
     forward, backward = ahead, 0.0
-    for look in range(LOOKS):
+    for look in range(TRIALS):
         there = scene.land(q + share * step)
         left = scene.left()
         along = float(own @ left)

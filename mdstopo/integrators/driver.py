@@ -50,7 +50,7 @@ class Method:
 
 
 class Compiling(Protocol):
-    """Another process that may be compiling what looks at steps (`warm.Beside`).
+    """Another process that may be compiling what evaluates responses (`warm.Beside`).
 
     due: whether that has never been compiled here; wait: until the process has ended.
     """
@@ -87,7 +87,7 @@ class Driver:
         self,
         scene: Scene,
         method: Method,
-        responses: Callable[[], ModuleType],
+        load_responses: Callable[[], ModuleType],
         tolerance: float,
         step: float,
         reductions: IndexArray,
@@ -99,18 +99,18 @@ class Driver:
 
         scene: the compiled load case.
         method: the integrator.
-        responses: imports the compiled entries that evaluate responses from the steps (`energy_responses`).
+        load_responses: imports the compiled entries that evaluate responses from the steps (`energy_responses`).
         tolerance: relative error that objectives and gradients may have.
         step: fixed step (s); 0: adaptive steps; negative: see `generalized_alpha.longest_step`.
         reductions (n_obj,): codes of `sensitivity.reductions`, one an objective.
         alpha (N,): the array that every design is put in, shared with whoever gives designs.
-        beside: another process that may be compiling what looks at steps.
+        beside: another process that may be compiling what evaluates responses.
         integrated: whether something is looked at that is integrated over time.
         """
         self.scene = scene
         self.method = method
         self._entry: Any = None
-        self._load_responses = responses
+        self._load_responses = load_responses
         self._responses: Any = None
         self._beside = beside
         self.packed = self._plain = pack(scene.model)
@@ -145,26 +145,25 @@ class Driver:
         return self._entry
 
     @property
-    def responses(self) -> Any:
-        """The entries that look at steps; where they have never been compiled, another process is doing it."""
+    def response_entries(self) -> Any:
+        """The entries that evaluate responses; where they have never been compiled, another process is doing it."""
         if self._beside is not None:
             self._beside.wait()
             self._beside = None
-        return self._response_entries
+        return self._loaded_responses()
 
-    @property
-    def _response_entries(self) -> Any:
-        """As `responses`, without waiting; after the method's own entries, which enter its functions in
+    def _loaded_responses(self) -> Any:
+        """The same without waiting; after the method's own entries, which enter its functions in
         `steps_interface`."""
         if self._responses is None and self.entry is not None:
             self._responses = self._load_responses()
         return self._responses
 
     def compile_responses(self) -> None:
-        """Compile what looks at the steps, without running it."""
-        self._response_entries.evaluate_responses.compile(*self._response_arguments(0, True))
+        """Compile what evaluates responses, without running it."""
+        self._loaded_responses().evaluate_responses.compile(*self._response_arguments(0, True))
         room = self.limits, self.room, self.room_ints, self.strength
-        self._response_entries.dense.compile(*self._dense_arguments(0, *room))
+        self._loaded_responses().dense.compile(*self._dense_arguments(0, *room))
 
     def _make_rows(self, most: int) -> None:
         """Arrays for so many peaks of each objective."""
@@ -208,7 +207,7 @@ class Driver:
 
     def _evaluate_responses(self, count: int, gradient: bool) -> None:
         if gradient not in self._evaluate:
-            self._evaluate[gradient] = self.responses.evaluate_responses.prepare(
+            self._evaluate[gradient] = self.response_entries.evaluate_responses.prepare(
                 *self._response_arguments(count, gradient)
             )
         self._evaluate[gradient]((_COUNT, count))
@@ -338,7 +337,7 @@ class DenseSteps:
             self.count, self._limits, self._room, self._ints, self._strength, np.array(times, dtype=np.float64),
             self._packed,
         )  # fmt: skip
-        self._driver.responses.dense(*arguments)
+        self._driver.response_entries.dense(*arguments)
         out: FloatArray = arguments[-2]
         return out
 

@@ -73,7 +73,7 @@ FIRST_LEVEL = 0
 LONGEST = 6.0
 #: the first pass is made in single precision from this Newton tolerance on, where the bodies move by that share of
 #: their distance and reach
-ROUGH_TOLERANCE, ROUGH = 1e-7, 0.05
+SINGLE_TOLERANCE, SINGLE_SHARE = 1e-7, 0.05
 #: fall of the coefficients from one to the next from which on `caution` is due, and the most there is
 SLOW = 0.26
 MOST_CAUTIOUS = 100.0
@@ -204,7 +204,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         v_base[d] = v0[d]
         load_base[d] = 0.0
     may_begin_in_single_precision = (
-        fixed_step <= 0.0 and newton_tolerance >= ROUGH_TOLERANCE and may_use_single_precision(model)
+        fixed_step <= 0.0 and newton_tolerance >= SINGLE_TOLERANCE and may_use_single_precision(model)
     )
     t = times[0]
     t_node[0] = t
@@ -278,7 +278,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
             single_precision = may_begin_in_single_precision
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
-                single_precision = single_precision and scale[p] > ROUGH * (
+                single_precision = single_precision and scale[p] > SINGLE_SHARE * (
                     np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]
                 )
             motion_weights(pair, rel0, reach, scale, weight)

@@ -39,6 +39,21 @@ ROWS = 16
 NO_CHUNK = np.zeros((0, 3), dtype=np.int64)
 
 
+#: fields that both models have, `Model` and `general.model.GeneralModel`
+StartCoordinates = Annotated[FloatArray, Field("n", "coordinates at the start: moved since home (m, rad)")]
+StartVelocities = Annotated[FloatArray, Field("n", "velocities at the start (m/s, rad/s)")]
+Home = Annotated[FloatArray, Field(f"n // 3, {HOME}", "x, y, psi of each body where its q is zero; cos, sin of psi")]
+Reach = Annotated[FloatArray, Field("n_pair", "largest distance of an attachment point from its centre of mass (m)")]
+Power = Annotated[FloatArray, Field("n_block", "mu of Eq. 12")]
+Force = Annotated[
+    FloatArray, Field("n_seg, n, 2", "generalised load at the segment's start, its slope; with gravity (N, N m)")
+]
+LoadBody = Annotated[IndexArray, Field("n_load", "of loads whose effect depends on a body's rotation: the body")]
+LoadFollows = Annotated[IndexArray, Field("n_load", "1 where the load turns with it, else 0")]
+LoadArm = Annotated[FloatArray, Field("n_load, 2", "point of attack in the body's frame (m)")]
+LoadForce = Annotated[FloatArray, Field("n_seg, n_load, 2, 2", "two components, value and slope (N)")]
+
+
 class Springs(NamedTuple):
     """What a pass over the members needs of a `Model`: few arrays, because handing over many takes its time."""
 
@@ -53,11 +68,11 @@ class Model(NamedTuple):
     """What is constant during every evaluation of one load case."""
 
     inv_mass: Annotated[FloatArray, Field("n", "1/m, 1/m, 1/J of each body (1/kg, 1/(kg m²)); 0 for ground")]
-    q0: Annotated[FloatArray, Field("n", "coordinates at the start, from home: zero (m, rad)")]
-    v0: Annotated[FloatArray, Field("n", "velocities at the start (m/s, rad/s)")]
-    home: Annotated[FloatArray, Field(f"n // 3, {HOME}", "x, y, psi of each body where its q is zero; cos, sin of psi")]
+    q0: StartCoordinates
+    v0: StartVelocities
+    home: Home
     pair: Annotated[IndexArray, Field("n_pair, 2", "the two bodies of each pair that members connect: P's, then Q's")]
-    reach: Annotated[FloatArray, Field("n_pair", "largest distance of an attachment point from its centre of mass (m)")]
+    reach: Reach
     shortest: Annotated[
         FloatArray, Field("n_pair", "shortest initial length of a member (m), infinite without members")
     ]
@@ -69,7 +84,7 @@ class Model(NamedTuple):
             "row, members in a row (otherwise 0)",
         ),
     ]
-    power: Annotated[FloatArray, Field("n_block", "mu of Eq. 12")]
+    power: Power
     near: Annotated[
         FloatArray,
         Field(
@@ -88,13 +103,11 @@ class Model(NamedTuple):
         ),
     ]
     times: Annotated[FloatArray, Field("n_seg + 1", "start, kinks of the loads, end (s)")]
-    force: Annotated[
-        FloatArray, Field("n_seg, n, 2", "generalised load at the segment's start, its slope; with gravity (N, N m)")
-    ]
-    load_body: Annotated[IndexArray, Field("n_load", "of loads whose effect depends on a body's rotation: the body")]
-    load_follows: Annotated[IndexArray, Field("n_load", "1 where the load turns with it, else 0")]
-    load_arm: Annotated[FloatArray, Field("n_load, 2", "point of attack in the body's frame (m)")]
-    load_force: Annotated[FloatArray, Field("n_seg, n_load, 2, 2", "two components, value and slope (N)")]
+    force: Force
+    load_body: LoadBody
+    load_follows: LoadFollows
+    load_arm: LoadArm
+    load_force: LoadForce
     chunk: Annotated[
         IndexArray,
         Field(
