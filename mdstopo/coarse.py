@@ -6,16 +6,11 @@ displacements nor the largest speeds change much; where a vibration is not resol
 1/step. Vibrations that the method damps out, as it should in stiff scenes, are too small to be seen in either.
 """
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from mdstopo.integrators.scene_driver import SceneDriver
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
-    from mdstopo.integrators.driver import Driver
 
 #: change, relative to what half the step gives, from which a step is far too large
 COARSE = 0.3
@@ -25,7 +20,7 @@ NOTHING = 1e-9
 _KINDS = "displacement", "rotation", "speed", "angular velocity"
 
 
-def coarse(driver: "Driver | GeneralDriver", alpha: FloatArray) -> str:
+def coarse(driver: SceneDriver, alpha: FloatArray) -> str:
     """Why the driver's fixed step is far too large for alpha (N,), or nothing.
 
     A motion that the step cannot compute at all is for the computation itself to report.
@@ -47,7 +42,7 @@ def coarse(driver: "Driver | GeneralDriver", alpha: FloatArray) -> str:
     return ""
 
 
-def _largest(driver: "Driver | GeneralDriver", alpha: FloatArray) -> list[float] | None:
+def _largest(driver: SceneDriver, alpha: FloatArray) -> list[float] | None:
     """Largest displacement, rotation, speed and angular velocity of any body; None where the motion ends early."""
     status, steps = driver.simulate(alpha)
     if status is not Status.OK:

@@ -8,8 +8,7 @@ simulation.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,30 +17,22 @@ from mdstopo.case.integrators import AUTO
 from mdstopo.case.model import Case, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
-from mdstopo.integrators.driver import Driver, ResponseResult
+from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult, Scene, SceneDriver, SceneFamily
 from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
-from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.design import Design, checked
-from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.origin import extent_of, origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
-from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
+from mdstopo.sensitivity.springs_driver import SPRINGS
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
 if TYPE_CHECKING:
     from mdstopo.error_estimate import Estimator
-    from mdstopo.general.compile import GeneralScene
-    from mdstopo.general.driver import GeneralDriver
     from mdstopo.general.settle import Settled
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
-    from mdstopo.sensitivity.methods import Differentiated
-
-    AnyScene: TypeAlias = Scene | GeneralScene
-    AnyDriver: TypeAlias = Driver | GeneralDriver
 
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
 #: else exceed ten tolerances on scenes whose members turn fast
@@ -80,9 +71,9 @@ class Evaluator:
             from mdstopo.scene.rounding import rounded_otherwise
 
             self._near = rounded_otherwise(case, self._origin, extent_of(case), sample)
-        self.scenes: Mapping[str, AnyScene] = _compile(self._near, bool(self.beyond))
-        self._drivers: dict[str, AnyDriver] = {}
-        self._diagnoses: dict[str, Diagnosis] = {}
+        self._family = _family(self.beyond)
+        self.scenes: Mapping[str, Scene] = self._family.scenes(self._near)
+        self._drivers: dict[str, SceneDriver] = {}
         self._coarse: dict[str, str] = {}
         self._n = case.n_design
         self._design = Design(case)
@@ -159,14 +150,14 @@ class Evaluator:
                 status, diagnosis = self._verdict(name, design, result)
             gradients, across = (result.gradients, result.across) if exact else (None, None)
             if status.ok and gradient and not exact:
-                found = _differentiate(method, driver, design, result, rows.cones)
+                found = driver.differentiate(method, design, result, rows.cones)
                 status, diagnosis, gradients, across = found.status, found.message, found.gradients, found.across
             work.append(driver.work.tolist())
             message = diagnosis or message
             if not status.ok:
                 break
             if result.grazing >= 0:
-                grazing = self._member(name, result.grazing)
+                grazing = driver.member(result.grazing)
             for j, key in enumerate(keys):
                 looked[key] = _peaks(result, j, gradients, across, driver.shapes[j])
         if edge and status.ok:
@@ -206,13 +197,13 @@ class Evaluator:
         status, steps = driver.simulate(design)
         message = ""
         if not status.ok:
-            status, message = self._explain(load_case, design, status, float(steps.t[-1]), steps.state[-1])
+            status, message = driver.explain(design, status, float(steps.t[-1]), steps.state[-1])
         elif too_coarse:
             status, message = Status.STEP_TOO_LARGE, too_coarse
         else:
             meeting = driver.met(steps.count)
             if meeting >= 0:
-                status, message = Status.ZERO_LENGTH, self._member(load_case, meeting)
+                status, message = Status.ZERO_LENGTH, driver.member(meeting)
         work = work_named(driver.work.tolist())
         bodies = next(each.bodies for each in self.case.load_cases if each.name == load_case)
         home = np.array([value for body in bodies for value in (*body.position, body.angle)])
@@ -233,14 +224,7 @@ class Evaluator:
 
     def _histories(self, design: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         load_case = next(each.load_case for each in self.case.objectives if each.name == objective)
-        driver = self.driver(load_case)
-        if isinstance(driver, Driver):
-            from mdstopo.sensitivity.methods import histories
-
-            return histories(driver, design)
-        from mdstopo.general.methods import histories as histories_general
-
-        return histories_general(driver, design, list(self._by_load_case[load_case]).index(objective))
+        return self.driver(load_case).histories(design, list(self._by_load_case[load_case]).index(objective))
 
     def problem(self, scalarisation: "Scalarisation | None" = None) -> "Problem":
         """The case as the optimiser sees it; several objectives need a scalarisation."""
@@ -260,31 +244,15 @@ class Evaluator:
 
     def settled(self, alpha: FloatArray, load_case: str) -> "Settled | None":
         """How far the start moves to be at rest with alpha (N,); None where the case does not settle, or cannot."""
-        if not self.case.solver.settle:
-            return None
-        driver = self.driver(load_case)
-        assert not isinstance(driver, Driver)
-        return driver.start.settled if driver.settle(self.design(alpha)) and driver.start is not None else None
+        return self.driver(load_case).settled(self.design(alpha)) if self.case.solver.settle else None
 
     def degrees_of_freedom(self, load_case: str) -> int:
         """Coordinates that are free, less the independent rows of joints."""
-        scene = self.scenes[load_case]
-        if isinstance(scene, Scene):
-            return scene.n
-        return int(scene.model.free.sum()) - int(scene.model.size[0])
+        return self.scenes[load_case].degrees_of_freedom
 
     def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
         """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
-        scene = self.scenes[load_case]
-        if isinstance(scene, Scene):
-            from mdstopo.mechanics.start_frequencies import natural_frequencies
-
-            return natural_frequencies(self._near, scene, self.design(alpha))
-        from mdstopo.general.vibration import natural_frequencies as of_general
-
-        driver = self.driver(load_case)
-        assert not isinstance(driver, Driver)
-        return of_general(driver, self.design(alpha))
+        return self.driver(load_case).natural_frequencies(self.design(alpha))
 
     # -- how
 
@@ -293,7 +261,7 @@ class Evaluator:
         return checked(self.case, alpha)
 
     @cached_property
-    def _seen(self) -> "list[tuple[str, tuple[str, ...], AnyDriver]]":
+    def _seen(self) -> list[tuple[str, tuple[str, ...], SceneDriver]]:
         """The load cases that objectives or constraints look at: name, the names of these, driver."""
         return [(name, tuple(looked), self.driver(name)) for name, looked in self._by_load_case.items() if looked]
 
@@ -304,24 +272,13 @@ class Evaluator:
                 return f"alpha = 0 in group {name}, whose power {power:g} is below 1"
         return ""
 
-    def driver(self, name: str) -> "AnyDriver":
+    def driver(self, name: str) -> SceneDriver:
         """The buffers and compiled entries of one load case, made at their first use."""
         if name not in self._drivers:
-            looked = self._by_load_case[name].values()
-            solver = self.case.solver
-            scene, tolerance, step = self.scenes[name], _of_motion(solver.tolerance), solver.step or 0.0
-            driver: AnyDriver
-            if isinstance(scene, Scene):
-                reductions = np.array([REDUCTIONS[each.over_time] for each in looked], dtype=np.int64)
-                alpha = self._design.values
-                integrated = any(each.over_time in INTEGRALS for each in looked)
-                driver = Driver(
-                    scene, self._method, _response_entries, tolerance, step, reductions, alpha, self._beside, integrated
-                )
-            else:
-                from mdstopo.general.driver import GeneralDriver
-
-                driver = GeneralDriver(self._near, scene, self._method, tolerance, step)
+            solver, looked = self.case.solver, tuple(self._by_load_case[name].values())
+            tolerance, step = _of_motion(solver.tolerance), solver.step or 0.0
+            options = DriverOptions(self._method, tolerance, step, looked, self._design.values, self._beside)
+            driver = self._family.driver(self._near, self.scenes[name], options)
             if self._method.kind.finds_step and solver.step is None:
                 from mdstopo.integrators.default_step import default_step
 
@@ -339,35 +296,15 @@ class Evaluator:
             self._coarse[name] = coarse(self.driver(name), design)
         return self._coarse[name]
 
-    def _diagnosis(self, name: str) -> Diagnosis:
-        if name not in self._diagnoses:
-            scene = self.scenes[name]
-            assert isinstance(scene, Scene)
-            self._diagnoses[name] = Diagnosis(self._near, scene)
-        return self._diagnoses[name]
-
-    def _explain(
-        self, name: str, design: FloatArray, status: Status, time: float, state: FloatArray
-    ) -> tuple[Status, str]:
-        """The status and its message, for a motion that ended at `time` in a state (2, n)."""
-        driver = self.driver(name)
-        if isinstance(driver, Driver):
-            return self._diagnosis(name).explain(design, status, time, state)
-        return status, driver.message
-
     def _verdict(self, name: str, design: FloatArray, result: ResponseResult) -> tuple[Status, str]:
         """Why the motion of a load case cannot be trusted, and which member or joint is the cause."""
-        if result.status.ok and result.meeting >= 0:
-            return Status.ZERO_LENGTH, self._member(name, result.meeting)
-        if result.status.ok:
-            return Status.UNRESOLVED, self._member(name, result.unresolved)
-        status, steps = self.driver(name).simulate(design)
-        return self._explain(name, design, status, float(steps.t[-1]), steps.state[-1])
-
-    def _member(self, name: str, padded: int) -> str:
-        """A member of a load case's scene in words."""
         driver = self.driver(name)
-        return (self._diagnosis(name) if isinstance(driver, Driver) else driver).member(padded)
+        if result.status.ok and result.meeting >= 0:
+            return Status.ZERO_LENGTH, driver.member(result.meeting)
+        if result.status.ok:
+            return Status.UNRESOLVED, driver.member(result.unresolved)
+        status, steps = driver.simulate(design)
+        return driver.explain(design, status, float(steps.t[-1]), steps.state[-1])
 
     def _evaluation(
         self,
@@ -423,37 +360,13 @@ def _of_motion(tolerance: float) -> float:
     return min(tolerance, max(LOOSEST, 0.5 * tolerance))
 
 
-def _response_entries() -> ModuleType:
-    """The compiled entries that evaluate responses of springs between free bodies from their steps."""
-    from mdstopo.sensitivity import energy_responses
+def _family(beyond: str) -> SceneFamily:
+    """The kernels that a case needs; beyond: what in it goes beyond springs between free bodies (`scene.family`)."""
+    if not beyond:
+        return SPRINGS
+    from mdstopo.general.general_driver import GENERAL
 
-    return energy_responses
-
-
-def _compile(case: Case, general: bool) -> dict[str, "AnyScene"]:
-    """Every load case as a scene of the family that the case needs."""
-    if general:
-        from mdstopo.general.compile import compile_general
-
-        return {load_case.name: compile_general(case, load_case) for load_case in case.load_cases}
-    order = state_order(case)
-    shared = compile_members(case, {name: i for i, name in enumerate(order)})
-    return {load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases}
-
-
-def _differentiate(
-    method: str, driver: "AnyDriver", design: FloatArray, looked: ResponseResult, cones: bool
-) -> "Differentiated":
-    """Gradients by another method than the adjoint one."""
-    from mdstopo.sensitivity.methods import Differentiated, differentiate
-
-    if isinstance(driver, Driver):
-        return differentiate(method, driver, design, looked)
-    from mdstopo.general.methods import differentiate as differentiate_general
-
-    across = np.zeros_like(looked.gradients) if cones and method != "constant_load" else None
-    gradients, message = differentiate_general(driver, method, design, looked, across)
-    return Differentiated(Status.OK, message, gradients, across)
+    return GENERAL
 
 
 def _peaks(

@@ -12,7 +12,7 @@ class IntegratorKind(NamedTuple):
     """An integrator.
 
     name: as case files have it; doc: a sentence for the case reference. made_by: module:function, called with the
-    solver's settings, which returns the `integrators.driver.Method`.
+    solver's settings, which returns the `integrators.scene_driver.Method`.
     springs: whether it computes springs between free bodies by their own kernels. general: the module with its entries
     for all other scenes (`general.method_interface`); empty where there are none.
     adaptive: whether it chooses steps by the tolerance where none is given. finds_step: whether it finds a fixed step

@@ -8,7 +8,6 @@ at the same equilibrium, however far it sags. Where it does not, the machine has
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,11 +15,9 @@ from mdstopo.case.arrays import FloatArray
 from mdstopo.case.model import Case
 from mdstopo.case.words import number_text, shown
 from mdstopo.engine import Evaluator
+from mdstopo.general.general_driver import GeneralDriver
 from mdstopo.general.settle import settle
 from mdstopo.general.start import size_of
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
 
 #: the farthest that an equilibrium goes in one step of the sizes: in sizes of the scene, and in rad
 NEAR, TURN = 0.01, 0.05
@@ -59,7 +56,9 @@ def compare_equilibria(case: Case, design: FloatArray, end: FloatArray, reduced:
         where = f"in load case {load_case.name} " if len(case.load_cases) > 1 else ""
         far = _Distance(case, begun.q, ended.q)
         words = f"{where}the final design rests {far} away from where the full one does"
-        tracked = _followed(whole.driver(load_case.name), case, design, end, begun.q)  # type: ignore[arg-type]
+        driver = whole.driver(load_case.name)
+        assert isinstance(driver, GeneralDriver)  # what settles is no scene of springs alone
+        tracked = _followed(driver, case, design, end, begun.q)
         if tracked is None or _Distance(case, tracked, ended.q).is_beyond(NEAR, TURN):
             return Comparison(f"{words}, at another equilibrium: the members kept do not hold it")
         if far.is_beyond(FAR, TURNED):

@@ -15,7 +15,7 @@ from mdstopo.general.responses import MEMBER_FORCE
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: members that are followed at most, unless more rows than these are asked for
 FOLLOWED = 12

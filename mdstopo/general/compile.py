@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, ResponseRow
+from mdstopo.case.model import GROUND, Case, LoadCase, Response, ResponseRow
 from mdstopo.case.responses import kind_of
 from mdstopo.general import responses as responses_of
 from mdstopo.general.contact_compile import contact_rows
@@ -20,6 +20,7 @@ from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.compile import home_of
+from mdstopo.scene.loads import generalised_loads
 from mdstopo.scene.model import HOME_COS, VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
@@ -53,6 +54,11 @@ class GeneralScene:
     def n(self) -> int:
         """Coordinates of the bodies."""
         return 3 * self.n_bodies
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Coordinates that are free, less the independent rows of joints."""
+        return int(self.model.free.sum()) - int(self.model.size[0])
 
 
 def looked_at(case: Case, load_case: str) -> tuple[tuple[Response, ...], tuple[str, ...]]:
@@ -97,7 +103,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     reach = _reach(case, index, pairs, members)
     for p, row in zip(contact_pair.tolist(), contact, strict=True):
         reach[p] = max(reach[p], float(np.hypot(row[PX], row[PY])))
-    force, turning, load_force = _loads(load_case, index, times, n)
+    loads = generalised_loads(load_case, index, times)
     responses, reductions = looked_at(case, load_case.name)
     response, response_par = _responses(case, responses, index)
     layout = arrange(case, joint, joint_par, free, mass, home, pair)
@@ -105,11 +111,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     damped = _damped(case, responses, reductions)
     model = GeneralModel(
         free=free, mass=mass, q0=np.zeros(n), v0=v0, home=home, pair=pair, reach=reach, **members, times=times,
-        force=force,
-        load_body=np.array([index[load.body] for load in turning], dtype=np.int64),
-        load_follows=np.array([load.frame == "body" for load in turning], dtype=np.int64),
-        load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
-        load_force=load_force, bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
+        **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
         joint_par=joint_par, row=layout.row, place=layout.place,
         size=np.array([*layout.size, int(damped), len(layout.steady)], dtype=np.int64), line=layout.line,
         envelope=layout.envelope, product=layout.product, steady=layout.steady,
@@ -287,32 +289,6 @@ def _reach(
         reach[pair] = max(reach[pair], float(np.hypot(*tie.at_second)), float(np.hypot(*tie.at_first)))
     reach[reach == 0.0] = 1.0
     return reach
-
-
-def _loads(
-    load_case: LoadCase, index: dict[str, int], times: FloatArray, n: int
-) -> tuple[FloatArray, list[Load], FloatArray]:
-    """Generalised loads, and those that depend on a body's rotation with their components."""
-    force = np.zeros((len(times) - 1, n, 2))
-    for i, body in enumerate(load_case.bodies):
-        force[:, 3 * i, 0] += body.mass * load_case.gravity[0]
-        force[:, 3 * i + 1, 0] += body.mass * load_case.gravity[1]
-    turning: list[Load] = []
-    for load in load_case.loads:
-        if load.body == GROUND:
-            continue
-        b = 3 * index[load.body]
-        force[:, b + 2] += segment_values(load.moment, times)
-        if load.frame == "global" and tuple(load.at_local) == (0.0, 0.0):
-            force[:, b] += segment_values(load.force[0], times)
-            force[:, b + 1] += segment_values(load.force[1], times)
-        elif any(np.any(segment_values(component, times)) for component in load.force):
-            turning.append(load)
-    load_force = np.zeros((len(times) - 1, len(turning), 2, 2))
-    for k, load in enumerate(turning):
-        load_force[:, k, 0] = segment_values(load.force[0], times)
-        load_force[:, k, 1] = segment_values(load.force[1], times)
-    return force, turning, load_force
 
 
 def _responses(case: Case, responses: tuple[Response, ...], index: dict[str, int]) -> tuple[IndexArray, FloatArray]:

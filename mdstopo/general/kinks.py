@@ -17,7 +17,7 @@ from mdstopo.general.model import GeneralModel
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 EvaluateAt = Callable[[FloatArray, bool], FloatArray]
 

@@ -19,7 +19,7 @@ from mdstopo.general.responses import MEMBER_FORCE, TIE
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: samples of a step in which several members may lead
 FINE = np.linspace(0.0, 1.0, 17)

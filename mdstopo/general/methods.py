@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.general.extremes import RATE, SIGN, parts, row_of
 from mdstopo.general.quadrature_breakpoints import INTEGRALS, reduced
-from mdstopo.integrators.driver import ResponseResult
+from mdstopo.integrators.scene_driver import ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray
 from mdstopo.sensitivity.constant_load import DROPPED
@@ -14,7 +14,7 @@ from mdstopo.sensitivity.methods import FALLBACK
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: sweeps of the iterative method before it counts as not contracting
 SWEEPS = 200

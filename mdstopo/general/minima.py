@@ -34,7 +34,7 @@ from mdstopo.integrators.driver import CLOSENESS
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: a minimum below this share of the highest value may be a zero, or nearly one
 LOW = 0.05

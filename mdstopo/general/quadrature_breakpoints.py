@@ -22,7 +22,7 @@ from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: reductions that are integrals over time: of g (1), of its square (2)
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}

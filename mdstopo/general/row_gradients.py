@@ -9,7 +9,7 @@ from mdstopo.general.quadrature_breakpoints import INTEGRALS
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: rows times members of one reverse sweep at most, for the memory they take
 BLOCK = 2**23

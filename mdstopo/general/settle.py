@@ -20,7 +20,7 @@ import numpy as np
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: pseudo-steps at most, and the farthest that one goes, relative to the scene
 MOST, FAR = 400, 0.1

@@ -22,7 +22,7 @@ from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
     from mdstopo.general.settle import Settled
 
 #: misfit of a joint at the start, relative to the scene's size or speeds, up to which it fits

@@ -7,7 +7,7 @@ import numpy as np
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
+    from mdstopo.general.general_driver import GeneralDriver
 
 #: what a constraint leaves of a direction, relative, below which the direction is held
 HELD = 1e-9

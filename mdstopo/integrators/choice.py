@@ -7,7 +7,7 @@ import numpy as np
 
 from mdstopo.case.integrators import ADAPTIVE, AUTO, FIXED, INTEGRATORS, SMOOTH
 from mdstopo.case.model import SolverSettings
-from mdstopo.integrators.driver import Method
+from mdstopo.integrators.scene_driver import Method
 
 
 def choose(solver: SolverSettings, beyond: str = "") -> tuple[str, str]:

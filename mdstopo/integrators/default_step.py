@@ -7,16 +7,12 @@ it fits other designs as well.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.integrators.scene_driver import SceneDriver
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralDriver
-    from mdstopo.integrators.driver import Driver
 
 #: error aimed at, in tolerances: the promise is ten, and other designs than the measured one are less kind
 AIM = 2.0
@@ -37,7 +33,7 @@ class _Run:
     rows: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]
 
 
-def default_step(driver: "Driver | GeneralDriver", alpha: FloatArray) -> float:
+def default_step(driver: SceneDriver, alpha: FloatArray) -> float:
     """What to put into `driver.settings[2]` so that errors are about `AIM` tolerances (settings[0]) at alpha (N,).
 
     Negative: radians of the fastest vibration a step (`generalized_alpha.longest_step`). The error meant is that
@@ -66,12 +62,12 @@ def _settle(run: Callable[[float], _Run | None], step: float, aim: float) -> flo
     return step
 
 
-def _run(driver: "Driver | GeneralDriver", alpha: FloatArray, step: float) -> _Run | None:
+def _run(driver: SceneDriver, alpha: FloatArray, step: float) -> _Run | None:
     """Simulate with a step, or None where that fails."""
     kept = driver.settings[2]
     driver.settings[2] = step
     try:
-        if len(driver.reductions) == 0:
+        if not driver.shapes:
             status, steps = driver.simulate(alpha)
             return _Run(steps.t.copy(), steps.state[:, 0].copy(), ()) if status is Status.OK else None
         looked = driver.evaluate(alpha, True)

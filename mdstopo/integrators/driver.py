@@ -5,17 +5,16 @@ little, and gives the steps more room when the kernel asks for it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 
-from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.memory import holds_steps
 from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
+from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
 from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
 from mdstopo.mechanics.active_members import ROOMY
 from mdstopo.scene.compile import Scene
@@ -28,91 +27,32 @@ CLOSENESS = 0.15
 ROWS = 4
 
 
-@dataclass(frozen=True)
-class Method:
-    """An integrator as the engine sees it.
-
-    kind: its record. load: imports its compiled entries (simulate). tables: its constant arrays. steps, stages: room to
-    begin with. collocates: whether its stages are the nodes of Gauss's rules.
-    """
-
-    kind: IntegratorKind
-    load: Callable[[], ModuleType]
-    tables: FloatArray
-    steps: int
-    stages: int
-    collocates: bool = False
-
-    @property
-    def name(self) -> str:
-        """As in the case file."""
-        return self.kind.name
-
-
-class Compiling(Protocol):
-    """Another process that may be compiling what evaluates responses (`warm.Beside`).
-
-    due: whether that has never been compiled here; wait: until the process has ended.
-    """
-
-    due: bool
-
-    def wait(self) -> None: ...
-
-
-class ResponseResult(NamedTuple):
-    """What one call of `Driver.evaluate` found; arrays are views that the next call overwrites.
-
-    rows (n_obj, R, 4): time, value, step, fraction; found (n_obj,): how many rows hold; gradients (n_obj, R, N);
-    meeting: padded index of a member whose ends meet, or -1. grazing: of one that leaves no derivative, or -1. across:
-    as gradients, of `evaluation.Peak.across`, where it was asked for; rows of responses without one are zero.
-    unresolved: of a member whose stored energy has no digits, or -1.
-    """
-
-    status: Status
-    time: float
-    rows: FloatArray
-    found: IndexArray
-    gradients: FloatArray
-    meeting: int
-    grazing: int = -1
-    across: FloatArray | None = None
-    unresolved: int = -1
-
-
 class Driver:
     """One scene, one method, ready to run."""
 
     def __init__(
         self,
         scene: Scene,
-        method: Method,
+        options: DriverOptions,
         load_responses: Callable[[], ModuleType],
-        tolerance: float,
-        step: float,
         reductions: IndexArray,
-        alpha: FloatArray,
-        beside: Compiling | None = None,
         integrated: bool = False,
     ) -> None:
         """Make room, and pack the scene; nothing is compiled or imported yet.
 
         scene: the compiled load case.
-        method: the integrator.
+        options: the method, its tolerance or step, and the array that designs are put in.
         load_responses: imports the compiled entries that evaluate responses from the steps (`energy_responses`).
-        tolerance: relative error that objectives and gradients may have.
-        step: fixed step (s); 0: adaptive steps; negative: see `generalized_alpha.longest_step`.
         reductions (n_obj,): codes of `sensitivity.reductions`, one an objective.
-        alpha (N,): the array that every design is put in, shared with whoever gives designs.
-        beside: another process that may be compiling what evaluates responses.
         integrated: whether something is looked at that is integrated over time.
         """
+        method, tolerance, step = options.method, options.tolerance, options.step
         self.scene = scene
         self.method = method
         self._entry: Any = None
         self._load_responses = load_responses
         self._responses: Any = None
-        self._beside = beside
+        self._beside = options.beside
         self.packed = self._plain = pack(scene.model)
         n, n_pair = len(scene.model.inv_mass), len(scene.model.pair)
         #: coordinates, pairs, whether anything depends on velocity, whether loads turn: what room is made for
@@ -125,7 +65,7 @@ class Driver:
         self.work = np.zeros(WORK, dtype=np.int64)
         padded = scene.model.member.shape[1]
         count = len(reductions)
-        self._alpha = alpha  # one array for all designs: a read-only one would be another type
+        self._alpha = options.design  # one array for all designs: a read-only one would be another type
         #: how the values come from what they are formed of (`evaluation.Peak`)
         self.shapes: tuple[Shape, ...] = tuple("plain" for _ in reductions)
         self.strength = aligned((ROOMY, padded))
@@ -328,6 +268,14 @@ class DenseSteps:
         self.t: FloatArray = arrays[0][: count + 1]
         self.state: FloatArray = arrays[1][: count + 1]
         self.index: IndexArray = arrays[2][: count + 1]
+
+    def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """`at`, and lam (T, 0): nothing is constrained."""
+        return self.at(times), np.zeros((len(times), 0))
+
+    def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
+        """There are no joints."""
+        return {}
 
     def at(self, times: FloatArray) -> FloatArray:
         """q, v, a (3, T, n) at times (T,) within what was simulated."""

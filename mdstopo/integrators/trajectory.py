@@ -2,17 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mdstopo.integrators.driver import DenseSteps
+from mdstopo.integrators.scene_driver import Steps
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
-
-if TYPE_CHECKING:
-    from mdstopo.general.driver import GeneralSteps
 
 
 @dataclass(frozen=True)
@@ -46,7 +42,7 @@ class Trajectory:
     a: FloatArray
     lam: FloatArray
     work: dict[str, int]
-    steps: "DenseSteps | GeneralSteps" = field(repr=False)
+    steps: Steps = field(repr=False)
     reactions: Mapping[str, FloatArray] = field(default_factory=dict)
     home: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
 
@@ -54,7 +50,7 @@ class Trajectory:
     def of(
         cls,
         load_case: str,
-        steps: "DenseSteps | GeneralSteps",
+        steps: Steps,
         status: Status,
         message: str,
         work: dict[str, int],
@@ -74,9 +70,7 @@ class Trajectory:
         q += home
         a, lam = np.zeros_like(q), np.zeros((len(t), 0))
         reactions: Mapping[str, FloatArray] = {}
-        if isinstance(steps, DenseSteps):
-            a = steps.at(t)[2][:, :n].copy() if steps.count else a
-        elif steps.count:
+        if steps.count:
             out, lam = steps.balanced(t)
             a = out[2][:, :n].copy()
             reactions = steps.reactions(out[0], lam)
@@ -91,10 +85,7 @@ class Trajectory:
         if asked.ndim != 1 or not np.all((asked >= self.t[0]) & (asked <= self.t[-1])):
             raise ValueError(f"times must be one-dimensional and lie within {self.t[0]:g} .. {self.t[-1]:g} s")
         n = self.q.shape[1]
-        if isinstance(self.steps, DenseSteps):
-            out, lam = self.steps.at(asked), np.zeros((len(asked), 0))
-        else:
-            out, lam = self.steps.balanced(asked)
+        out, lam = self.steps.balanced(asked)
         q, v, a = out[:, :, :n]
         q += self.home
         return States(q, v, a, lam)

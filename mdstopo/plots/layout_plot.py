@@ -8,7 +8,7 @@ from mdstopo.case.model import GROUND
 from mdstopo.plots.scenery import edge_at, ends_at, outline, sizes, start_state
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import COLOURS, MOST_NAMED, WIDTH
-from mdstopo.plots.watch import points_at
+from mdstopo.scene.points import points_at
 
 #: of the range of alpha: what is thinner is not drawn
 FAINT = 0.02

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, Contact, MemberGroup
-from mdstopo.plots.watch import points_at
+from mdstopo.scene.points import points_at
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,8 @@ from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared
 from mdstopo.plots.scenery import outline, sizes, start_state
 from mdstopo.plots.source import Source
-from mdstopo.plots.watch import points_at, response_history
+from mdstopo.plots.watch import response_history
+from mdstopo.scene.points import points_at
 from mdstopo.store.whole_front import whole_front
 
 Floats = NDArray[np.float64]

@@ -9,8 +9,9 @@ from functools import cached_property
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case, Load, LoadCase, MemberGroup, SpringLaw
+from mdstopo.case.model import GROUND, Case, LoadCase, MemberGroup, SpringLaw
 from mdstopo.scene.grids import row_of
+from mdstopo.scene.loads import Loads, generalised_loads
 from mdstopo.scene.model import (
     BLOCK,
     DAMPING,
@@ -33,7 +34,7 @@ from mdstopo.scene.model import (
     Model,
 )
 from mdstopo.scene.origin import ends_of
-from mdstopo.scene.signals import breakpoints, segment_values
+from mdstopo.scene.signals import breakpoints
 
 ELASTIC, VISCOUS = 0, 1
 
@@ -57,6 +58,11 @@ class Scene:
     def n(self) -> int:
         """Coordinates of the moving bodies."""
         return 3 * self.n_bodies
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Coordinates that are free, less the independent rows of joints."""
+        return self.n
 
     @property
     def start(self) -> float:
@@ -185,26 +191,7 @@ def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
 
     pairs, reach, shortest = _watched_pairs(names, shared)
     times = breakpoints(load_case)
-    force = np.zeros((len(times) - 1, 3 * len(names), 2))
-    for i, body in enumerate(load_case.bodies):
-        force[:, 3 * i, 0] += body.mass * load_case.gravity[0]
-        force[:, 3 * i + 1, 0] += body.mass * load_case.gravity[1]
-    turning: list[Load] = []
-    for load in load_case.loads:
-        if load.body == GROUND:
-            continue
-        b = 3 * index[load.body]
-        force[:, b + 2] += segment_values(load.moment, times)
-        if load.frame == "global" and tuple(load.at_local) == (0.0, 0.0):
-            force[:, b] += segment_values(load.force[0], times)
-            force[:, b + 1] += segment_values(load.force[1], times)
-        elif any(np.any(segment_values(component, times)) for component in load.force):
-            turning.append(load)
-    load_force = np.zeros((len(times) - 1, len(turning), 2, 2))
-    for k, load in enumerate(turning):
-        load_force[:, k, 0] = segment_values(load.force[0], times)
-        load_force[:, k, 1] = segment_values(load.force[1], times)
-
+    loads = generalised_loads(load_case, index, times)
     block, member = shared.block, shared.member
     damped = bool(np.any(member[DAMPING] > 0.0))
     model = Model(
@@ -220,16 +207,12 @@ def compile_scene(case: Case, load_case: LoadCase, shared: Members) -> Scene:
         near=shared.near,
         member=member,
         times=times,
-        force=force,
-        load_body=np.array([index[load.body] for load in turning], dtype=np.int64),
-        load_follows=np.array([load.frame == "body" for load in turning], dtype=np.int64),
-        load_arm=np.array([load.at_local for load in turning], dtype=np.float64).reshape(-1, 2),
-        load_force=load_force,
+        **loads._asdict(),
     )
     for array in model:
         if isinstance(array, np.ndarray):
             array.flags.writeable = False
-    return Scene(load_case, model, names, n_bodies, damped, _skipped(case, names, damped, times, turning, block))
+    return Scene(load_case, model, names, n_bodies, damped, _skipped(case, names, damped, times, loads, block))
 
 
 def _watched_pairs(names: tuple[str, ...], shared: Members) -> tuple[IndexArray, FloatArray, FloatArray]:
@@ -252,7 +235,7 @@ def _skipped(
     names: tuple[str, ...],
     damped: bool,
     times: FloatArray,
-    turning: list[Load],
+    loads: Loads,
     block: IndexArray,
 ) -> tuple[str, ...]:
     """What the arrays of a scene leave out, and why: a sentence each.
@@ -261,7 +244,7 @@ def _skipped(
     names: bodies in the order of the state.
     damped: whether any force depends on velocity.
     times (n_seg + 1,): ends of the segments of the loads (s).
-    turning: loads whose effect depends on the angle of their body.
+    loads: of the load case.
     block (n_block, BLOCK): as of `Model`.
     """
     notes = []
@@ -271,7 +254,7 @@ def _skipped(
         notes.append("ground: no member is tied to it")
     if len(times) == 2:
         notes.append("kinks in time: all loads are smooth")
-    if not turning:
+    if not len(loads.load_body):
         notes.append("load stiffness: no load turns with a body or acts off its centre of mass")
     if not any(kind == VISCOUS for kind in block[:, 3].tolist()):
         notes.append("damping and preload columns of the members")

@@ -3,9 +3,11 @@
 Nothing here is on the path of an evaluation that goes well.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from mdstopo.case.model import Case
+from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.grids import places_of
 from mdstopo.scene.model import COUNT, DESIGN, L0, PAIR, PRELOAD, PX, PY, QX, QY, STIFFNESS, FloatArray
@@ -28,11 +30,7 @@ class Diagnosis:
             places = places_of(block)
             i = int(np.searchsorted(places, padded))
             if i < len(places) and places[i] == padded:
-                p, q = group.p_world[i], group.q_world[i]
-                return (
-                    f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
-                    f"({q[0]:g}, {q[1]:g}) on {group.body_to}"
-                )
+                return member_in_words(group, i)
         raise IndexError(f"no member at {padded}")
 
     def explain(self, design: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
@@ -41,10 +39,7 @@ class Diagnosis:
         meeting = self._collapsed(design, state[0])
         if meeting >= 0 and status in (Status.STEP_TOO_SMALL, Status.STEP_LIMIT, Status.NEWTON_FAILED):
             return Status.ZERO_LENGTH, f"{self.member(meeting)}, {where}"
-        speed = np.abs(state[1, : self.scene.n]).reshape(-1, 3).max(axis=1)
-        wild = np.flatnonzero(~np.isfinite(speed))
-        body = self.scene.bodies[int(wild[0]) if wild.size else int(speed.argmax())]
-        return status, f"{where}; the fastest body is {body}"
+        return status, f"{where}; the fastest body is {fastest_body(self.scene.bodies, state[1, : self.scene.n])}"
 
     def _collapsed(self, design: FloatArray, q: FloatArray) -> int:
         """Padded index of the member that has shrunk to nothing while it carries a force, or -1."""
@@ -70,3 +65,21 @@ class Diagnosis:
             if ratio[i] < best:
                 best, found = float(ratio[i]), int(places[i])
         return found
+
+
+def member_in_words(group: MemberGroup, i: int) -> str:
+    """Member i of a group, by its ends."""
+    p, q = group.p_world[i], group.q_world[i]
+    return (
+        f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
+        f"({q[0]:g}, {q[1]:g}) on {group.body_to}"
+    )
+
+
+def fastest_body(bodies: Sequence[str], v: FloatArray) -> str:
+    """The name of the body that moves fastest at velocities v (3 n_bodies,), or of one whose speed is no number."""
+    if not len(v):
+        return GROUND
+    speed = np.abs(v).reshape(-1, 3).max(axis=1)
+    wild = np.flatnonzero(~np.isfinite(speed))
+    return bodies[int(wild[0]) if wild.size else int(speed.argmax())]

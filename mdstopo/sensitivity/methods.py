@@ -4,18 +4,18 @@
 times.
 """
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mdstopo.integrators.scene_driver import Differentiated, ResponseResult
 from mdstopo.integrators.steps import OK, status_of
 from mdstopo.scene.model import FloatArray
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
-    from mdstopo.integrators.driver import Driver, ResponseResult
+    from mdstopo.integrators.driver import Driver
 
 #: nodes of the rule by which constant_load forms a mean or an integral over time
 NODES = 201
@@ -23,20 +23,7 @@ NODES = 201
 FALLBACK = "the sweeps of the iterative method do not contract at t = {:.6g} s; direct was taken instead"
 
 
-@dataclass(frozen=True)
-class Differentiated:
-    """gradients (n_obj, R, N) of the rows; message: what the user should know although it worked, or empty.
-
-    across: as gradients, of `evaluation.Peak.across`, or None.
-    """
-
-    status: Status
-    message: str
-    gradients: FloatArray
-    across: FloatArray | None = None
-
-
-def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: "ResponseResult") -> Differentiated:
+def differentiate(method: str, driver: "Driver", alpha: FloatArray, looked: ResponseResult) -> Differentiated:
     """Gradients of the rows that `driver.evaluate(alpha, ...)` found, by `direct`, `iterative` or `constant_load`.
 
     alpha: (N,). Counts are added to `driver.work`. Raises ValueError for a name that is none of the three, and for
@@ -91,7 +78,7 @@ def histories(driver: "Driver", alpha: FloatArray) -> tuple[Status, FloatArray, 
 
 
 def _constant_load(
-    driver: "Driver", alpha: FloatArray, looked: "ResponseResult", gradients: FloatArray
+    driver: "Driver", alpha: FloatArray, looked: ResponseResult, gradients: FloatArray
 ) -> Differentiated:
     from mdstopo.sensitivity.constant_load import constant_load
 

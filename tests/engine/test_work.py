@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import mdstopo.case.reader
+import mdstopo.integrators.driver
 import mdstopo.scene.compile
+import mdstopo.sensitivity.springs_driver
 from mdstopo import evaluate, simulate
 from mdstopo.engine import Evaluator
 from tests.engine.scenes import interior, paper, random_design, random_scene, read, spring_scene, with_solver
@@ -54,8 +56,9 @@ def test_the_second_evaluation_reads_and_compiles_nothing(monkeypatch):
         raise AssertionError("compiled or read again")
 
     for module, name in (
-        (mdstopo.case.reader, "parse"), (mdstopo.scene.compile, "compile_scene"), (mdstopo.engine, "compile_scene"),
-        (mdstopo.engine, "compile_members"), (mdstopo.engine, "Driver"),
+        (mdstopo.case.reader, "parse"), (mdstopo.scene.compile, "compile_scene"),
+        (mdstopo.sensitivity.springs_driver, "compile_scene"), (mdstopo.sensitivity.springs_driver, "compile_members"),
+        (mdstopo.sensitivity.springs_driver, "SpringsDriver"), (mdstopo.integrators.driver.Driver, "__init__"),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, refuse)
     again = evaluate(case, alpha)

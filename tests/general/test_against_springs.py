@@ -9,8 +9,9 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.engine import Evaluator
 from mdstopo.general.compile import compile_general
-from mdstopo.general.driver import GeneralDriver
+from mdstopo.general.general_driver import GeneralDriver
 from mdstopo.integrators.choice import method_of
+from mdstopo.integrators.scene_driver import DriverOptions
 
 CASE = """
 format: 1
@@ -37,9 +38,8 @@ objectives: {G: {response: energy, over_time: max}}
 def test_values_and_gradients_agree(over_time):
     case = read_case(CASE, overrides={"objectives.G.over_time": over_time, "solver.tolerance": "1e-11"})
     expected = mdstopo.evaluate(case)
-    driver = GeneralDriver(
-        case, compile_general(case, case.load_cases[0]), method_of("runge_kutta", case.solver), 1e-11, 0.0
-    )
+    options = DriverOptions(method_of("runge_kutta", case.solver), 1e-11, 0.0, case.objectives, case.initial)
+    driver = GeneralDriver(case, compile_general(case, case.load_cases[0]), options)
     found = driver.evaluate(case.initial, True)
     assert found.status.ok
     gradient = expected.gradients["G"]

@@ -772,7 +772,8 @@ def test_curves_share_one_array():
 
 def test_a_monotone_curve_stays_monotone():
     kernel = Kernel(CurveLaw(curve=np.array([[-1.0, -10.0], [0.0, 0.0], [0.1, 0.0], [0.2, 50.0], [3.0, 51.0]])))
-    assert all(kernel.at(x)[1] >= 0.0 for x in np.linspace(-2.0, 4.0, 301))
+    slopes = [kernel.at(x)[1] for x in np.linspace(-2.0, 4.0, 301)]
+    assert min(slopes) >= -1e-14 * max(slopes)  # one that is zero is formed of coefficients that cancel
 
 
 # --- laws of time

@@ -1,10 +1,10 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from mdstopo.case.memory import holds_steps
 from mdstopo.case.model import Case
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.competing_members import compete, members_peaks
-from mdstopo.general.compile import GeneralScene
+from mdstopo.general.compile import GeneralScene, compile_general
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
@@ -36,11 +36,16 @@ from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.step_history import GRAZES, history_room
 from mdstopo.general.variables import Placing
-from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE, Method, ResponseResult
+from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
+from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
+from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.general.settle import Settled
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
@@ -54,19 +59,18 @@ def load_method(kind: IntegratorKind) -> ModuleType:
 
 
 class GeneralDriver:
-    """One general scene, one method, ready to run; the interface of `integrators.driver.Driver`."""
+    """One general scene, one method, ready to run; `integrators.scene_driver.SceneDriver` tells how."""
 
-    def __init__(self, case: Case, scene: GeneralScene, method: Method, tolerance: float, step: float) -> None:
+    def __init__(self, case: Case, scene: GeneralScene, options: DriverOptions) -> None:
         self.case = case
         self.scene = scene
-        self.method = method
+        self.method = method = options.method
         model = scene.model
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
         self._packed = self.ints, self.floats = pack_general(model)
-        self.settings = np.array([tolerance, NEWTON_TOLERANCE, step, CLOSENESS])
-        self.reductions = np.zeros(len(scene.responses), dtype=np.int64)
+        self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS])
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
@@ -366,19 +370,49 @@ class GeneralDriver:
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the design of the last run."""
+        return float(self.natural_frequencies(np.concatenate([self._alpha, self._values])).max(initial=0.0))
+
+    def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
+        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
         from mdstopo.general.vibration import natural_frequencies
 
-        return float(natural_frequencies(self, np.concatenate([self._alpha, self._values])).max(initial=0.0))
+        return natural_frequencies(self, alpha)
+
+    def settled(self, alpha: FloatArray) -> "Settled | None":
+        """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
+        return self.start.settled if self.start is not None and self.settle(alpha) else None
+
+    def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
+        """Gradients of what `evaluate` found by `direct`, `iterative` or `constant_load`; cones: tell `across`, too."""
+        from mdstopo.general.methods import differentiate
+
+        across = np.zeros_like(looked.gradients) if cones and method != "constant_load" else None
+        gradients, message = differentiate(self, method, alpha, looked, across)
+        return Differentiated(Status.OK, message, gradients, across)
+
+    def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
+        """Times (T,) of the steps and the derivative (T, N) of response j at them, by `direct`."""
+        from mdstopo.general.methods import histories
+
+        return histories(self, alpha, j)
+
+    def watch(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
+        """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
+        _, count, _ = self.run(alpha, False)
+        t = self.states()[0][: count + 1]
+        step = np.clip(np.searchsorted(t, times, side="right") - 1, 0, count - 1)
+        places = np.stack([step.astype(np.float64), (times - t[step]) / (t[step + 1] - t[step])], axis=1)
+        responses = range(len(self.scene.responses))
+        return np.array([self.sample_response(j, places, True, count)[2][:, 0] for j in responses])
 
     @property
     def times(self) -> FloatArray:
         """The times that the case gives: ends of segments, without those that steps land on for other reasons."""
         return self._model.times
 
-    @property
-    def message(self) -> str:
-        """Who is to blame for how the last run ended, or nothing."""
-        return self._message
+    def explain(self, alpha: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
+        """The status of the last run, and who is to blame for it, in words."""
+        return status, self._message
 
     def take(self, design: FloatArray) -> None:
         """Take a design: alpha (N,), and behind it the values of variables (P,), or none for the initial ones."""
@@ -414,11 +448,8 @@ class GeneralDriver:
         if code == STEP_LIMIT and self.where[0] >= 0:
             who = self.member(int(self.where[0]))
             return f"{when}; {who} brakes too fast for explicit steps: a larger slip or a smaller damping needs fewer"
-        n, count = len(self.scene.model.mass), self._steps_until(time)
-        speed = np.abs(self.states()[1][count, 1, : self.scene.n]).reshape(-1, 3).max(axis=1)
-        wild = np.flatnonzero(~np.isfinite(speed))
-        body = self.scene.bodies[int(wild[0]) if wild.size else int(speed.argmax())] if n > 3 else "ground"
-        return f"{when}; the fastest body is {body}"
+        v = self.states()[1][self._steps_until(time), 1, : self.scene.n]
+        return f"{when}; the fastest body is {fastest_body(self.scene.bodies, v)}"
 
     def states(self) -> tuple[FloatArray, FloatArray]:
         """Times and states in the driver's room, with the room for more behind them."""
@@ -449,12 +480,7 @@ class GeneralDriver:
             i = padded - block[START]
             if 0 <= i < block[COUNT]:
                 group = self.case.members[block[GROUP]]
-                i += block[OFFSET]
-                p, q = group.p_world[i], group.q_world[i]
-                return (
-                    f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
-                    f"({q[0]:g}, {q[1]:g}) on {group.body_to}"
-                )
+                return member_in_words(group, i + block[OFFSET])
         return "a member"
 
     def simulate(self, alpha: FloatArray) -> tuple[Status, "GeneralSteps"]:
@@ -464,7 +490,7 @@ class GeneralDriver:
 
 
 class GeneralSteps:
-    """The steps of one simulation, and the motion between them (as `integrators.driver.DenseSteps`)."""
+    """The steps of one simulation, and the motion between them (`integrators.scene_driver.Steps`)."""
 
     def __init__(self, driver: GeneralDriver, count: int) -> None:
         self._driver = driver
@@ -530,3 +556,10 @@ class GeneralSteps:
         out = np.zeros((len(q), len(model.joint), 3))
         reactions(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
         return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}
+
+
+def _scenes(case: Case) -> Mapping[str, GeneralScene]:
+    return {load_case.name: compile_general(case, load_case) for load_case in case.load_cases}
+
+
+GENERAL = SceneFamily(_scenes, GeneralDriver)

@@ -1,0 +1,202 @@
+"""What the engine knows of whatever computes a scene: one interface, whichever kernels the scene needs.
+
+A `SceneFamily` compiles the load cases of a case into scenes, and makes of each a `SceneDriver`, which simulates and
+differentiates it. There are two families: springs between free bodies (`sensitivity.springs_driver`), and everything
+else (`general.general_driver`). `scene.family` tells which one a case needs; nothing else asks for it.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from mdstopo.case.integrators import IntegratorKind
+from mdstopo.case.model import Case, LoadCase, Objective, ResponseRow
+from mdstopo.evaluation import USUAL, Rows, Shape
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.general.settle import Settled
+
+
+@dataclass(frozen=True)
+class Method:
+    """An integrator as the engine sees it.
+
+    kind: its record. load: imports its compiled entries (simulate). tables: its constant arrays. steps, stages: room to
+    begin with. collocates: whether its stages are the nodes of Gauss's rules.
+    """
+
+    kind: IntegratorKind
+    load: Callable[[], ModuleType]
+    tables: FloatArray
+    steps: int
+    stages: int
+    collocates: bool = False
+
+    @property
+    def name(self) -> str:
+        """As in the case file."""
+        return self.kind.name
+
+
+class Compiling(Protocol):
+    """Another process that may be compiling what evaluates responses (`warm.Beside`).
+
+    due: whether that has never been compiled here; wait: until the process has ended.
+    """
+
+    due: bool
+
+    def wait(self) -> None: ...
+
+
+class ResponseResult(NamedTuple):
+    """What one call of `SceneDriver.evaluate` found; arrays are views that the next call overwrites.
+
+    rows (n_obj, R, 4 or more): time, value, step, fraction, and what else the family keeps of a row; found (n_obj,):
+    how many rows hold; gradients (n_obj, R, N); meeting: padded index of a member whose ends meet, or -1. grazing: of
+    one that leaves no derivative, or -1. across: as gradients, of `evaluation.Peak.across`, where it was asked for;
+    rows of responses without one are zero. unresolved: of a member whose stored energy has no digits, or -1.
+    """
+
+    status: Status
+    time: float
+    rows: FloatArray
+    found: IndexArray
+    gradients: FloatArray
+    meeting: int
+    grazing: int = -1
+    across: FloatArray | None = None
+    unresolved: int = -1
+
+
+@dataclass(frozen=True)
+class Differentiated:
+    """gradients (n_obj, R, N) of the rows; message: what the user should know although it worked, or empty.
+
+    across: as gradients, of `evaluation.Peak.across`, or None.
+    """
+
+    status: Status
+    message: str
+    gradients: FloatArray
+    across: FloatArray | None = None
+
+
+class Scene(Protocol):
+    """One load case as arrays; bodies: names in the order of the state; skipped: what was left out, and why.
+
+    n: coordinates of the bodies that move. degrees_of_freedom: those of them that are free, less the independent rows
+    of joints.
+    """
+
+    @property
+    def load_case(self) -> LoadCase: ...
+    @property
+    def model(self) -> Any: ...
+    @property
+    def bodies(self) -> tuple[str, ...]: ...
+    @property
+    def skipped(self) -> tuple[str, ...]: ...
+    @property
+    def n(self) -> int: ...
+    @property
+    def degrees_of_freedom(self) -> int: ...
+
+
+class Steps(Protocol):
+    """The steps of one simulation in arrays of their own: t (count + 1,); state (count + 1, 2, n), q and v."""
+
+    count: int
+    t: FloatArray
+    state: FloatArray
+
+    def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """q, v, a (3, T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
+
+    def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
+        """Joint name -> Fx, Fy, M (T, 3) on its first body, at states q (T, n) with lam (T, n_rows)."""
+
+
+class SceneDriver(Protocol):
+    """One scene, one method, ready to run: the arrays and compiled entries of a load case.
+
+    Designs are alpha (N,), and behind it the values (P,) of the case's variables. Members are told by their place in
+    the padded arrays of the scene. settings: tolerance of the motion, of Newton's iteration, fixed step (s), window of
+    competing peaks. shapes: how the value of each response is formed (`evaluation.Peak`). work (WORK,): counts of the
+    last call. room: where the steps are kept.
+    """
+
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def settings(self) -> FloatArray: ...
+    @property
+    def shapes(self) -> tuple[Shape, ...]: ...
+    @property
+    def work(self) -> IndexArray: ...
+    @property
+    def room(self) -> FloatArray: ...
+
+    def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
+        """Simulate a design and evaluate all responses, and on demand their gradients by the discrete adjoint."""
+
+    def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
+        """Gradients of what `evaluate` found by `direct`, `iterative` or `constant_load`; cones: tell `across`, too."""
+
+    def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
+        """Times (T,) of the steps and the derivative (T, N) of response j at them, by `direct`."""
+
+    def simulate(self, alpha: FloatArray) -> tuple[Status, Steps]:
+        """Simulate a design; the steps come back in arrays of their own."""
+
+    def watch(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
+        """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
+
+    def met(self, count: int) -> int:
+        """A member whose ends meet under force within the steps of the last run, or -1."""
+
+    def member(self, padded: int) -> str:
+        """A member in words."""
+
+    def explain(self, alpha: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
+        """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
+
+    def rate_at_start(self) -> float:
+        """Fastest vibration at the start, rad/s, with the design of the last run."""
+
+    def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
+        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
+
+    def settled(self, alpha: FloatArray) -> "Settled | None":
+        """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""
+
+
+@dataclass(frozen=True)
+class DriverOptions:
+    """What a driver is made for, beside its scene.
+
+    method: the integrator. tolerance: relative error that objectives and gradients may have. step: fixed step (s); 0:
+    adaptive steps; negative: see `generalized_alpha.longest_step`. looked: what is looked at, objectives first. design
+    (N + P,): the array that every design is put in, shared with whoever gives designs. beside: another process that may
+    be compiling what evaluates responses.
+    """
+
+    method: Method
+    tolerance: float
+    step: float
+    looked: Sequence[Objective | ResponseRow]
+    design: FloatArray
+    beside: Compiling | None = None
+
+
+class SceneFamily(NamedTuple):
+    """What one family of kernels computes.
+
+    scenes: the load cases of a case as scenes, by name. driver: the driver of one of them.
+    """
+
+    scenes: Callable[[Case], Mapping[str, Scene]]
+    driver: Callable[[Case, Any, DriverOptions], SceneDriver]

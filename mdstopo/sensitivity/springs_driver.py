@@ -1,0 +1,88 @@
+"""Springs between free bodies, for the engine: their scenes, and a driver that simulates and differentiates them."""
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.case.model import Case
+from mdstopo.integrators.driver import Driver
+from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
+from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
+from mdstopo.scene.diagnosis import Diagnosis
+from mdstopo.scene.model import FloatArray
+from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
+from mdstopo.status import Status
+
+if TYPE_CHECKING:
+    from mdstopo.general.settle import Settled
+
+
+class SpringsDriver(Driver):
+    """One scene of springs between free bodies, ready to run; `integrators.scene_driver.SceneDriver` tells how."""
+
+    def __init__(self, case: Case, scene: Scene, options: DriverOptions) -> None:
+        reductions = np.array([REDUCTIONS[each.over_time] for each in options.looked], dtype=np.int64)
+        integrated = any(each.over_time in INTEGRALS for each in options.looked)
+        super().__init__(scene, options, _response_entries, reductions, integrated)
+        self.case = case
+        self._diagnosis = Diagnosis(case, scene)
+
+    def differentiate(self, method: str, alpha: FloatArray, looked: ResponseResult, cones: bool) -> Differentiated:
+        """Gradients of what `evaluate` found; energies are no norms: `cones` asks for nothing."""
+        from mdstopo.sensitivity.methods import differentiate
+
+        return differentiate(method, self, alpha, looked)
+
+    def histories(self, alpha: FloatArray, j: int) -> tuple[Status, FloatArray, FloatArray]:
+        """Times (T,) of the steps and the derivative (T, N) of the stored energy at them, by `direct`."""
+        from mdstopo.sensitivity.methods import histories
+
+        return histories(self, alpha)
+
+    def watch(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
+        """(n_resp, T): the stored energy of a design at times (T,), for each objective that looks at it."""
+        from mdstopo.responses.stored_energy import stored_energy
+
+        energy = stored_energy(self.case, alpha, self.simulate(alpha)[1].at(times)[0] + self._home)
+        return np.tile(energy, (len(self.reductions), 1))
+
+    @property
+    def _home(self) -> FloatArray:
+        home: FloatArray = self.scene.model.home[:, :3].ravel()
+        return home
+
+    def member(self, padded: int) -> str:
+        """A member in words, from its place in the padded arrays."""
+        return self._diagnosis.member(padded)
+
+    def explain(self, alpha: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
+        """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
+        return self._diagnosis.explain(alpha, status, time, state)
+
+    def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
+        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
+        from mdstopo.mechanics.start_frequencies import natural_frequencies
+
+        return natural_frequencies(self.case, self.scene, alpha)
+
+    def settled(self, alpha: FloatArray) -> "Settled | None":
+        """None: a case that settles is none of springs between free bodies."""
+        return None
+
+
+def _response_entries() -> ModuleType:
+    """The compiled entries that evaluate responses from the steps."""
+    from mdstopo.sensitivity import energy_responses
+
+    return energy_responses
+
+
+def _scenes(case: Case) -> Mapping[str, Scene]:
+    order = state_order(case)
+    shared = compile_members(case, {name: i for i, name in enumerate(order)})
+    return {load_case.name: compile_scene(case, load_case, shared) for load_case in case.load_cases}
+
+
+SPRINGS = SceneFamily(_scenes, SpringsDriver)
