@@ -30,13 +30,16 @@ from mdstopo.integrators.rows import (
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,
+    FIRST,
     FORCES,
+    LEVEL,
     NEEDS_ROOM,
     NEWTON,
     NEWTON_FAILED,
     NON_FINITE,
     OK,
     REJECTED,
+    SEGMENT,
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
@@ -57,8 +60,8 @@ from mdstopo.integrators.steps import (
 )
 from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import add_loads, forces
-from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose
-from mdstopo.mechanics.passes import SUMS, scale_members
+from mdstopo.mechanics.geometry import DX, DY, POSE, copy_rows, relative_pose
+from mdstopo.mechanics.passes import K_XX, K_YY, STORED, SUMS, scale_members
 from mdstopo.mechanics.single_precision import may_use_single_precision, single_precision_forces
 from mdstopo.scene.packing import unpack
 
@@ -218,9 +221,9 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         f_base[d] = f[0, d]
     add_loads(model, np.int64(0), t, q0, load_base)
     for p in range(n_pair):
-        scale[p] = sums[0, p, 7] + sums[0, p, 11]
-        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # a pair that starts strained
+        scale[p] = sums[0, p, K_XX] + sums[0, p, K_YY]
+        if sums[0, p, STORED] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * sums[0, p, STORED] / scale[p])  # a pair that starts strained
     gross_loads(model, load[:n])
     add_preloads(model, strength, rel0, load)
     rounding_of_pairs(model, inv_mass, rel0, v0, load, scale, motion, noise)
@@ -236,7 +239,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
         np.int64(0), t, q0, v0, none, rel[0], sums[0], k[0], c[0], turn[0],
         steps.scalar, steps.stage, steps.pull, steps.K, steps.C, steps.turn,
     )  # fmt: skip
-    steps.index[0, 0] = 1
+    steps.index[0, FIRST] = 1
     count = 0
     stages = 1
     longest = 0.0
@@ -279,7 +282,7 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
             for p in range(n_pair):
                 scale[p] = max(motion[p], deflection(rel[s - 1], rel0, reach, p), 1e3 * noise[p])
                 single_precision = single_precision and scale[p] > SINGLE_SHARE * (
-                    np.sqrt(rel0[p, 0] ** 2 + rel0[p, 1] ** 2) + reach[p]
+                    np.sqrt(rel0[p, DX] ** 2 + rel0[p, DY] ** 2) + reach[p]
                 )
             motion_weights(pair, rel0, reach, scale, weight)
             accepted = False
@@ -396,11 +399,11 @@ def _windows(model, tables, strength, settings, most, damped, turning, steps, ow
                 return NON_FINITE, count, t
             t = end if lands else t + h
             longest = max(longest, h)
-            steps.index[count, 1] = level
-            steps.index[count, 2] = segment
+            steps.index[count, LEVEL] = level
+            steps.index[count, SEGMENT] = segment
             stages += s
             count += 1
-            steps.index[count, 0] = stages
+            steps.index[count, FIRST] = stages
             keep_state(steps.t, steps.state, count, t, q0, v0)
             work[ACCEPTED] += 1
             if fixed_step <= 0.0:

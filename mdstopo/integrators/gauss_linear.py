@@ -20,7 +20,7 @@ from mdstopo.integrators.rows import (
     scale_rows,
     take_rows,
 )
-from mdstopo.integrators.steps import REVERSE, SWEEPS
+from mdstopo.integrators.steps import FIRST, LEVEL, REVERSE, SWEEPS, Q, V
 from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
     add_turning,
@@ -65,8 +65,8 @@ def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
 
     Returns k and c: a reverse sweep starts there.
     """
-    o = steps.index[k, 0]
-    s = steps.index[k + 1, 0] - o
+    o = steps.index[k, FIRST]
+    s = steps.index[k + 1, FIRST] - o
     h = steps.t[k + 1] - steps.t[k]
     state = steps.state[k]
     stage = steps.stage
@@ -74,8 +74,8 @@ def point_of(model, tables, strength, steps, count, k, c, damped, q, v, work):
     second = np.empty(s)
     _polynomials(c, s, first, second)
     for d in range(q.shape[0]):
-        q[d] = state[0, d] + h * c * state[1, d]
-        v[d] = state[1, d]
+        q[d] = state[Q, d] + h * c * state[V, d]
+        v[d] = state[V, d]
     for j in range(s):
         for d in range(q.shape[0]):
             v[d] += h * first[j] * stage[o + j, 2, d]
@@ -106,7 +106,7 @@ def parent_of(steps, w):
 @kernel
 def stage_weights(tables, steps, w, out):
     """Gauss weights, times the length of the window."""
-    level = steps.index[w, 1]
+    level = steps.index[w, LEVEL]
     h = steps.t[w + 1] - steps.t[w]
     for j in range(COUNTS[level]):
         out[j] = h * tables[level, 0, 1, j]
@@ -145,10 +145,10 @@ def reverse_step(
 
     Not used: lam_x.
     """
-    level = steps.index[w, 1]
+    level = steps.index[w, LEVEL]
     s = COUNTS[level]
     n = lam_q.shape[0]
-    o = steps.index[w, 0]
+    o = steps.index[w, FIRST]
     h = steps.t[w + 1] - steps.t[w]
     planes = tables[level]
     second = planes[2]
@@ -242,10 +242,10 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
 
     Not used: dx.
     """
-    level = steps.index[w, 1]
+    level = steps.index[w, LEVEL]
     s = COUNTS[level]
     n = dq.shape[0]
-    o = steps.index[w, 0]
+    o = steps.index[w, FIRST]
     h = steps.t[w + 1] - steps.t[w]
     planes = tables[level]
     k = steps.K[o : o + s]

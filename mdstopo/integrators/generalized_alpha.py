@@ -25,12 +25,15 @@ from mdstopo.integrators.gauss_equations import CLOSELY, fastest_rate
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,
+    FIRST,
     FORCES,
     NEEDS_ROOM,
     NEWTON,
     NEWTON_FAILED,
     NON_FINITE,
     OK,
+    SEGMENT,
+    STARTS,
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
@@ -45,7 +48,7 @@ from mdstopo.integrators.steps import (
 )
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE
-from mdstopo.mechanics.passes import SUMS
+from mdstopo.mechanics.passes import K_XX, K_YY, STORED, SUMS
 
 AlphaSteps = namedtuple("AlphaSteps", FIELDS)  # type: ignore[misc]
 TAG = (0, 0, 0)
@@ -167,7 +170,7 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
     one = np.int64(1)
     yes = np.bool_(True)
     no = np.bool_(False)
-    steps.index[0, 0] = 0
+    steps.index[0, FIRST] = 0
     for d in range(n):
         q[d] = model.q0[d]
         v[d] = model.v0[d]
@@ -226,9 +229,9 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                 work[TANGENTS] += 1
                 if count == 0 and newton == -starting:
                     for p in range(n_pair):
-                        scale[p] = sums[0, p, 7] + sums[0, p, 11]
-                        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
-                            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])  # it starts strained
+                        scale[p] = sums[0, p, K_XX] + sums[0, p, K_YY]
+                        if sums[0, p, STORED] > 0.0 and scale[p] > 0.0:
+                            motion[p] = np.sqrt(2.0 * sums[0, p, STORED] / scale[p])  # it starts strained
                     gross_loads(model, delta)
                     add_preloads(model, strength, rel[0], delta)
                     rounding_of_pairs(model, inv_mass, rel[0], v, delta, scale, motion, noise)
@@ -305,13 +308,13 @@ def integrate(model, tables, strength, damped, newton_tolerance, step, max_steps
                 finite = finite and np.isfinite(q[d]) and np.isfinite(v[d])
             if not finite:
                 return NON_FINITE, count
-            steps.index[count, 1] = starting
-            steps.index[count, 2] = segment
+            steps.index[count, STARTS] = starting
+            steps.index[count, SEGMENT] = segment
             count += 1
             work[ACCEPTED] += 1
-            steps.index[count, 0] = stages
+            steps.index[count, FIRST] = stages
             keep_state(steps.t, steps.state, count, t_end, q, v)
-    steps.index[count, 1] = -1  # no step follows (`stage_weights`)
+    steps.index[count, STARTS] = -1  # no step follows (`stage_weights`)
     return OK, count
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.banded import half_width, solve
 from mdstopo.integrators.generalized_alpha import TAG, AlphaSteps, effective_matrix, weights_of
-from mdstopo.integrators.steps import REVERSE
+from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, REVERSE, STARTS, TIME
 from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
     add_turning,
@@ -89,10 +89,10 @@ def sample(steps, count, damped, t, g, d):
     Returns how many samples there are.
     """
     for k in range(count - 1):
-        o = steps.index[k + 1, 0] - 1
-        t[k] = steps.scalar[o, 0]
-        g[k] = steps.scalar[o, 1]
-        d[k] = steps.scalar[o, 2]
+        o = steps.index[k + 1, FIRST] - 1
+        t[k] = steps.scalar[o, TIME]
+        g[k] = steps.scalar[o, ENERGY]
+        d[k] = steps.scalar[o, ENERGY_RATE]
     return count - 1
 
 
@@ -112,7 +112,7 @@ def stage_weights(tables, steps, w, out):
     if last > 0:
         out[0] = 0.5 * h
     # a following step without a stage at its start leaves that half to this step's end
-    if steps.index[w + 1, 1] == 0:
+    if steps.index[w + 1, STARTS] == 0:
         out[last] += 0.5 * (steps.t[w + 2] - steps.t[w + 1])
 
 
@@ -150,8 +150,8 @@ def reverse_step(
     Not used: accuracy.
     """
     n = lam_q.shape[0]
-    o = steps.index[w, 0]
-    last = steps.index[w + 1, 0] - 1 - o
+    o = steps.index[w, FIRST]
+    last = steps.index[w + 1, FIRST] - 1 - o
     h = steps.t[w + 1] - steps.t[w]
     e1, e2, e3, beta, gamma, lag = weights_of(tables[0])
     spread = stage_q_bar.shape[0] > 0
@@ -248,8 +248,8 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
       dq_stage (s, n): changes of the coordinates of the stages (m, rad).
     """
     n = dq.shape[0]
-    o = steps.index[w, 0]
-    last = steps.index[w + 1, 0] - 1 - o
+    o = steps.index[w, FIRST]
+    last = steps.index[w + 1, FIRST] - 1 - o
     h = steps.t[w + 1] - steps.t[w]
     e1, e2, e3, beta, gamma, lag = weights_of(tables[0])
     half = half_width(pair, inv_mass)

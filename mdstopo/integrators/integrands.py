@@ -15,7 +15,7 @@ import numpy as np
 
 from mdstopo.integrators.gauss_tables import LEGENDRE, LEVELS, gauss_tables
 from mdstopo.integrators.runge_kutta_tables import GENERAL, NYSTROEM, ORDERS, VECTORS, B, C, runge_kutta_tables
-from mdstopo.integrators.steps import carve
+from mdstopo.integrators.steps import ENERGY, FIRST, carve
 from mdstopo.scene.model import FloatArray, IndexArray, Model
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def quadrature_breakpoints(driver: "Driver", count: int) -> tuple[list[float], f
     t, _, index, scalar, *_ = carve.py_func(  # type: ignore[attr-defined]
         driver.room, driver.room_ints, n, n_pair, int(driver.limits[1]), int(driver.limits[2]), damped, turning
     )
-    energy, first = scalar[:, 1], index[: count + 1, 0]
+    energy, first = scalar[:, ENERGY], index[: count + 1, FIRST]
     width = np.diff(t[: count + 1])
     left = np.zeros(count)
     whole = 0.0

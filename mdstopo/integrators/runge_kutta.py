@@ -11,15 +11,18 @@ from collections import namedtuple
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
+from mdstopo.integrators.runge_kutta_tables import BB, E2_Q, E2_V, E_Q, E_V, ORDERS, STAGES, B, C
 from mdstopo.integrators.steps import (
     ACCEPTED,
     FIELDS,
+    FIRST,
     FORCES,
     NEEDS_ROOM,
     NON_FINITE,
     OK,
+    PARENT,
     REJECTED,
+    SEGMENT,
     STEP_LIMIT,
     STEP_TOO_SMALL,
     TANGENTS,
@@ -39,7 +42,8 @@ from mdstopo.integrators.steps import (
 from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import forces
 from mdstopo.mechanics.geometry import POSE, relative_pose
-from mdstopo.mechanics.passes import SUMS, member_sums, scale_members, springs_of
+from mdstopo.mechanics.passes import STORED, SUMS, member_sums, scale_members, springs_of
+from mdstopo.scene.model import DESIGN, PAIR, SCALED_STIFFNESS, START, STOP
 from mdstopo.scene.packing import unpack
 
 RungeKuttaSteps = namedtuple("RungeKuttaSteps", FIELDS)  # type: ignore[misc]
@@ -108,7 +112,7 @@ def advance(
     t_one = np.empty(1)
     for i in range(s):
         for d in range(n):
-            q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
+            q[i, d] = q0[d] + h * vectors[C, i] * v0[d]
             v[i, d] = v0[d]
         for j in range(i):
             w = h * h * aa[i, j]
@@ -119,7 +123,7 @@ def advance(
             if u != 0.0:
                 for d in range(n):
                     v[i, d] += u * a[j, d]
-        t_one[0] = t + h * vectors[0, i]
+        t_one[0] = t + h * vectors[C, i]
         forces(model, strength, segment, np.int64(1), t_one, q[i:], v[i:], tangent, damped, rel, sums, f, k, c, turn)
         for d in range(n):
             a[i, d] = model.inv_mass[d] * f[0, d]
@@ -135,8 +139,8 @@ def advance(
         position = q0[d] + h * v0[d]
         speed = v0[d]
         for j in range(s):
-            position += h * h * vectors[1, j] * a[j, d]
-            speed += h * vectors[2, j] * a[j, d]
+            position += h * h * vectors[BB, j] * a[j, d]
+            speed += h * vectors[B, j] * a[j, d]
         ends[0, d] = position
         ends[1, d] = speed
 
@@ -161,10 +165,10 @@ def _error(vectors, s, h, longest, a, weight):
         fq = 0.0
         fv = 0.0
         for j in range(s):
-            eq += vectors[3, j] * a[j, d]
-            ev += vectors[4, j] * a[j, d]
-            fq += vectors[5, j] * a[j, d]
-            fv += vectors[6, j] * a[j, d]
+            eq += vectors[E_Q, j] * a[j, d]
+            ev += vectors[E_V, j] * a[j, d]
+            fq += vectors[E2_Q, j] * a[j, d]
+            fv += vectors[E2_V, j] * a[j, d]
         value = h * h * weight[d] * max(abs(eq), later * abs(ev))
         other = h * h * weight[d] * max(abs(fq), later * abs(fv))
         if not np.isfinite(value):
@@ -243,11 +247,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     for p in range(n_pair):
         scale[p] = 0.0
         for b in range(model.block.shape[0]):
-            if model.block[b, 0] == p and model.block[b, 4] >= 0:
-                for i in range(model.block[b, 1], model.block[b, 2]):
-                    scale[p] += strength[0, i]
-        if sums[0, p, 3] > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * sums[0, p, 3] / scale[p])
+            if model.block[b, PAIR] == p and model.block[b, DESIGN] >= 0:
+                for i in range(model.block[b, START], model.block[b, STOP]):
+                    scale[p] += strength[SCALED_STIFFNESS, i]
+        if sums[0, p, STORED] > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * sums[0, p, STORED] / scale[p])
     gross_loads(model, weight)
     add_preloads(model, strength, rel0, weight)
     rounding_of_pairs(model, model.inv_mass, rel0, v0, weight, scale, motion, noise)
@@ -256,7 +260,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     span = last_time - t
     wanted = fixed_step if fixed_step > 0.0 else span
     keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)
-    steps.index[0, 0] = 0
+    steps.index[0, FIRST] = 0
     count = 0
     stages = 0
     longest = 0.0
@@ -312,11 +316,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             for d in range(n):
                 q0[d] = ends[0, d]
                 v0[d] = ends[1, d]
-            steps.index[count, 1] = count - 1
-            steps.index[count, 2] = segment
+            steps.index[count, PARENT] = count - 1
+            steps.index[count, SEGMENT] = segment
             stages += s
             count += 1
-            steps.index[count, 0] = stages
+            steps.index[count, FIRST] = stages
             keep_state(steps.t, steps.state, count, t, q0, v0)
             work[ACCEPTED] += 1
     return OK, count, t

@@ -4,8 +4,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.runge_kutta import MOST, TAG, RungeKuttaSteps, advance
-from mdstopo.integrators.runge_kutta_tables import STAGES
-from mdstopo.integrators.steps import REVERSE
+from mdstopo.integrators.runge_kutta_tables import STAGES, B
+from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, PARENT, REVERSE, SEGMENT, TIME
 from mdstopo.integrators.steps_interface import implement
 from mdstopo.mechanics.assembly import (
     add_turning,
@@ -41,13 +41,13 @@ def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, wo
     method = 1 if damped else 0
     s = STAGES[method]
     h = c * (steps.t[k + 1] - steps.t[k])
-    o = steps.index[count, 0]
+    o = steps.index[count, FIRST]
     ends = np.empty((2, n))
     advance(
-        model, tables[method], s, strength, steps.index[k, 2], steps.t[k], h, steps.state[k, 0], steps.state[k, 1],
-        keep, damped, o if keep else -1, np.empty((1, n_pair, POSE)), np.empty((1, n_pair, SUMS)), np.empty((1, n)),
-        np.empty((1, n_pair, 6, 6)), np.empty((1, n_pair, 6, 6)), np.zeros((1, n)), np.empty((MOST, n)),
-        np.empty((MOST, n)), np.empty((MOST, n)), steps, ends, work,
+        model, tables[method], s, strength, steps.index[k, SEGMENT], steps.t[k], h, steps.state[k, 0],
+        steps.state[k, 1], keep, damped, o if keep else -1, np.empty((1, n_pair, POSE)), np.empty((1, n_pair, SUMS)),
+        np.empty((1, n)), np.empty((1, n_pair, 6, 6)), np.empty((1, n_pair, 6, 6)), np.zeros((1, n)),
+        np.empty((MOST, n)), np.empty((MOST, n)), np.empty((MOST, n)), steps, ends, work,
     )  # fmt: skip
     for d in range(n):
         q[d] = ends[0, d]
@@ -56,10 +56,10 @@ def _partial(model, tables, strength, steps, count, k, c, damped, keep, q, v, wo
         w = count + 1
         steps.t[w] = steps.t[k]
         steps.t[w + 1] = steps.t[k] + h
-        steps.index[w, 0] = o
-        steps.index[w, 1] = k - 1
-        steps.index[w, 2] = steps.index[k, 2]
-        steps.index[w + 1, 0] = o + s
+        steps.index[w, FIRST] = o
+        steps.index[w, PARENT] = k - 1
+        steps.index[w, SEGMENT] = steps.index[k, SEGMENT]
+        steps.index[w + 1, FIRST] = o + s
 
 
 @kernel
@@ -128,27 +128,27 @@ def sample(steps, count, damped, t, g, d):
     s = STAGES[1 if damped else 0]
     m = 0
     for w in range(count):
-        o = steps.index[w, 0]
+        o = steps.index[w, FIRST]
         h = steps.t[w + 1] - steps.t[w]
         last = steps.t[w]
         if w > 0:
             t[m] = last
-            g[m] = steps.scalar[o, 1]
-            d[m] = steps.scalar[o, 2]
+            g[m] = steps.scalar[o, ENERGY]
+            d[m] = steps.scalar[o, ENERGY_RATE]
             m += 1
         # stages by rising time; of several at one time the last, which is the most accurate
         while True:
             best = -1
             for i in range(1, s):
-                time = steps.scalar[o + i, 0]
+                time = steps.scalar[o + i, TIME]
                 inside = time > last + 1e-3 * h and time < steps.t[w + 1] - 1e-3 * h
-                if inside and (best < 0 or time <= steps.scalar[o + best, 0]):
+                if inside and (best < 0 or time <= steps.scalar[o + best, TIME]):
                     best = i
             if best < 0:
                 break
-            last = steps.scalar[o + best, 0]
+            last = steps.scalar[o + best, TIME]
             t[m] = last
-            g[m] = steps.scalar[o + best, 1]
+            g[m] = steps.scalar[o + best, ENERGY]
             d[m] = np.nan
             m += 1
     return m
@@ -157,16 +157,16 @@ def sample(steps, count, damped, t, g, d):
 @kernel
 def parent_of(steps, w):
     """The step before, which is kept with each step: a partial step stands behind all others."""
-    return steps.index[w, 1]
+    return steps.index[w, PARENT]
 
 
 @kernel
 def stage_weights(tables, steps, w, out):
     """The weights of the velocity: an integral is the velocity of one more coordinate."""
-    s = steps.index[w + 1, 0] - steps.index[w, 0]
+    s = steps.index[w + 1, FIRST] - steps.index[w, FIRST]
     vectors = tables[0 if s == STAGES[0] else 1, 2]
     for j in range(s):
-        out[j] = (steps.t[w + 1] - steps.t[w]) * vectors[2, j]
+        out[j] = (steps.t[w + 1] - steps.t[w]) * vectors[B, j]
 
 
 @kernel
@@ -200,8 +200,8 @@ def reverse_step(
     Not used: c_point, mu_q, mu_v, lam_x, accuracy.
     """
     n = lam_q.shape[0]
-    o = steps.index[w, 0]
-    s = steps.index[w + 1, 0] - o
+    o = steps.index[w, FIRST]
+    s = steps.index[w + 1, FIRST] - o
     table = tables[1 if damped else 0]
     one = np.int64(1)
     h = steps.t[w + 1] - steps.t[w]
@@ -255,8 +255,8 @@ def tangent_step(pair, inv_mass, tables, steps, w, c_point, dq, dv, dx, force, d
     Not used: c_point, dx.
     """
     n = dq.shape[0]
-    o = steps.index[w, 0]
-    s = steps.index[w + 1, 0] - o
+    o = steps.index[w, FIRST]
+    s = steps.index[w + 1, FIRST] - o
     table = tables[1 if damped else 0]
     h = steps.t[w + 1] - steps.t[w]
     one = np.int64(1)

@@ -14,6 +14,9 @@ import numpy as np
 
 from mdstopo.compiler.fields import Field, Fields, FloatArray, IndexArray, views_of
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.geometry import DX, DY, UC, US, UX, UY
+from mdstopo.mechanics.passes import STORED
+from mdstopo.scene.model import KIND, PAIR, SCALED_PRELOAD, START, STOP
 from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)
@@ -73,7 +76,7 @@ class StepArrays:
     t: Annotated[FloatArray, Field("steps + 1", "times of the states (s)")]
     state: Annotated[FloatArray, Field("steps + 1, 2, n", "q, v")]
     index: Annotated[
-        IndexArray, Field("steps + 1, 3", "first stage of the step; level (the method's own); segment of the loads")
+        IndexArray, Field("steps + 1, 3", "first stage of the step; a number of the method's own; segment of the loads")
     ]
     scalar: Annotated[FloatArray, Field("stages, 3", "t, stored energy (J), its rate (W), at each stage")]
     stage: Annotated[FloatArray, Field("stages, 3, n", "q, v, and a vector of the method's own, at each stage")]
@@ -104,8 +107,10 @@ TURN = 1.0
 #: at once. An error of the velocity left there goes on moving them.
 LASTING = 0.1
 
-#: columns of `index`, `scalar`, `stage`
-FIRST, LEVEL, SEGMENT = range(3)
+#: columns of `index`, `scalar`, `stage`; what the method's own column holds (`METHODS_OWN`): of `gauss` how many nodes,
+#: as the place of its tables; of `runge_kutta` the step before; of `generalized_alpha` how many balances begin it
+FIRST, METHODS_OWN, SEGMENT = range(3)
+LEVEL = PARENT = STARTS = METHODS_OWN
 TIME, ENERGY, ENERGY_RATE = range(3)
 Q, V, OWN = range(3)
 
@@ -159,8 +164,8 @@ def keep_state(times, state, k, t, q, v):
     """
     times[k] = t
     for d in range(state.shape[2]):
-        state[k, 0, d] = q[d]
-        state[k, 1, d] = v[d]
+        state[k, Q, d] = q[d]
+        state[k, V, d] = v[d]
 
 
 @kernel
@@ -195,7 +200,7 @@ def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_ou
     energy = 0.0
     rate = 0.0
     for p in range(rel.shape[0]):
-        energy += sums[p, 3]
+        energy += sums[p, STORED]
         for j in range(3):
             rate += sums[p, 4 + j] * rel[p, 4 + j]
             pull[o, p, j] = sums[p, 4 + j]
@@ -210,18 +215,18 @@ def keep_stage(o, t, q, v, own, rel, sums, k, c, turn, scalar, stage, pull, k_ou
         stage[o, 2, d] = own[d]
         if turn_out.shape[0] > 0:
             turn_out[o, d] = turn[d]
-    scalar[o, 0] = t
-    scalar[o, 1] = energy
-    scalar[o, 2] = rate
+    scalar[o, TIME] = t
+    scalar[o, ENERGY] = energy
+    scalar[o, ENERGY_RATE] = rate
 
 
 @part
 def deflection(rel, rel0, reach, p):
     """How far the pair p has moved from its pose at the start, at its attachment points, m (angle within a turn)."""
-    x = rel[p, 10] - rel0[p, 10]
-    y = rel[p, 11] - rel0[p, 11]
-    c = rel[p, 12] - rel0[p, 12]
-    s = rel[p, 13] - rel0[p, 13]
+    x = rel[p, UX] - rel0[p, UX]
+    y = rel[p, UY] - rel0[p, UY]
+    c = rel[p, UC] - rel0[p, UC]
+    s = rel[p, US] - rel0[p, US]
     return np.sqrt(x * x + y * y) + reach[p] * np.sqrt(c * c + s * s)
 
 
@@ -260,7 +265,7 @@ def add_gross_force(pair, rel, reach, p, force, out):
     Out:
       out (n or more,): added to (N, N m).
     """
-    arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
+    arm = np.sqrt(rel[p, DX] * rel[p, DX] + rel[p, DY] * rel[p, DY]) + reach[p]
     for side in range(2):
         b = 3 * pair[p, side]
         out[b] += force
@@ -273,11 +278,11 @@ def add_preloads(model, strength, rel, out):
     """out (n,) += the preloads of all springs, strength (3, M_padded), as gross forces."""
     for k in range(model.block.shape[0]):
         total = 0.0
-        if model.block[k, 3] == 1:
-            for i in range(model.block[k, 1], model.block[k, 2]):
-                total += abs(strength[2, i])
+        if model.block[k, KIND] == 1:
+            for i in range(model.block[k, START], model.block[k, STOP]):
+                total += abs(strength[SCALED_PRELOAD, i])
         if total > 0.0:
-            add_gross_force(model.pair, rel, model.reach, model.block[k, 0], total, out)
+            add_gross_force(model.pair, rel, model.reach, model.block[k, PAIR], total, out)
 
 
 @part
@@ -301,7 +306,7 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
     """
     span = model.times[model.times.shape[0] - 1] - model.times[0]
     for p in range(model.pair.shape[0]):
-        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + model.reach[p]
+        arm = np.sqrt(rel[p, DX] * rel[p, DX] + rel[p, DY] * rel[p, DY]) + model.reach[p]
         mobility = 0.0
         speed = 0.0
         push = 0.0
@@ -334,7 +339,7 @@ def noise_of(pair, noise, rel, reach, q, p):
     moved = max(abs(q[a]), abs(q[a + 1])) + max(abs(q[b]), abs(q[b + 1]))
     turned = min(abs(q[a + 2]), 1.0) + min(abs(q[b + 2]), 1.0)
     if turned > 0.0:
-        moved += turned * (np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p])
+        moved += turned * (np.sqrt(rel[p, DX] * rel[p, DX] + rel[p, DY] * rel[p, DY]) + reach[p])
     return noise[p] + 1e-15 * moved
 
 
@@ -363,7 +368,7 @@ def motion_weights(pair, rel, reach, scale, weight):
     """
     weight[:] = 0.0
     for p in range(pair.shape[0]):
-        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + reach[p]
+        arm = np.sqrt(rel[p, DX] * rel[p, DX] + rel[p, DY] * rel[p, DY]) + reach[p]
         for side in range(2):
             b = 3 * pair[p, side]
             turn = (arm if side == 0 else reach[p]) / scale[p]

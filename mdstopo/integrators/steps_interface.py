@@ -30,6 +30,7 @@ from functools import partial
 from typing import Any
 
 from mdstopo.compiler.jit import by_type, kernel
+from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, TIME
 
 Implementation = Any  # a compiled function
 
@@ -204,12 +205,12 @@ def sample_stages(steps, count, damped, t, g, d):
 
     Returns how many samples there are.
     """
-    first = steps.index[0, 0]
-    m = steps.index[count, 0] - first
+    first = steps.index[0, FIRST]
+    m = steps.index[count, FIRST] - first
     for i in range(m):
-        t[i] = steps.scalar[first + i, 0]
-        g[i] = steps.scalar[first + i, 1]
-        d[i] = steps.scalar[first + i, 2]
+        t[i] = steps.scalar[first + i, TIME]
+        g[i] = steps.scalar[first + i, ENERGY]
+        d[i] = steps.scalar[first + i, ENERGY_RATE]
     return m
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdstopo.integrators.scene_driver import Steps
+from mdstopo.integrators.steps import Q, V
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
 
@@ -66,7 +67,7 @@ class Trajectory:
           the steps.
         """
         t, n = steps.t.copy(), len(home)
-        q, v = steps.state[:, 0, :n].copy(), steps.state[:, 1, :n].copy()
+        q, v = steps.state[:, Q, :n].copy(), steps.state[:, V, :n].copy()
         q += home
         a, lam = np.zeros_like(q), np.zeros((len(t), 0))
         reactions: Mapping[str, FloatArray] = {}

@@ -11,7 +11,25 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.mechanics.passes import springs_of, threads_for
-from mdstopo.scene.model import BLOCK, DAMPING, MEMBER, STIFFNESS, VECTOR, Model, Springs
+from mdstopo.scene.model import (
+    BLOCK,
+    CHUNK_BLOCK,
+    CHUNK_START,
+    CHUNK_STOP,
+    COUNT,
+    DAMPING,
+    KIND,
+    MEMBER,
+    SCALED_DAMPING,
+    SCALED_PRELOAD,
+    SCALED_STIFFNESS,
+    START,
+    STIFFNESS,
+    VECTOR,
+    WIDTH,
+    Model,
+    Springs,
+)
 
 #: costs of a member of a grid and of another: all that are left have to cost at most three quarters of what all do
 IN_GRID, PLAIN = 2, 3
@@ -53,8 +71,8 @@ def _gather_active(springs, strength, fill):
     members = 0
     cost = 0
     for k in range(block.shape[0]):
-        members += block[k, 5]
-        cost += block[k, 5] * (IN_GRID if block[k, 6] > 0 else PLAIN)
+        members += block[k, COUNT]
+        cost += block[k, COUNT] * (IN_GRID if block[k, WIDTH] > 0 else PLAIN)
     if strength.shape[0] < ROOMY or 4 * PLAIN * left > 3 * cost:
         return springs, strength[:3], members
     # where each chunk begins among those that are left
@@ -64,17 +82,17 @@ def _gather_active(springs, strength, fill):
         for j in range(5):
             fewer[k, j] = block[k, j]
     for i in range(parts):
-        k = springs.chunk[i, 0]
-        begin[i] = block[k, 1] + fewer[k, 5]
+        k = springs.chunk[i, CHUNK_BLOCK]
+        begin[i] = block[k, START] + fewer[k, 5]
         fewer[k, 5] += count[i]
     for k in range(block.shape[0]):
-        fewer[k, 2] = block[k, 1] + (fewer[k, 5] + VECTOR - 1) // VECTOR * VECTOR
+        fewer[k, 2] = block[k, START] + (fewer[k, 5] + VECTOR - 1) // VECTOR * VECTOR
     chunk = np.empty((parts, 3), np.int64)
     for i in range(parts):
-        k = springs.chunk[i, 0]
-        chunk[i, 0] = k
-        chunk[i, 1] = springs.chunk[i, 1]
-        chunk[i, 2] = min(springs.chunk[i, 2], fewer[k, 2])
+        k = springs.chunk[i, CHUNK_BLOCK]
+        chunk[i, CHUNK_BLOCK] = k
+        chunk[i, CHUNK_START] = springs.chunk[i, CHUNK_START]
+        chunk[i, CHUNK_STOP] = min(springs.chunk[i, CHUNK_STOP], fewer[k, 2])
     room = strength[3:ROOMY]
     if fill:
         gather = (np.zeros(1, np.int64), springs.chunk, block, springs.member, strength, begin, count, room)
@@ -91,21 +109,21 @@ def _count_chunks(counter, chunk, block, strength, count):
     """Count the members that carry something in chunk after chunk, until none is left: what each thread does."""
     i = taken(counter)
     while i < chunk.shape[0]:
-        count[i] = _count(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, strength)
+        count[i] = _count(chunk[i, CHUNK_BLOCK], chunk[i, CHUNK_START], chunk[i, CHUNK_STOP], block, strength)
         i = taken(counter)
 
 
 @kernel
 def _count(k, start, stop, block, strength):
     """How many of the members in places start to stop of block k carry something."""
-    s = strength[0, start:stop]
+    s = strength[SCALED_STIFFNESS, start:stop]
     found = 0
-    if block[k, 3] == 0:
+    if block[k, KIND] == 0:
         for i in range(s.shape[0]):
             found += s[i] != 0.0
         return found
-    c = strength[1, start:stop]
-    p = strength[2, start:stop]
+    c = strength[SCALED_DAMPING, start:stop]
+    p = strength[SCALED_PRELOAD, start:stop]
     for i in range(s.shape[0]):
         found += (s[i] != 0.0) | (c[i] != 0.0) | (p[i] != 0.0)
     return found
@@ -126,7 +144,17 @@ def _gather_chunks(counter, chunk, block, member, strength, begin, count, room):
     """
     i = taken(counter)
     while i < chunk.shape[0]:
-        _gather(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, member, strength, begin[i], count[i], room)
+        _gather(
+            chunk[i, CHUNK_BLOCK],
+            chunk[i, CHUNK_START],
+            chunk[i, CHUNK_STOP],
+            block,
+            member,
+            strength,
+            begin[i],
+            count[i],
+            room,
+        )
         i = taken(counter)
 
 
@@ -145,14 +173,14 @@ def _gather(k, start, stop, block, member, strength, begin, count, room):
       room (MEMBER, M_padded): rows as of `Model.member`, with strengths for the last three; damping and preload are
         written where the block has them.
     """
-    viscous = block[k, 3] == 1
+    viscous = block[k, KIND] == 1
     place = np.empty(stop - start, np.int64)
     found = 0
     for i in range(start, stop):
         place[found] = i  # without a branch: zeros come at random
-        something = strength[0, i] != 0.0
+        something = strength[SCALED_STIFFNESS, i] != 0.0
         if viscous:
-            something |= (strength[1, i] != 0.0) | (strength[2, i] != 0.0)
+            something |= (strength[SCALED_DAMPING, i] != 0.0) | (strength[SCALED_PRELOAD, i] != 0.0)
         found += something
     for row in range(MEMBER if viscous else DAMPING):
         source = member[row] if row < STIFFNESS else strength[row - STIFFNESS]

@@ -11,7 +11,7 @@ from mdstopo.compiler.vector import lanes
 from mdstopo.mechanics.laws.spring import hardly_moved
 from mdstopo.mechanics.laws.spring_grid import grid_design, grid_force, grid_tangent
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import EXCESS, ROWS, STIFFNESS, TILE
+from mdstopo.scene.model import DESIGN, EXCESS, L0, PAIR, PX, PY, QX, QY, ROWS, STIFFNESS, TILE, WIDTH
 
 #: places of a tile: of each it reads two numbers, where `passes` reads six
 PLACES = 4 * TILE
@@ -42,20 +42,20 @@ def sum_grid(k, start, stop, block, near, member, stiffness, rel, m, tangent, su
     Out:
       sums (m or more, columns, SUMS): added to.
     """
-    p = block[k, 0]
-    width = block[k, 6]
-    counted = block[k, 4] >= 0
+    p = block[k, PAIR]
+    width = block[k, WIDTH]
+    counted = block[k, DESIGN] >= 0
     rows = (stop - start) // width
     tall, wide = tile_of(rows, width)
     room = np.empty((tall, 2))
     for row in range(0, rows, tall):
         lo = start + row * width
         hi = start + min(row + tall, rows) * width
-        px = member[0, lo:hi]
-        py = member[1, lo:hi]
-        qx = member[2, lo:hi]
-        qy = member[3, lo:hi]
-        l0 = member[4, lo:hi]
+        px = member[PX, lo:hi]
+        py = member[PY, lo:hi]
+        qx = member[QX, lo:hi]
+        qy = member[QY, lo:hi]
+        l0 = member[L0, lo:hi]
         excess = member[EXCESS, lo:hi]
         ks = stiffness[lo:hi]
         own = room[: (hi - lo) // width]
@@ -103,7 +103,7 @@ def design_grid(start, stop, width, near, member, pose, u, weight, out):
         own = room[: (hi - lo) // width]
         for first in range(0, width, wide):
             grid_design(
-                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
+                member[PX, lo:hi], member[PY, lo:hi], member[QX, lo:hi], member[QY, lo:hi], member[L0, lo:hi],
                 member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], width, first, min(first + wide, width),
                 pose, close, u, weight, own, turned, out[lo:hi],
             )  # fmt: skip

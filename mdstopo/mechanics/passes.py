@@ -24,10 +24,39 @@ from mdstopo.mechanics.laws.spring import (
     viscous_tangent,
 )
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.scene.model import DAMPING, EXCESS, PRELOAD, STIFFNESS, TILE, Springs
+from mdstopo.scene.model import (
+    CHUNK_BLOCK,
+    CHUNK_START,
+    CHUNK_STOP,
+    COUNT,
+    DAMPING,
+    DESIGN,
+    EXCESS,
+    KIND,
+    L0,
+    LENGTH,
+    PAIR,
+    PRELOAD,
+    PX,
+    PY,
+    QX,
+    QY,
+    SCALED_DAMPING,
+    SCALED_PRELOAD,
+    SCALED_STIFFNESS,
+    START,
+    STIFFNESS,
+    STOP,
+    TILE,
+    WIDTH,
+    Springs,
+)
 
 #: sums a pair and pose: Q (3), E, E_xi (3), K (9, by rows), C (6, upper triangle)
 SUMS = 22
+#: columns of them: the force and couple Q, the stored energy E and its slopes E_xi, K_xx and K_yy
+SUM_X, SUM_Y, SUM_T, STORED, SLOPE_X, SLOPE_Y, SLOPE_T, K_XX = range(8)
+K_YY = 11
 #: the first of K and C, which are made on demand
 FIRST_TANGENT = 7
 #: members times poses from which on threads are worth making: some 0.8 ms of work
@@ -70,7 +99,9 @@ def _scale_chunks(counter, chunk, block, power, member, alpha, strength):
     """
     i = taken(counter)
     while i < chunk.shape[0]:
-        _scale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, member, alpha, strength)
+        _scale(
+            chunk[i, CHUNK_BLOCK], chunk[i, CHUNK_START], chunk[i, CHUNK_STOP], block, power, member, alpha, strength
+        )
         i = taken(counter)
 
 
@@ -87,14 +118,14 @@ def _scale(k, start, stop, block, power, member, alpha, strength):
     Out:
       strength (3 or more, M_padded): stiffness, damping and preload times alpha^mu there, zeros in the padding.
     """
-    if block[k, 4] < 0:
+    if block[k, DESIGN] < 0:
         for i in range(start, stop):
             for row in range(3):
                 strength[row, i] = member[STIFFNESS + row, i]
         return
     mu = power[k]
     rows, count, first, width = _rows(block, k, start, stop)
-    for row in range(3 if block[k, 3] == 1 else 1):
+    for row in range(3 if block[k, KIND] == 1 else 1):
         for j in range(rows):
             at = start + j * width
             begin = first + j * count
@@ -125,13 +156,18 @@ def _rows(block, k, start, stop):
     Of a grid its rows, else one row. Behind the last row of a grid there may be eight places that are none of it:
     blocks are padded to sixteen.
     """
-    width = block[k, 6]
-    before = start - block[k, 1]
+    width = block[k, WIDTH]
+    before = start - block[k, START]
     if width == 0:
-        return np.int64(1), min(stop - start, block[k, 5] - before), block[k, 4] + before, stop - start
-    count = block[k, 7]
+        return np.int64(1), min(stop - start, block[k, COUNT] - before), block[k, DESIGN] + before, stop - start
+    count = block[k, LENGTH]
     before //= width
-    return min(block[k, 5] // count - before, (stop - start) // width), count, block[k, 4] + before * count, width
+    return (
+        min(block[k, COUNT] // count - before, (stop - start) // width),
+        count,
+        block[k, DESIGN] + before * count,
+        width,
+    )
 
 
 @kernel
@@ -154,8 +190,8 @@ def member_sums(springs, strength, rel, m, tangent, sums):
     if springs.threads == 0:  # whole blocks: added where they belong at once
         for k in range(block.shape[0]):
             _sum(
-                k, block[k, 1], block[k, 2], block, springs.near[k], springs.member, strength, rel, m, tangent, sums,
-                block[k, 0],
+                k, block[k, START], block[k, STOP], block, springs.near[k], springs.member, strength, rel, m, tangent,
+                sums, block[k, PAIR],
             )  # fmt: skip
         return
     counter = np.zeros(1, np.int64)
@@ -163,7 +199,7 @@ def member_sums(springs, strength, rel, m, tangent, sums):
     job = (counter, chunk, block, springs.near, springs.member, strength, rel, m, tangent, part)
     shared(_sum_chunks, threads_for(springs, m), job)
     for i in range(chunk.shape[0]):
-        p = block[chunk[i, 0], 0]
+        p = block[chunk[i, CHUNK_BLOCK], PAIR]
         for j in range(m):
             for s in range(SUMS):
                 sums[j, p, s] += part[i, j, 0, s]
@@ -187,8 +223,21 @@ def _sum_chunks(counter, chunk, block, near, member, strength, rel, m, tangent, 
     while i < chunk.shape[0]:
         out = part[i]
         out[:] = 0.0
-        k = chunk[i, 0]
-        _sum(k, chunk[i, 1], chunk[i, 2], block, near[k], member, strength, rel, m, tangent, out, np.int64(0))
+        k = chunk[i, CHUNK_BLOCK]
+        _sum(
+            k,
+            chunk[i, CHUNK_START],
+            chunk[i, CHUNK_STOP],
+            block,
+            near[k],
+            member,
+            strength,
+            rel,
+            m,
+            tangent,
+            out,
+            np.int64(0),
+        )
         i = taken(counter)
 
 
@@ -209,24 +258,24 @@ def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, c
     Out:
       sums (m or more, columns, SUMS): added to.
     """
-    if block[k, 6] > 0:
+    if block[k, WIDTH] > 0:
         sum_grid(k, start, stop, block, near, member, strength[0], rel, m, tangent, sums, column)
         return
-    p = block[k, 0]
-    viscous = block[k, 3] == 1
-    counted = block[k, 4] >= 0  # energy is that of design members
+    p = block[k, PAIR]
+    viscous = block[k, KIND] == 1
+    counted = block[k, DESIGN] >= 0  # energy is that of design members
     width = member.shape[1]
     rows = member.reshape(member.size)
     scale = strength.reshape(strength.size)
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)
-        px = member[0, lo:hi]
-        py = member[1, lo:hi]
-        qx = member[2, lo:hi]
-        qy = member[3, lo:hi]
-        l0 = member[4, lo:hi]
+        px = member[PX, lo:hi]
+        py = member[PY, lo:hi]
+        qx = member[QX, lo:hi]
+        qy = member[QY, lo:hi]
+        l0 = member[L0, lo:hi]
         excess = member[EXCESS, lo:hi]
-        ks = strength[0, lo:hi]
+        ks = strength[SCALED_STIFFNESS, lo:hi]
         for j in range(m):
             r = rel[j, p]
             o = sums[j, column]
@@ -239,8 +288,8 @@ def _sum(k, start, stop, block, near, member, strength, rel, m, tangent, sums, c
                     found_force = elastic_force(rows, width, scale, lo, hi, r, hardly_moved(r, near))
                     add_forces(found_force, counted, o)
                 continue
-            cs = strength[1, lo:hi]
-            ps = strength[2, lo:hi]
+            cs = strength[SCALED_DAMPING, lo:hi]
+            ps = strength[SCALED_PRELOAD, lo:hi]
             if tangent:
                 (x, y, t, e, ex, ey, et, k0, k1, k2, k3, k4, k5, k6, k7, k8, c0, c1, c2, c3, c4, c5) = viscous_tangent(
                     px, py, qx, qy, l0, excess, ks, cs, ps, r
@@ -351,7 +400,18 @@ def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
     """
     i = taken(counter)
     while i < chunk.shape[0]:
-        _design(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, near[chunk[i, 0]], member, rel, u, weight, out)
+        _design(
+            chunk[i, CHUNK_BLOCK],
+            chunk[i, CHUNK_START],
+            chunk[i, CHUNK_STOP],
+            block,
+            near[chunk[i, CHUNK_BLOCK]],
+            member,
+            rel,
+            u,
+            weight,
+            out,
+        )
         i = taken(counter)
 
 
@@ -370,24 +430,24 @@ def _design(k, start, stop, block, near, member, rel, u, weight, out):
     Out:
       out (M_padded,): added to.
     """
-    if block[k, 4] < 0:
+    if block[k, DESIGN] < 0:
         return
-    p = block[k, 0]
+    p = block[k, PAIR]
     many = u.shape[0]
-    if block[k, 6] > 0:
-        design_grid(start, stop, block[k, 6], near, member, rel[:, p], u[:, p], weight, out)
+    if block[k, WIDTH] > 0:
+        design_grid(start, stop, block[k, WIDTH], near, member, rel[:, p], u[:, p], weight, out)
         return
     for lo in range(start, stop, TILE):
         hi = min(lo + TILE, stop)
-        px = member[0, lo:hi]
-        py = member[1, lo:hi]
-        qx = member[2, lo:hi]
-        qy = member[3, lo:hi]
-        l0 = member[4, lo:hi]
+        px = member[PX, lo:hi]
+        py = member[PY, lo:hi]
+        qx = member[QX, lo:hi]
+        qy = member[QY, lo:hi]
+        l0 = member[L0, lo:hi]
         excess = member[EXCESS, lo:hi]
         ks = member[STIFFNESS, lo:hi]
         o = out[lo:hi]
-        if block[k, 3] == 0:
+        if block[k, KIND] == 0:
             elastic_design(px, py, qx, qy, l0, excess, ks, rel[:many, p], u[:, p], o)
         else:
             for j in range(many):
@@ -421,7 +481,7 @@ def _unscale_chunks(counter, chunk, block, power, alpha, padded, out):
     """
     i = taken(counter)
     while i < chunk.shape[0]:
-        _unscale(chunk[i, 0], chunk[i, 1], chunk[i, 2], block, power, alpha, padded, out)
+        _unscale(chunk[i, CHUNK_BLOCK], chunk[i, CHUNK_START], chunk[i, CHUNK_STOP], block, power, alpha, padded, out)
         i = taken(counter)
 
 
@@ -438,7 +498,7 @@ def _unscale(k, start, stop, block, power, alpha, padded, out):
     Out:
       out (N,): mu alpha^(mu - 1) times it, at the variables of these members.
     """
-    if block[k, 4] < 0:
+    if block[k, DESIGN] < 0:
         return
     mu = power[k]
     rows, count, first, width = _rows(block, k, start, stop)

@@ -22,6 +22,7 @@ from mdstopo.mechanics.laws.spring_grid import (
 )
 from mdstopo.mechanics.laws.sums import add_tangent
 from mdstopo.mechanics.passes import springs_of
+from mdstopo.scene.model import L0, PX, PY, START, STOP, WIDTH
 
 
 @kernel
@@ -29,7 +30,7 @@ def may_use_single_precision(model):
     """Whether all members lie in grids, and there are few."""
     found = model.threads == 0
     for k in range(model.block.shape[0]):
-        found = found and model.block[k, 6] > 0
+        found = found and model.block[k, WIDTH] > 0
     return found
 
 
@@ -93,8 +94,8 @@ def single_precision_sums(springs, strength, rel, m, sums):
     block = springs.block
     sums[:m] = 0.0
     for k in range(block.shape[0]):
-        width = block[k, 6]
-        tall, wide = tile_of((block[k, 2] - block[k, 1]) // width, width)
+        width = block[k, WIDTH]
+        tall, wide = tile_of((block[k, STOP] - block[k, START]) // width, width)
         room = np.empty((tall, 2), np.float32)
         own = _aligned_rows(2 * tall + 2, wide)
         _sum_in_single_precision(block[k], wide, springs.member, strength[0], rel, m, sums, room, own[2:], own[:2])
@@ -142,10 +143,10 @@ def _sum_in_single_precision(block, wide, member, stiffness, rel, m, sums, room,
                 _shorten(member[2 + axis, at : at + count], q[axis])
             for j in range(rows):
                 at = start + j * width + first
-                _shorten_products(stiffness[at : at + count], member[4, at : at + count], own[j], own[tall + j])
+                _shorten_products(stiffness[at : at + count], member[L0, at : at + count], own[j], own[tall + j])
             for j in range(m):
                 r = rel[j, p]
-                begin_rows(member[0, start:], member[1, start:], width, r[0], r[1], room[:rows])
+                begin_rows(member[PX, start:], member[PY, start:], width, r[0], r[1], room[:rows])
                 force, tangent = _tangent(q[0], q[1], own[:rows], own[tall : tall + rows], room[:rows], r[2], r[3])
                 o = sums[j, p]
                 for axis in range(3):

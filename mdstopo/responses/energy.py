@@ -6,8 +6,8 @@ Along the motion dg/dt = sum over pairs of E_xi . xi', and dg/dq = T^T E_xi: bot
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.geometry import add_pair_force, relative_pose
-from mdstopo.mechanics.passes import member_sums
+from mdstopo.mechanics.geometry import VT, VX, VY, add_pair_force, relative_pose
+from mdstopo.mechanics.passes import SLOPE_T, SLOPE_X, SLOPE_Y, STORED, member_sums
 
 
 @part
@@ -37,8 +37,8 @@ def energy_of(rel, sums):
     value = 0.0
     rate = 0.0
     for p in range(rel.shape[0]):
-        value += sums[p, 3]
-        rate += sums[p, 4] * rel[p, 4] + sums[p, 5] * rel[p, 5] + sums[p, 6] * rel[p, 6]
+        value += sums[p, STORED]
+        rate += sums[p, SLOPE_X] * rel[p, VX] + sums[p, SLOPE_Y] * rel[p, VY] + sums[p, SLOPE_T] * rel[p, VT]
     return value, rate
 
 

@@ -9,7 +9,7 @@ earlier first where equal. For minima everything is done to -g.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.integrators.steps import step_at
+from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, step_at
 from mdstopo.integrators.steps_interface import point_of, sample
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of
@@ -46,15 +46,17 @@ def keep_peak(peaks, found, time, value):
     """Insert a peak, highest first and the earlier first where equal; return how many are kept."""
     rows = peaks.shape[0]
     place = found
-    while place > 0 and (value > peaks[place - 1, 1] or (value == peaks[place - 1, 1] and time < peaks[place - 1, 0])):
+    while place > 0 and (
+        value > peaks[place - 1, VALUE] or (value == peaks[place - 1, VALUE] and time < peaks[place - 1, TIME])
+    ):
         place -= 1
     if place >= rows:
         return found
     for i in range(min(found, rows - 1), place, -1):
-        peaks[i, 0] = peaks[i - 1, 0]
-        peaks[i, 1] = peaks[i - 1, 1]
-    peaks[place, 0] = time
-    peaks[place, 1] = value
+        peaks[i, TIME] = peaks[i - 1, TIME]
+        peaks[i, VALUE] = peaks[i - 1, VALUE]
+    peaks[place, TIME] = time
+    peaks[place, VALUE] = value
     return min(found + 1, rows)
 
 
@@ -144,7 +146,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     rel = np.empty((1, n_pair, POSE))
     sums = np.empty((1, n_pair, SUMS))
     springs = springs_of(model)
-    room = steps.index[count, 0] + 2
+    room = steps.index[count, FIRST] + 2
     t = np.empty(room)
     g = np.empty(room)
     d = np.empty(room)
@@ -165,8 +167,8 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
     member_sums(springs, strength, ends[begun:], 2 - begun, np.bool_(False), end_sums[begun:])
     work[0] += 2 - begun
     for end in range(2):
-        value = steps.scalar[0, 1]
-        rate = steps.scalar[0, 2]
+        value = steps.scalar[0, ENERGY]
+        rate = steps.scalar[0, ENERGY_RATE]
         if end >= begun:
             value, rate = energy_of(ends[end], end_sums[end])
         for p in range(n_pair):
@@ -255,7 +257,7 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
         if crossing and ((rises and falls) or turns):
             known = False  # brackets that were widened may share a peak
             for r in range(found):
-                known = known or abs(peaks[r, 0] - time) <= 1e-10 * span
+                known = known or abs(peaks[r, TIME] - time) <= 1e-10 * span
             if not known:
                 found = keep_peak(peaks, found, time, value)
     if found == 0:
@@ -265,11 +267,11 @@ def find_peaks(model, tables, strength, steps, count, damped, sign, closeness, p
                 best = i
         found = keep_peak(peaks, found, t[best], g[best])
     kept = 1
-    while kept < found and peaks[kept, 1] >= peaks[0, 1] - closeness * abs(peaks[0, 1]):
+    while kept < found and peaks[kept, VALUE] >= peaks[0, VALUE] - closeness * abs(peaks[0, VALUE]):
         kept += 1
     for i in range(kept):
-        k = step_at(steps.t, count, peaks[i, 0])
-        peaks[i, 1] *= sign
-        peaks[i, 2] = k
-        peaks[i, 3] = (peaks[i, 0] - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
+        k = step_at(steps.t, count, peaks[i, TIME])
+        peaks[i, VALUE] *= sign
+        peaks[i, STEP] = k
+        peaks[i, FRACTION] = (peaks[i, TIME] - steps.t[k]) / (steps.t[k + 1] - steps.t[k])
     return kept

@@ -20,6 +20,7 @@ from mdstopo.scene.model import (
     HOME_ANGLE,
     HOME_COS,
     HOME_SIN,
+    KIND,
     L0,
     MEMBER,
     QX,
@@ -256,7 +257,7 @@ def _skipped(
         notes.append("kinks in time: all loads are smooth")
     if not len(loads.load_body):
         notes.append("load stiffness: no load turns with a body or acts off its centre of mass")
-    if not any(kind == VISCOUS for kind in block[:, 3].tolist()):
+    if not any(kind == VISCOUS for kind in block[:, KIND].tolist()):
         notes.append("damping and preload columns of the members")
     fixed = sum(len(group) for group in case.members if not group.design)
     if fixed:

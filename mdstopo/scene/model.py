@@ -20,12 +20,16 @@ from mdstopo.compiler.fields import IndexArray as IndexArray
 #: rows of `Model.member`
 PX, PY, QX, QY, L0, EXCESS, STIFFNESS, DAMPING, PRELOAD = range(9)
 MEMBER = 9
+#: rows of the strengths: stiffness, damping, preload of each member times alpha^mu (N/m, N s/m, N)
+SCALED_STIFFNESS, SCALED_DAMPING, SCALED_PRELOAD = range(3)
 #: columns of `Model.home`: x, y, psi, and cos and sin of psi
 HOME_X, HOME_Y, HOME_ANGLE, HOME_COS, HOME_SIN = range(5)
 HOME = 5
 #: columns of `Model.block`, and how many there are
 PAIR, START, STOP, KIND, DESIGN, COUNT, WIDTH, LENGTH = range(8)
 BLOCK = 8
+#: columns of `Model.chunk`
+CHUNK_BLOCK, CHUNK_START, CHUNK_STOP = range(3)
 #: blocks are padded to a multiple of this
 VECTOR = 16
 #: members of one tile, few enough that all rows stay in the first-level cache while several poses pass over them

@@ -54,7 +54,7 @@ def chunks_of(block: IndexArray) -> IndexArray:
 
 def many_members(block: IndexArray) -> bool:
     """Whether blocks are cut into chunks, which threads may share."""
-    return len(block) > 0 and bool(block[-1, 2] > MANY)
+    return len(block) > 0 and bool(block[-1, STOP] > MANY)
 
 
 @views_of(FIELDS, Model, part)

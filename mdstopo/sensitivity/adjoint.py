@@ -9,6 +9,7 @@ inside. The peak's time is held fixed (envelope theorem).
 import numpy as np
 
 from mdstopo.compiler.jit import part
+from mdstopo.integrators.steps import ENERGY, FIRST, Q, V
 from mdstopo.integrators.steps_interface import carried, parent_of, reach, reverse_step, stage_weights
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, springs_of
@@ -54,8 +55,8 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
         else:
             point[d] = mu_q[d]
     while w >= 0:
-        o = steps.index[w, 0]
-        end = steps.index[w + 1, 0]
+        o = steps.index[w, FIRST]
+        end = steps.index[w + 1, FIRST]
         bar = stage_q_bar[o:end] if stage_q_bar.shape[0] > 0 else stage_q_bar
         reverse_step(
             pair, inv_mass, tables, steps, w, c, point, none, bar, lam_q, lam_v, lam_x, z[o:end], damped, turning,
@@ -114,7 +115,7 @@ def energy_rows(
     springs = springs_of(motion)
     turning = model.load_body.shape[0] > 0
     integral = reduction in (MEAN, INTEGRAL)
-    stages = steps.index[count, 0]
+    stages = steps.index[count, FIRST]
     point = np.empty((1, 3, n))
     q = point[0, 0]
     v = point[0, 1]
@@ -130,10 +131,10 @@ def energy_rows(
         scale = 1.0 / (steps.t[count] - steps.t[0]) if reduction == MEAN else 1.0
         value = 0.0
         for w in range(count):
-            stage_weights(tables, steps, w, weight[steps.index[w, 0] : steps.index[w + 1, 0]])
+            stage_weights(tables, steps, w, weight[steps.index[w, FIRST] : steps.index[w + 1, FIRST]])
         for i in range(stages):
             weight[i] *= scale
-            value += weight[i] * steps.scalar[i, 1]
+            value += weight[i] * steps.scalar[i, ENERGY]
             energy_slope(pair, pose[i], steps.pull[i], weight[i], bar[i])
         rows[0, 0] = np.nan
         rows[0, 1] = value
@@ -159,8 +160,8 @@ def energy_rows(
             if c >= 1.0 or (k == 0 and c == 0.0):
                 state = steps.state[k + 1 if c >= 1.0 else 0]
                 for d in range(n):
-                    q[d] = state[0, d]
-                    v[d] = state[1, d]
+                    q[d] = state[Q, d]
+                    v[d] = state[V, d]
             else:
                 w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
             at = ELSEWHERE
@@ -185,7 +186,7 @@ def energy_rows(
         out[:] = 0.0
         passed = 0
         if integral or not (k == 0 and c == 0.0):  # a peak at the start is not passed by the motion
-            passed = max(stages, steps.index[w + 1, 0])
+            passed = max(stages, steps.index[w + 1, FIRST])
         z = np.empty((passed, n))
         used = np.zeros(passed, np.int64)
         if passed > 0:

@@ -8,7 +8,7 @@ time. O(N) memory; with the histories of the response, dg/dalpha at every step's
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.integrators.steps import carve
+from mdstopo.integrators.steps import FIRST, Q, V, carve
 from mdstopo.integrators.steps_interface import carried, parent_of, reach, stage_weights, steps_of
 from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, energy_gradient, springs_of, unscale_gradient
@@ -73,8 +73,8 @@ def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, s
     if c >= 1.0 or (k == 0 and c == 0.0):
         state = steps.state[k + 1 if c >= 1.0 else 0]
         for d in range(q.shape[0]):
-            q[d] = state[0, d]
-            v[d] = state[1, d]
+            q[d] = state[Q, d]
+            v[d] = state[V, d]
     else:
         w, c_w = reach(model, tables, strength, steps, count, k, c, damped, q, v, work)
     slope_at(model, strength, q, v, rel, sums, mu_q)
@@ -100,7 +100,7 @@ def integral_weights(model, tables, steps, count, weight, bar):
     """
     rel = np.empty((model.pair.shape[0], POSE))
     for w in range(count):
-        stage_weights(tables, steps, w, weight[steps.index[w, 0] : steps.index[w + 1, 0]])
+        stage_weights(tables, steps, w, weight[steps.index[w, FIRST] : steps.index[w + 1, FIRST]])
     for i in range(weight.shape[0]):
         relative_pose(model.pair, model.home, steps.stage[i, 0], steps.stage[i, 1], rel)
         energy_slope(model.pair, rel, steps.pull[i], weight[i], bar[i])
@@ -195,7 +195,7 @@ def direct(
     n_obj = rows.shape[0]
     n_row = rows.shape[1]
     padded_size = model.member.shape[1]
-    stages = steps.index[count, 0]
+    stages = steps.index[count, FIRST]
     width = (2 + carried(steps)) * n
     rel = np.empty((1, n_pair, POSE))
     sums = np.empty((1, n_pair, SUMS))
@@ -221,13 +221,13 @@ def direct(
             )  # fmt: skip
             before[j, r] = parent_of(steps, w) if w >= 0 else NOWHERE
             if w >= 0:
-                most = max(most, steps.index[w + 1, 0] - steps.index[w, 0])
+                most = max(most, steps.index[w + 1, FIRST] - steps.index[w, FIRST])
     weight = np.zeros(stages if integral else 0)
     bar = np.zeros((stages if integral else 0, n))
     if integral:
         integral_weights(model, tables, steps, count, weight, bar)
     for w in range(count):
-        most = max(most, steps.index[w + 1, 0] - steps.index[w, 0])
+        most = max(most, steps.index[w + 1, FIRST] - steps.index[w, FIRST])
     matrix = np.empty((width + 1, width + 3 * n_pair * most))
     none = np.zeros(n)
     no_bar = np.zeros((most, n))
@@ -261,8 +261,8 @@ def direct(
                     model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                     rel, sums, mu[j, r], work,
                 )  # fmt: skip
-            o = steps.index[w, 0]
-            end = steps.index[w + 1, 0]
+            o = steps.index[w, FIRST]
+            end = steps.index[w + 1, FIRST]
             step_matrix(
                 pair, model.home, model.inv_mass, tables, steps, w, c, mu[job // n_row, job % n_row] if row else none,
                 bar[o:end] if integral and not row else no_bar, damped, turning, matrix,

@@ -10,15 +10,42 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, part
 from mdstopo.integrators.gauss import TAG as GAUSS
-from mdstopo.integrators.steps import ENERGY, FORCES, SPRINGS, TIME, carve, deflection, solved_to, step_at
+from mdstopo.integrators.steps import (
+    ENERGY,
+    FIRST,
+    FORCES,
+    SEGMENT,
+    SPRINGS,
+    TIME,
+    Q,
+    V,
+    carve,
+    deflection,
+    solved_to,
+    step_at,
+)
 from mdstopo.integrators.steps_interface import point_of, steps_of
 from mdstopo.mechanics.active_members import active_members
 from mdstopo.mechanics.assembly import add_loads
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import elongation_of, meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
-from mdstopo.mechanics.passes import SUMS, member_sums, springs_of, unscale_gradient
-from mdstopo.scene.model import DESIGN, EXCESS, L0, PAIR, PX, PY, QX, QY, START, STOP
+from mdstopo.mechanics.passes import SUM_T, SUM_X, SUM_Y, SUMS, member_sums, springs_of, unscale_gradient
+from mdstopo.scene.model import (
+    DESIGN,
+    EXCESS,
+    L0,
+    PAIR,
+    PX,
+    PY,
+    QX,
+    QY,
+    SCALED_PRELOAD,
+    SCALED_STIFFNESS,
+    START,
+    STOP,
+    WIDTH,
+)
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.adjoint import energy_rows
 
@@ -82,7 +109,7 @@ def evaluate_responses(
     turning = model.load_body.shape[0] > 0
     n = model.q0.shape[0]
     steps = steps_of(tag, carve(room, room_ints, n, model.pair.shape[0], limits[1], limits[2], damped, turning))
-    pose = np.empty((steps.index[count, 0], model.pair.shape[0], POSE))
+    pose = np.empty((steps.index[count, FIRST], model.pair.shape[0], POSE))
     for i in range(pose.shape[0]):
         relative_pose(model.pair, model.home, steps.stage[i, 0], steps.stage[i, 1], pose[i])
     find_meeting(model, strength, steps, count, pose, settings, meeting)
@@ -128,7 +155,7 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
     block = model.block
     m = model.member
     n_pair = pair.shape[0]
-    stages = steps.index[count, 0]
+    stages = steps.index[count, FIRST]
     before = np.empty((n_pair, POSE))
     rel = np.empty((n_pair, POSE))
     spare = np.empty(n_pair)
@@ -137,7 +164,7 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
     for p in range(n_pair):
         spare[p] = model.shortest[p]
     relative_pose(pair, model.home, model.q0, model.v0, before)
-    for i in range(steps.index[0, 0], stages + 1):
+    for i in range(steps.index[0, FIRST], stages + 1):
         was = time
         between = False
         if i == stages:
@@ -146,9 +173,9 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
         else:
             copy_rows(pose[i], rel)
             time = steps.scalar[i, TIME]
-            while step < count and steps.index[step, 0] < i:
+            while step < count and steps.index[step, FIRST] < i:
                 step += 1
-            between = steps.index[step, 0] == i and time > was and not settings[2] > 0.0
+            between = steps.index[step, FIRST] == i and time > was and not settings[2] > 0.0
         for p in range(n_pair):
             moved = deflection(rel, before, model.reach, p)
             spare[p] -= moved
@@ -156,25 +183,26 @@ def find_meeting(model, strength, steps, count, pose, settings, meeting):
                 continue
             shortest = np.inf
             for k in range(block.shape[0]):
-                lo = block[k, 1]
-                hi = block[k, 2]
-                if block[k, 0] == p:
-                    shortest = min(shortest, _shortest(m, lo, hi, block[k, 6], rel[p]))
+                lo = block[k, START]
+                hi = block[k, STOP]
+                if block[k, PAIR] == p:
+                    shortest = min(shortest, _shortest(m, lo, hi, block[k, WIDTH], rel[p]))
             spare[p] = shortest
             for k in range(block.shape[0]):
-                if shortest > moved or block[k, 0] != p:
+                if shortest > moved or block[k, PAIR] != p:
                     continue
-                lo = block[k, 1]
-                hi = block[k, 2]
+                lo = block[k, START]
+                hi = block[k, STOP]
                 j = meeting_in(
-                    m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
-                    strength[2, lo:hi], before[p], rel[p],
+                    m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[SCALED_STIFFNESS, lo:hi],
+                    strength[SCALED_PRELOAD, lo:hi], before[p], rel[p],
                 )  # fmt: skip
                 if j < 0 and between:
                     ease = (time - was) ** 2 * (model.inv_mass[3 * pair[p, 0]] + model.inv_mass[3 * pair[p, 1]])
                     j = passing_in(
-                        m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi], strength[0, lo:hi],
-                        strength[2, lo:hi], before[p], rel[p], 0.5 * UNSEEN * settings[0] / ease,
+                        m[0, lo:hi], m[1, lo:hi], m[2, lo:hi], m[3, lo:hi], m[4, lo:hi],
+                        strength[SCALED_STIFFNESS, lo:hi], strength[SCALED_PRELOAD, lo:hi], before[p], rel[p],
+                        0.5 * UNSEEN * settings[0] / ease,
                     )  # fmt: skip
                 if j >= 0:
                     meeting[0] = lo + j
@@ -205,10 +233,10 @@ def find_unresolved(model, strength, steps, count, pose, collocated, visible, me
       meeting (3,): of which [2] is written, the member's index in the padded arrays, or -1.
     """
     meeting[2] = -1
-    best = steps.index[0, 0]
+    best = steps.index[0, FIRST]
     for step in range(count):
-        first = steps.index[step, 0]
-        for i in range(first, steps.index[step + 1, 0] if collocated else first + 1):
+        first = steps.index[step, FIRST]
+        for i in range(first, steps.index[step + 1, FIRST] if collocated else first + 1):
             if steps.scalar[i, ENERGY] > steps.scalar[best, ENERGY]:
                 best = i
     energy = steps.scalar[best, ENERGY]
@@ -219,12 +247,12 @@ def find_unresolved(model, strength, steps, count, pose, collocated, visible, me
         r = pose[best, p]
         size = max(size, math.hypot(r[10], r[11]) + model.reach[p] * math.hypot(r[12], r[13]))
     for d in range(0, model.q0.shape[0], 3):
-        size = max(size, abs(steps.stage[best, 0, d]), abs(steps.stage[best, 0, d + 1]))
+        size = max(size, abs(steps.stage[best, Q, d]), abs(steps.stage[best, Q, d + 1]))
     rounding = 2.2e-16 * size
     stiffness = 0.0
     for b in range(model.block.shape[0]):
         if model.block[b, DESIGN] >= 0:
-            stiffness += _sum(strength[0, model.block[b, START] : model.block[b, STOP]])
+            stiffness += _sum(strength[SCALED_STIFFNESS, model.block[b, START] : model.block[b, STOP]])
     if rounding * math.sqrt(2.0 * stiffness / energy) <= visible:
         return
     m = model.member
@@ -241,7 +269,7 @@ def find_unresolved(model, strength, steps, count, pose, collocated, visible, me
             ux = r[10] + (r[12] * m[QX, i] - r[13] * m[QY, i])
             uy = r[11] + (r[13] * m[QX, i] + r[12] * m[QY, i])
             elongation = abs(elongation_of(x, y, math.sqrt(x * x + y * y), ux, uy, m[L0, i], m[EXCESS, i]))
-            force = strength[0, i] * elongation
+            force = strength[SCALED_STIFFNESS, i] * elongation
             lost += force * rounding
             elongated = elongated or (force > 0.0 and elongation > ELONGATED * rounding)
             if force > most:
@@ -318,16 +346,16 @@ def dense(tag, ints, floats, tables, damped, limits, count, room, room_ints, str
         if t == steps.t[k] or t == steps.t[k + 1]:
             state = steps.state[k if t == steps.t[k] else k + 1]
             for d in range(n):
-                q[d] = state[0, d]
-                v[d] = state[1, d]
+                q[d] = state[Q, d]
+                v[d] = state[V, d]
         else:
             point_of(model, tables, strength, steps, count, k, c, damped, q, v, work)
         relative_pose(model.pair, model.home, q, v, rel[0])
         springs = springs_of(model)
         member_sums(springs, strength, rel, np.int64(1), np.bool_(False), sums)
         f[:] = 0.0
-        add_loads(model, steps.index[k, 2], t, q, f)
+        add_loads(model, steps.index[k, SEGMENT], t, q, f)
         for p in range(n_pair):
-            add_pair_force(model.pair, rel[0], p, sums[0, p, 0], sums[0, p, 1], sums[0, p, 2], f)
+            add_pair_force(model.pair, rel[0], p, sums[0, p, SUM_X], sums[0, p, SUM_Y], sums[0, p, SUM_T], f)
         for d in range(n):
             out[2, i, d] = model.inv_mass[d] * f[d]

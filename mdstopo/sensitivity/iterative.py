@@ -12,13 +12,13 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel, member_kernel
 from mdstopo.integrators.generalized_alpha import weights_of
 from mdstopo.integrators.generalized_alpha_linear import hermite
-from mdstopo.integrators.steps import SWEEPS, carve
+from mdstopo.integrators.steps import FIRST, SWEEPS, carve
 from mdstopo.integrators.steps_interface import steps_of
 from mdstopo.mechanics.assembly import add_turning, subtract_products
 from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
 from mdstopo.mechanics.passes import SUMS
-from mdstopo.scene.model import DAMPING, EXCESS, PRELOAD, STIFFNESS
+from mdstopo.scene.model import DAMPING, DESIGN, EXCESS, KIND, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, STOP
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.direct import finish_rows, integral_weights, look_at_row
 from mdstopo.sensitivity.propagation import STRIP, add_three
@@ -133,7 +133,7 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):
       push (STRIP,): overwritten.
     """
     wide = hi - lo
-    p = block[k, 0]
+    p = block[k, PAIR]
     unit = np.eye(3)
     lever = np.zeros(out.shape[0])
     out[:] = 0.0
@@ -143,14 +143,14 @@ def _member_forces(pair, block, member, k, lo, hi, rel, push, out):
         ut = 1.0 if axis == 2 else 0.0
         o = push[:wide]
         o[:] = 0.0
-        if block[k, 3] == 0:
+        if block[k, KIND] == 0:
             elastic_design(
-                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
+                member[PX, lo:hi], member[PY, lo:hi], member[QX, lo:hi], member[QY, lo:hi], member[L0, lo:hi],
                 member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], rel[p : p + 1], unit[axis : axis + 1], o,
             )  # fmt: skip
         else:
             viscous_design(
-                member[0, lo:hi], member[1, lo:hi], member[2, lo:hi], member[3, lo:hi], member[4, lo:hi],
+                member[PX, lo:hi], member[PY, lo:hi], member[QX, lo:hi], member[QY, lo:hi], member[L0, lo:hi],
                 member[EXCESS, lo:hi], member[STIFFNESS, lo:hi], member[DAMPING, lo:hi], member[PRELOAD, lo:hi],
                 rel[p], unit[axis], o,
             )  # fmt: skip
@@ -258,7 +258,7 @@ def iterative(
                 model, tables, strength, steps, count, damped, rows[j, r], states[j, r, 0], states[j, r, 1],
                 rel[:1], sums, mu[j, r], work,
             )  # fmt: skip
-    stages = steps.index[count, 0] if integral else 0
+    stages = steps.index[count, FIRST] if integral else 0
     weight = np.zeros(stages)
     bar = np.zeros((stages, n))
     if integral:
@@ -273,8 +273,8 @@ def iterative(
     rhs = room[6]
     push = np.empty(STRIP)
     for w in range(count):
-        o = steps.index[w, 0]
-        last = steps.index[w + 1, 0] - 1 - o
+        o = steps.index[w, FIRST]
+        last = steps.index[w + 1, FIRST] - 1 - o
         h = steps.t[w + 1] - steps.t[w]
         w_q = h * h * beta * e1
         w_v = h * gamma * e1
@@ -288,10 +288,10 @@ def iterative(
         for j in range(last + 1):
             relative_pose(pair, model.home, steps.stage[o + j, 0], steps.stage[o + j, 1], rel[j])
         for b in range(block.shape[0]):
-            if block[b, 4] < 0:
+            if block[b, DESIGN] < 0:
                 continue
-            for lo in range(block[b, 1], block[b, 2], STRIP):
-                hi = min(lo + STRIP, block[b, 2])
+            for lo in range(block[b, START], block[b, STOP], STRIP):
+                hi = min(lo + STRIP, block[b, STOP])
                 wide = hi - lo
                 for j in range(n_obj):
                     for r in range(found[j]):

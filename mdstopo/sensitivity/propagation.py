@@ -12,10 +12,11 @@ tangent step; one pass over the members then applies it to all of them,
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, member_kernel
+from mdstopo.integrators.steps import FIRST
 from mdstopo.integrators.steps_interface import carried, tangent_step
 from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
-from mdstopo.scene.model import DAMPING, EXCESS, L0, PRELOAD, STIFFNESS
+from mdstopo.scene.model import DAMPING, DESIGN, EXCESS, KIND, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, STOP
 
 #: members that are carried through together: their rows stay in the first-level cache
 STRIP = 128
@@ -47,8 +48,8 @@ def step_matrix(pair, home, inv_mass, tables, steps, w, c, mu_q, bar, damped, tu
     n_pair = pair.shape[0]
     rows = carried(steps)
     width = (2 + rows) * n
-    o = steps.index[w, 0]
-    s = steps.index[w + 1, 0] - o
+    o = steps.index[w, FIRST]
+    s = steps.index[w + 1, FIRST] - o
     y = np.empty(width)
     force = np.zeros((s, n))
     moved = np.empty((s, n))
@@ -126,16 +127,16 @@ def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, addin
     push = np.empty((3 * s, STRIP))
     fresh = np.empty((last - first, STRIP))
     for k in range(block.shape[0]):
-        if block[k, 4] < 0:
+        if block[k, DESIGN] < 0:
             continue
-        p = block[k, 0]
-        for lo in range(block[k, 1], block[k, 2], STRIP):
-            hi = min(lo + STRIP, block[k, 2])
+        p = block[k, PAIR]
+        for lo in range(block[k, START], block[k, STOP], STRIP):
+            hi = min(lo + STRIP, block[k, STOP])
             wide = hi - lo
-            px = member[0, lo:hi]
-            py = member[1, lo:hi]
-            qx = member[2, lo:hi]
-            qy = member[3, lo:hi]
+            px = member[PX, lo:hi]
+            py = member[PY, lo:hi]
+            qx = member[QX, lo:hi]
+            qy = member[QY, lo:hi]
             l0 = member[L0, lo:hi]
             excess = member[EXCESS, lo:hi]
             ks = member[STIFFNESS, lo:hi]
@@ -145,7 +146,7 @@ def apply_matrix(pair, home, block, member, stage, s, matrix, first, last, addin
                 axis = i % 3
                 o = push[i, :wide]
                 o[:] = 0.0
-                if block[k, 3] == 0:
+                if block[k, KIND] == 0:
                     elastic_design(
                         px, py, qx, qy, l0, excess, ks, rel[i // 3 : i // 3 + 1, p], unit[axis : axis + 1], o
                     )
