@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.general.extremes import FRACTIONS, Samples, peaks, row_of
+from mdstopo.general.extremes import FRACTIONS, row_of
 from mdstopo.general.model import COUNT, GROUP, OFFSET
 from mdstopo.general.responses import MEMBER_FORCE
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -65,14 +65,8 @@ def members_peaks(
         own = min(window, 1.0 - limit / top[i]) if top[i] > 0.0 else window
         force, rate = np.moveaxis(seen_one.reshape(count, len(FRACTIONS), 2), 2, 0)
         sign = np.where(force >= 0.0, 1.0, -1.0)
-        samples = Samples(t, sign * force, sign * rate, np.full(force.shape, float(i)))
-
-        def evaluate_at(places: FloatArray, exact: bool, who: int = i) -> FloatArray:
-            if exact and len(places) == 1:
-                return driver.evaluate_one(j, count, places[0], who)[None].copy()
-            return driver.sample_response(j, places, exact, count, who=who)[2]
-
-        rows += peaks(samples, evaluate_at, 1.0, own)
+        samples = np.stack([sign * force, sign * rate, np.full(force.shape, float(i))], axis=2)
+        rows += list(driver.peaks_of_pieces(j, count, t, samples, 1.0, own, who=i))
     return rows
 
 

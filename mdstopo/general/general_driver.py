@@ -1,7 +1,6 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -18,13 +17,11 @@ from mdstopo.general.compile import GeneralScene, compile_general
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
+    LAST,
     SIGN,
     STEP,
     VALUE,
-    peaks,
-    ranked,
     row_of,
-    sample,
 )
 from mdstopo.general.kinks import landed
 from mdstopo.general.minima import minima
@@ -49,8 +46,10 @@ if TYPE_CHECKING:
 
 #: peaks kept of one response, unless told otherwise
 ROWS = 6
-#: signs with which a reduction takes the peaks of g: those of g, or of -g too; minima are found in `minima`
-SIGNS = {"max": (1.0,), "max_abs": (1.0, -1.0)}
+#: reductions that take the peaks of g, and whether those of -g too; minima are found in `minima`
+PEAKS = {"max": False, "max_abs": True}
+#: for peaks of whole steps
+NO_PIECES = np.empty((0, 4))
 
 
 def load_method(kind: IntegratorKind) -> ModuleType:
@@ -132,6 +131,7 @@ class GeneralDriver:
         """Arrays for at most so many peaks of each response; that of `Peak.across` comes when it is first asked for."""
         count, length = len(self.scene.responses), len(self._integral_gradient)
         self.rows = np.zeros((count, most, COLUMNS))
+        self._rows_of = list(self.rows)
         self.gradients = np.zeros((count, most, length))
         self.across: FloatArray | None = None
 
@@ -201,8 +201,6 @@ class GeneralDriver:
 
     def evaluate_at(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
         """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
-        if exact and rates and len(places) == 1:
-            return self.evaluate_one(j, count, places[0])[None].copy()
         return self.sample_response(j, places, exact, count, rates=rates)[2]
 
     def _grazing(self) -> int:
@@ -221,35 +219,69 @@ class GeneralDriver:
 
     def _look(self, j: int, reduction: str, count: int, gradient: bool, window: float) -> None:
         """Rows of response j, reduced over time; of an integral the gradient, too."""
-        most = self.rows.shape[1]
-        t = self.states()[0][: count + 1]
-        rows = self.rows[j]
+        rows, t = self.rows[j], self.states()[0]
         if reduction in INTEGRALS:
             total = self._integral_with_gradient(j, INTEGRALS[reduction], count, gradient, self.gradients[j, 0])
-            value, slope = reduced(reduction, total, float(t[-1] - t[0]))
+            value, slope = reduced(reduction, total, float(t[count] - t[0]))
             rows[0] = row_of(np.nan, value, 0, 0.0, slope, 1.0, -1.0)
             self.gradients[j, 0] *= slope
             self.found[j] = 1
             return
 
-        if compete(self.scene.model.response[j, 0], reduction):
-            found = members_peaks(self, j, t.copy(), reduction == "final", window, most)
-            found = ranked(found, window, most, t[-1] - t[0])
-        elif reduction == "final":
-            value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
-            found = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
-        elif reduction == "min":
-            found = ranked(minima(self, j, t.copy()), window, most, t[-1] - t[0])
+        competing = compete(self.scene.model.response[j, 0], reduction)
+        if not competing and reduction in PEAKS:
+            found = self._peaks_of_steps(j, PEAKS[reduction], count, window)
         else:
-            evaluate_at, t = partial(self.evaluate_at, j, count), t.copy()
-            samples = sample(t, evaluate_at)
-            found = [row for sign in SIGNS[reduction] for row in peaks(samples, evaluate_at, sign, window)]
-            found = ranked(found, window, most, t[-1] - t[0])
-        self.found[j] = len(found)
-        for r, row in enumerate(found):
-            flip = row[SIGN] if reduction == "max_abs" else 1.0
-            rows[r] = row
-            rows[r, VALUE] *= flip
+            t = t[: count + 1].copy()
+            if competing:
+                candidates = members_peaks(self, j, t, reduction == "final", window, len(rows))
+            elif reduction == "final":
+                value, rate, who = self.evaluate_one(j, count, np.array([count - 1.0, 1.0])).tolist()
+                candidates = [row_of(t[-1], value, count - 1, 1.0, rate, 1.0, who)]
+            else:
+                candidates = list(minima(self, j, t))
+            found = self.entry.rank_rows(np.array(candidates), window, float(t[-1] - t[0]), rows)
+        self.found[j] = found
+        if reduction == "max_abs":
+            rows[:found, VALUE] *= rows[:found, SIGN]
+
+    def _peaks_of_steps(self, j: int, both: bool, count: int, window: float) -> int:
+        """The highest peaks of response j, and where `both` are wanted of -g, into its rows; how many they are."""
+        found: int = self.ready(
+            f"peaks_of_steps {j}", self.entry.peaks_of_steps, self.entry.TAG, self.ints, self.floats,
+            self.method.tables, self.limits, count, self.room, self.room_ints, self.member_state, j, both,
+            not self.method.kind.adaptive, window, self._rows_of[j], self.work,
+        )  # fmt: skip
+        return found
+
+    def peaks_of_pieces(
+        self,
+        j: int,
+        count: int,
+        t: FloatArray,
+        seen: FloatArray,
+        sign: float,
+        window: float,
+        pieces: FloatArray = NO_PIECES,
+        who: int = -1,
+    ) -> FloatArray:
+        """The peaks (K, COLUMNS) of response j in sampled pieces of steps (`peak_search.peaks_of_pieces`).
+
+        j: the response.
+        count: how many steps the run has.
+        t (P + 1,): ends of the pieces (s).
+        seen (P, SAMPLES, 3): their samples.
+        sign: 1 for peaks of g, -1 for those of -g.
+        window: how far below the highest sample a peak may be, relative to it.
+        pieces (P, 4): what they are; no rows: the steps of the run.
+        who: of the steps the member whose force is looked at; -1: at each place the one with the largest.
+        """
+        rows = np.empty(((LAST + 2) * len(t), COLUMNS))
+        found = self.entry.peaks_of_pieces(
+            self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count, self.room, self.room_ints,
+            self.member_state, j, who, pieces, t, seen, sign, window, rows, self.work,
+        )  # fmt: skip
+        return rows[:found].copy()
 
     def sample_response(
         self,

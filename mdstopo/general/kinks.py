@@ -6,12 +6,12 @@ derivatives bend more sharply than values; for values see `quadrature_breakpoint
 integrand is continuous there, so that its derivatives need no term of their own.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mdstopo.general.extremes import FRACTION, STEP, VALUE, peaks
+from mdstopo.general.extremes import FRACTION, STEP, VALUE, EvaluateAt
 from mdstopo.general.minima import LOW, Pieces
 from mdstopo.general.model import GeneralModel
 from mdstopo.scene.model import FloatArray
@@ -19,19 +19,17 @@ from mdstopo.scene.model import FloatArray
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
 
-EvaluateAt = Callable[[FloatArray, bool], FloatArray]
-
 
 def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
     """Times inside (t[0], t[-1]) at which steps are to end for the sake of response j; t (m + 1,): the steps' times."""
     pieces = Pieces(driver, j, t)
-    samples = pieces.samples
-    highest = float(np.abs(samples.value).max())
+    values, rates = pieces.samples[:, :, 0], pieces.samples[:, :, 1]
+    highest = float(np.abs(values).max())
     if highest == 0.0:
         return []
     found = list(pieces.changes)
-    rate = float(np.abs(samples.rate).max())
-    for row in peaks(samples, pieces.evaluate_at, -1.0, 1e9):
+    rate = float(np.abs(rates).max())
+    for row in pieces.minima(1e9):
         low = -row[VALUE] if row[VALUE] < 0.0 else row[VALUE]
         if low > LOW * highest or not t[0] < row[0] < t[-1]:
             continue

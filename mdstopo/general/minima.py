@@ -24,8 +24,6 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
     ZERO,
-    Samples,
-    peaks,
     sample,
 )
 from mdstopo.general.leading_members import Lead, changes, is_led, leads
@@ -64,9 +62,14 @@ class Pieces:
         self.changes = changes(self.leads, t)
 
     @cached_property
-    def samples(self) -> Samples:
-        """Looks at all pieces."""
-        return sample(self.t, self.evaluate_at)
+    def samples(self) -> FloatArray:
+        """Value, rate and member (P, SAMPLES, 3) in all pieces."""
+        return sample(len(self.leads), self.evaluate_at)
+
+    def minima(self, window: float) -> FloatArray:
+        """The minima that come near the lowest, as rows (K, COLUMNS) whose places are pieces and fractions of them."""
+        pieces = np.column_stack([self._step, self._low, self._high, self._member]).astype(np.float64)
+        return self._driver.peaks_of_pieces(self._j, self._count, self.t, self.samples, -1.0, window, pieces)
 
     def evaluate_at(self, places: FloatArray, exact: bool) -> FloatArray:
         """(K, 3) value, rate, member at places (K, 2): pieces and fractions of them."""
@@ -97,12 +100,11 @@ class Pieces:
         row[TIME] = self.t[k] + (c - lead.low) / (lead.high - lead.low) * (self.t[k + 1] - self.t[k])
 
 
-def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> list[FloatArray]:
+def minima(driver: "GeneralDriver", j: int, t: FloatArray) -> FloatArray:
     """The minima of response j that come near the lowest, as rows of `extremes`; t (m + 1,): the steps' times."""
     pieces = Pieces(driver, j, t)
-    samples = pieces.samples
-    rows = peaks(samples, pieces.evaluate_at, -1.0, CLOSENESS)
-    highest = float(np.abs(samples.value).max())
+    rows = pieces.minima(CLOSENESS)
+    highest = float(np.abs(pieces.samples[:, :, 0]).max())
     bent = bool(has_kinks(driver.scene.model, j))
     for row in rows:
         k, c = int(row[STEP]), float(row[FRACTION])

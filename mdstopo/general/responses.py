@@ -63,6 +63,12 @@ def _is_by_state(kind):
 
 
 @kernel
+def rate_is_by_state(model, j):
+    """Whether the rate of response j is g_q v + g_v a (`ResponseKernels.by_state`)."""
+    return _is_by_state(model.response[j, 0])
+
+
+@kernel
 def kinked(model, j):
     """Whether response j is a norm, an absolute value, or a largest one, which may have kinks in time."""
     return _is_absolute(model.response[j, 0]) or is_norm(model, j)

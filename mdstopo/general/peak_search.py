@@ -1,0 +1,609 @@
+"""The extremes of a response over time, found on the steps of a finished motion: what `extremes` describes, compiled.
+
+A motion is a sequence of steps, or of pieces of steps (`minima`), on each of which the response is smooth. Samples of a
+piece lie at its start, its end and in between (`SAMPLES`); between two of them where the rate falls through zero a peak
+is refined on the method's own motion. Where steps are many to a vibration, as those of a method without error control
+are, what lies between the ends of one is looked at only where a peak may be.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from mdstopo.compiler.jit import entry, kernel
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
+from mdstopo.general.dense_output import go_to, quintic, time_at
+from mdstopo.general.extremes import (
+    COLUMNS,
+    FRACTION,
+    LAST,
+    NOBODY,
+    OTHER,
+    RATE,
+    SAMPLES,
+    SHARE,
+    SIGN,
+    STEP,
+    TIME,
+    VALUE,
+    WHO,
+)
+from mdstopo.general.forces import drive_state
+from mdstopo.general.method_interface import derivatives
+from mdstopo.general.model import unpack_general
+from mdstopo.general.responses import MEMBER_FORCE, kinked, largest_force, rate_is_by_state, rated
+from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.general.structures import bundle
+
+#: columns of a sample: value, rate, member
+G, DG, MEMBER = range(3)
+#: columns of a piece: the step, the fractions of it at which the piece begins and ends, the member looked at
+PIECE_STEP, PIECE_LOW, PIECE_HIGH, PIECE_MEMBER = range(4)
+#: values or rates that differ by less than this, relative to the largest, differ by rounding
+ROUNDING = 1e-13
+#: a rate below this, relative to the largest, is that of a plateau, which only rounding tilts
+FLAT = 1e-9
+#: peaks nearer to each other than this in time (relative to what was simulated) and value are one
+RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
+#: a response jumps where the sides of a boundary differ by more than this, relative to the largest value
+JUMP = 1e-9
+#: how often a bracket of a peak is narrowed at most
+TRIALS = 60
+#: a step has no peak inside if its ends stay below the limit by so many times what it may rise by; or if it rises (or
+#: falls) at both ends, with rates that differ by at most one share, and a mean rate that is theirs to another
+MARGIN, ALIKE, EVEN = 4.0, 0.5, 0.1
+
+#: a finished motion, and room for looking at it: the scene, the method's coefficients, state of the members, steps and
+#: how many there are; one state with its multipliers, slopes of the response there, states beside it
+FIELDS = (
+    "model", "tables", "member_state", "history", "count", "work", "workspace", "q", "v", "a", "lam", "bars", "row_bar",
+    "near", "ends",
+)  # fmt: skip
+
+
+class Motion:
+    """A finished motion inside kernels, whose parts `FIELDS` names; made by `finished`."""
+
+    def __init__(self, *_parts: Any) -> None: ...
+
+
+bundle(Motion, FIELDS)
+
+
+@kernel
+def finished(model, tables, member_state, history, count, work):
+    """A `Motion` of so many steps, with room for looking at it."""
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    return Motion(
+        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n_row), np.empty((3, n)), np.empty(n_row), np.empty((4, n)), np.empty((6, n)),
+    )  # fmt: skip
+
+
+@kernel
+def evaluate_here(tag, motion, j, k, c, who):
+    """Response j at the state in `motion.q` and `motion.v`, of fraction c of step k, whose modes are put in place.
+
+    tag: the method of integration (`method_interface`).
+    motion: the finished motion; a, lam, bars, row_bar and the workspace are overwritten.
+    j: the response. k, c: the step, and the fraction of it.
+    who: the member whose force is looked at; -1: the one with the largest.
+
+    Returns the value, its rate (per s) and the number of the member.
+    """
+    t = time_at(motion.history, k, c)
+    q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
+    model = motion.model
+    if model.response[j, 0] == MEMBER_FORCE and who < 0:
+        segment = motion.history.index[k, SEGMENT]
+        solve_accelerations(model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, lam)
+        who = largest_force(model, motion.member_state, segment, t, model.response[j, 5], q, v, a)
+    value, rate = rated(
+        tag, model, motion.member_state, motion.history, k, c, j, who, np.bool_(True), t, q, v, motion.workspace, a,
+        lam, motion.bars, motion.row_bar, motion.near,
+    )  # fmt: skip
+    return value, rate, who
+
+
+@kernel
+def evaluate_exactly(tag, motion, j, k, c, who):
+    """`evaluate_here` at fraction c of step k, where the method's own motion is."""
+    go_to(
+        tag, motion.model, motion.tables, motion.member_state, motion.history, motion.count, k, c, np.bool_(True), -1,
+        motion.workspace, motion.ends, motion.lam, motion.q, motion.v, motion.work,
+    )  # fmt: skip
+    return evaluate_here(tag, motion, j, k, c, who)
+
+
+@kernel
+def sample_ends(tag, motion, j, seen, accelerations):
+    """Look at both ends of every step, on the step's own side.
+
+    tag: the method of integration (`method_interface`). motion: the finished motion. j: the response.
+    seen (count, SAMPLES, 3): the first and the last sample of each step are written.
+    accelerations (count, 2, n): those at both ends of each step are written.
+
+    What is behind a boundary is what is in front of it where no law, load or mode changes there.
+    """
+    history = motion.history
+    shared = rate_is_by_state(motion.model, j) and motion.model.response[j, 4] < derivatives(tag)
+    for k in range(motion.count):
+        restore_modes(history, history.index[k, EVENTS], motion.member_state)
+        for e in range(2):
+            if (
+                e == 0
+                and shared
+                and k > 0
+                and history.index[k, SEGMENT] == history.index[k - 1, SEGMENT]
+                and history.index[k, EVENTS] == history.index[k - 1, EVENTS]
+            ):
+                for i in range(3):
+                    seen[k, 0, i] = seen[k - 1, LAST, i]
+                copy_vector(accelerations[k - 1, 1], accelerations[k, 0])
+                continue
+            copy_vector(history.state[k + e, 0], motion.q)
+            copy_vector(history.state[k + e, 1], motion.v)
+            t = time_at(history, k, float(e))
+            drive_state(motion.model, history.index[k, SEGMENT], t, motion.q, motion.v)
+            value, rate, who = evaluate_here(tag, motion, j, k, float(e), -1)
+            seen[k, e * LAST, G] = value
+            seen[k, e * LAST, DG] = rate
+            seen[k, e * LAST, MEMBER] = who
+            copy_vector(motion.a, accelerations[k, e])
+
+
+@kernel
+def sample_inside(tag, motion, j, k, seen, accelerations):
+    """Look at step k between its ends, on the quintic through these.
+
+    tag: the method of integration (`method_interface`). motion: the finished motion. j, k: the response, the step.
+    seen (SAMPLES, 3): all samples but the first and the last are written.
+    accelerations (2, n): at both ends of the step.
+    """
+    history = motion.history
+    h = history.t[k + 1] - history.t[k]
+    restore_modes(history, history.index[k, EVENTS], motion.member_state)
+    for e in range(2):
+        copy_vector(history.state[k + e, 0], motion.ends[3 * e])
+        copy_vector(history.state[k + e, 1], motion.ends[3 * e + 1])
+        copy_vector(accelerations[e], motion.ends[3 * e + 2])
+        segment = history.index[k, SEGMENT]
+        drive_state(motion.model, segment, history.t[k + e], motion.ends[3 * e], motion.ends[3 * e + 1])
+    for i in range(1, LAST):
+        c = i / LAST
+        quintic(c, h, motion.ends, motion.q, motion.v)
+        drive_state(motion.model, history.index[k, SEGMENT], time_at(history, k, c), motion.q, motion.v)
+        value, rate, who = evaluate_here(tag, motion, j, k, c, -1)
+        seen[i, G] = value
+        seen[i, DG] = rate
+        seen[i, MEMBER] = who
+
+
+@kernel
+def has_no_peak(h, left, right, sign, limit):
+    """Whether a step in which the motion is resolved can have no peak inside that comes up to the limit.
+
+    h: its length (s). left, right (3,): samples at its ends.
+    sign: 1 for peaks of g, -1 for those of -g. limit: below which none is wanted, of sign times g.
+    """
+    a, b = sign * left[G], sign * right[G]
+    da, db = sign * left[DG], sign * right[DG]
+    uneven = abs(b - a - 0.5 * h * (da + db))
+    if MARGIN * (h * (abs(da) + abs(db)) + uneven) < limit - max(a, b):
+        return True
+    least = min(abs(da), abs(db))
+    return da * db > 0.0 and abs(db - da) <= ALIKE * least and uneven <= EVEN * h * least
+
+
+@kernel
+def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
+    """Look at every step of a motion.
+
+    Constant:
+      tag: the method of integration (`method_interface`).
+      motion: the finished motion.
+      j: the response.
+      both: whether peaks of -g are looked for, too.
+      fine: whether steps are many to a vibration, so that not all have to be looked at inside.
+      closeness: how far below the highest a peak may be, relative to it.
+    Out:
+      seen (count, SAMPLES, 3): values, rates, members; NaN inside steps that are plain.
+      plain (count,): 1 where the samples inside a step are left out.
+    """
+    accelerations = np.empty((motion.count, 2, motion.q.shape[0]))
+    sample_ends(tag, motion, j, seen, accelerations)
+    top = -np.inf
+    low = np.inf
+    for k in range(motion.count):
+        for e in range(2):
+            top = max(top, seen[k, e * LAST, G])
+            low = min(low, seen[k, e * LAST, G])
+    sparing = fine and not kinked(motion.model, j)
+    for k in range(motion.count):
+        h = motion.history.t[k + 1] - motion.history.t[k]
+        plain[k] = 0
+        if sparing:
+            left, right = seen[k, 0], seen[k, LAST]
+            up = has_no_peak(h, left, right, 1.0, top - closeness * abs(top))
+            down = not both or has_no_peak(h, left, right, -1.0, -low - closeness * abs(low))
+            plain[k] = 1 if up and down else 0
+        if plain[k] == 0:
+            sample_inside(tag, motion, j, k, seen[k], accelerations[k])
+        else:
+            seen[k, 1:LAST, :] = np.nan
+
+
+@kernel
+def add_row(rows, found, t, w, c, sample, sign):
+    """Write a row of the sample (3,) at fraction c of piece w, whose ends are at t[w] and t[w + 1]; the new count."""
+    row = rows[found]
+    row[TIME] = t[w + 1] if c >= 1.0 else t[w] + c * (t[w + 1] - t[w])
+    row[VALUE] = sample[G]
+    row[STEP] = w
+    row[FRACTION] = c
+    row[RATE] = sample[DG]
+    row[SIGN] = sign
+    row[WHO] = sample[MEMBER]
+    row[OTHER] = NOBODY
+    row[SHARE] = 0.0
+    return found + 1
+
+
+@kernel
+def evaluate_piece(tag, motion, j, who, pieces, w, c, sample):
+    """Look exactly at fraction c of piece w; without pieces of step w, at member `who` (-1: the leading one).
+
+    tag: the method of integration (`method_interface`). motion: the finished motion. j: the response.
+    pieces (P, 4): steps and fractions of them, or no rows. sample (3,): out, value, rate and member.
+    """
+    k = w
+    if pieces.shape[0] > 0:
+        k = int(pieces[w, PIECE_STEP])
+        low, high = pieces[w, PIECE_LOW], pieces[w, PIECE_HIGH]
+        c = high if c >= 1.0 else low + c * (high - low)
+        who = int(pieces[w, PIECE_MEMBER])
+    value, rate, member = evaluate_exactly(tag, motion, j, k, c, who)
+    sample[G] = value
+    sample[DG] = rate
+    sample[MEMBER] = member
+
+
+@kernel
+def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, sample):
+    """The fraction of piece w at which the rate vanishes, by Illinois' rule on the method's own motion.
+
+    tag: the method of integration (`method_interface`). motion: the finished motion. j, who: response and member.
+    pieces (P, 4), w: of `evaluate_piece`.
+    low, high: fractions between which the rate falls through zero. rise, fall: sign times the rate at them.
+    sign: 1, or -1 for peaks of -g. sample (3,): out, what is there.
+    """
+    size = max(rise, -fall)
+    side = 0
+    c = np.nan
+    last = np.nan
+    for _ in range(TRIALS):
+        c = (low * fall - high * rise) / (fall - rise)
+        if not low < c < high:
+            c = 0.5 * (low + high)
+        evaluate_piece(tag, motion, j, who, pieces, w, c, sample)
+        rate = sign * sample[DG]
+        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= 1e-13:
+            break
+        last = c
+        if rate > 0.0:
+            low = c
+            rise = rate
+            if side == -1:
+                fall *= 0.5
+            side = -1
+        else:
+            high = c
+            fall = rate
+            if side == 1:
+                rise *= 0.5
+            side = 1
+    return c
+
+
+@kernel
+def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows, found):
+    """Peaks within pieces: where the rate falls through zero between two samples.
+
+    Constant:
+      tag, motion, j, who, pieces: of `evaluate_piece`.
+    In:
+      t (P + 1,): ends of the pieces (s).
+      seen (P, SAMPLES, 3), plain (P,): samples, and where there are none inside.
+      sign: 1 for peaks of g, -1 for those of -g.
+      limit: value of sign times g below which no peak is wanted.
+      found: how many rows there are.
+    Out:
+      rows (room, COLUMNS): further ones are written.
+
+    Returns how many rows there are now.
+    """
+    sample = np.empty(3)
+    for w in range(seen.shape[0]):
+        if plain[w] != 0:
+            continue
+        width = (t[w + 1] - t[w]) / LAST
+        for i in range(LAST):
+            ga, gb = sign * seen[w, i, G], sign * seen[w, i + 1, G]
+            da, db = sign * seen[w, i, DG], sign * seen[w, i + 1, DG]
+            if not max(ga + max(da, 0.0) * width, gb + max(-db, 0.0) * width) >= limit:
+                continue
+            low, high = i / LAST, (i + 1) / LAST
+            if da * db > 0.0:  # both rates of one sign: the cubic through them may yet turn twice
+                slope = (gb - ga) / width
+                half = 3.0 * slope - 2.0 * da - db
+                square = 3.0 * (da + db - 2.0 * slope)
+                if square == 0.0 or not half * half > square * da:
+                    continue
+                split = -half / square
+                if not 0.0 < split < 1.0:
+                    continue
+                middle = low + split * (high - low)
+                evaluate_piece(tag, motion, j, who, pieces, w, middle, sample)
+                rate = sign * sample[DG]
+                if da > 0.0 and rate < 0.0:
+                    high = middle
+                    db = rate
+                elif rate > 0.0 and db < 0.0:
+                    low = middle
+                    da = rate
+                else:
+                    continue
+            elif not (da > 0.0 and db < 0.0):
+                continue
+            c = refine(tag, motion, j, who, pieces, w, low, high, da, db, sign, sample)
+            found = add_row(rows, found, t, w, c, sample, sign)
+    return found
+
+
+@kernel
+def moves_off(seen, plain, sign, size):
+    """Of a start from rest: -1 where the first sample that differs by more than rounding is lower, or none does; 1.
+
+    seen (P, SAMPLES, 3), plain (P,): samples, and where there are none inside.
+    sign: 1 for peaks of g, -1 for those of -g. size: the largest |g|.
+    """
+    first = sign * seen[0, 0, G]
+    for w in range(seen.shape[0]):
+        for i in range(SAMPLES):
+            if plain[w] != 0 and 0 < i < LAST:
+                continue
+            g = sign * seen[w, i, G]
+            if abs(g - first) > ROUNDING * size:
+                return -1.0 if g < first else 1.0
+    return -1.0
+
+
+@kernel
+def peaks_between(t, seen, plain, sign, limit, rows, found):
+    """Peaks at the ends of pieces: a rise into one, or a fall out of it.
+
+    t (P + 1,): ends of the pieces (s).
+    seen (P, SAMPLES, 3), plain (P,): samples, and where there are none inside.
+    sign: 1 for peaks of g, -1 for those of -g.
+    limit: value of sign times g below which no peak is wanted.
+    rows (room, COLUMNS), found: further rows are written; how many there are.
+
+    Returns how many rows there are now.
+    """
+    m = seen.shape[0]
+    size = 0.0
+    steepest = 0.0
+    for w in range(m):
+        for i in range(SAMPLES):
+            if plain[w] == 0 or i == 0 or i == LAST:
+                size = max(size, abs(seen[w, i, G]))
+                steepest = max(steepest, abs(seen[w, i, DG]))
+    flat = FLAT * steepest
+    behind = np.zeros(m + 1, np.int8)  # 1: the peak is on the side behind the boundary
+    for b in range(m + 1):
+        left = sign * seen[b - 1, LAST, G] if b > 0 else -np.inf
+        d_left = sign * seen[b - 1, LAST, DG] if b > 0 else 1.0
+        right = sign * seen[b, 0, G] if b < m else -np.inf
+        d_right = sign * seen[b, 0, DG] if b < m else -1.0
+        if b == 0 and d_right == 0.0:
+            d_right = moves_off(seen, plain, sign, size)
+        jump = 0 < b < m and abs(left - right) > JUMP * size
+        level_right = d_left > flat and d_right <= flat
+        level_left = d_right < -flat and d_left >= -flat
+        from_left = (
+            b > 0
+            and left >= limit
+            and d_left > 0.0
+            and (b == m or d_right <= 0.0 or level_right or (jump and right < left))
+        )
+        from_right = (
+            b < m
+            and right >= limit
+            and d_right < 0.0
+            and (b == 0 or d_left >= 0.0 or level_left or (jump and left < right))
+        )
+        # where both sides have one peak in common, it is one
+        if from_left and not (jump and right > left):
+            from_right = False
+        if from_right and jump:
+            from_left = False
+        behind[b] = 1 if from_right else 0
+        if from_left:
+            found = add_row(rows, found, t, b - 1, 1.0, seen[b - 1, LAST], sign)
+    for b in range(m):
+        if behind[b] != 0:
+            found = add_row(rows, found, t, b, 0.0, seen[b, 0], sign)
+    return found
+
+
+@kernel
+def search(tag, motion, j, who, pieces, t, seen, plain, sign, closeness, rows, found):
+    """The peaks of sign times response j that come near the highest sample.
+
+    Constant:
+      tag, motion, j, who, pieces: of `evaluate_piece`.
+    In:
+      t (P + 1,): ends of the pieces (s).
+      seen (P, SAMPLES, 3), plain (P,): samples, and where there are none inside.
+      sign: 1 for peaks of g, -1 for those of -g.
+      closeness: how far below the highest sample a peak may be, relative to it.
+      found: how many rows there are.
+    Out:
+      rows (found + (LAST + 2) (P + 1) or more, COLUMNS): further ones are written.
+
+    Returns how many rows there are now.
+    """
+    highest = -np.inf
+    w = 0
+    i = 0
+    for k in range(seen.shape[0]):
+        for s in range(SAMPLES):
+            if plain[k] == 0 or s == 0 or s == LAST:
+                g = sign * seen[k, s, G]
+                if g > highest or (np.isnan(g) and not np.isnan(highest)):
+                    highest = g
+                    w = k
+                    i = s
+    limit = highest - closeness * abs(highest)
+    before = found
+    found = peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows, found)
+    found = peaks_between(t, seen, plain, sign, limit, rows, found)
+    if found == before:  # constant
+        found = add_row(rows, found, t, w, i / LAST, seen[w, i], sign)
+        rows[before, RATE] = 0.0
+    return found
+
+
+@kernel
+def is_higher(one, other):
+    """Whether a row stands before another: the higher one, the earlier one where equal."""
+    a, b = one[SIGN] * one[VALUE], other[SIGN] * other[VALUE]
+    return a > b or (a == b and one[TIME] < other[TIME])
+
+
+@kernel
+def rank(rows, found, closeness, span, out):
+    """The rows within `closeness` of the highest, highest first, the earlier first where equal.
+
+    Peaks that are one in truth, and more only by what the method leaves of ripple over a small part of the simulated
+    time, count as one.
+
+    rows (found or more, COLUMNS): of which the first `found` are taken.
+    closeness: relative. span: the simulated time (s).
+    out (most, COLUMNS): the rows kept.
+
+    Returns how many are kept.
+    """
+    waits = np.ones(found, np.bool_)
+    kept = np.int64(0)
+    best = 0.0
+    for lap in range(found):
+        row = -1
+        for r in range(found):
+            if waits[r] and (row < 0 or is_higher(rows[r], rows[row])):
+                row = r
+        waits[row] = False
+        value = rows[row, SIGN] * rows[row, VALUE]
+        if lap == 0:
+            best = value
+        if value < best - closeness * abs(best) or kept == out.shape[0]:
+            break
+        ripple = False
+        for r in range(kept):
+            if (
+                out[r, WHO] == rows[row, WHO]
+                and out[r, SIGN] == rows[row, SIGN]
+                and abs(out[r, TIME] - rows[row, TIME]) <= RIPPLE_TIME * span
+                and abs(out[r, VALUE] - rows[row, VALUE]) <= RIPPLE * abs(best)
+            ):
+                ripple = True
+        if not ripple:
+            for i in range(COLUMNS):
+                out[kept, i] = rows[row, i]
+            kept += 1
+    return kept
+
+
+@entry
+def peaks_of_steps(
+    tag, ints, floats, tables, limits, count, room, room_ints, member_state, j, both, fine, closeness, out, work
+):
+    """The highest peaks of a response over all steps of a motion, ranked.
+
+    Constant:
+      tag: the method of integration (`method_interface`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_history`).
+    In:
+      count: number of steps.
+      room, room_ints: flat arrays of the history of steps (`carve_history`).
+      j: the response.
+      both: whether its absolute value is meant: peaks of g, and of -g.
+      fine: of `sample_steps`.
+      closeness: how far below the highest a peak may be, relative to it.
+    In place:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out:
+      out (most, COLUMNS): the rows.
+      work (WORK,): counts of work, added to.
+
+    Returns how many rows there are.
+    """
+    model = unpack_general(ints, floats)
+    history = carve_history(model, limits, room, room_ints)
+    motion = finished(model, tables, member_state, history, count, work)
+    seen = np.empty((count, SAMPLES, 3))
+    plain = np.empty(count, np.int8)
+    sample_steps(tag, motion, j, both, fine, closeness, seen, plain)
+    no_pieces = np.empty((0, 4))
+    rows = np.empty((2 * (LAST + 2) * (count + 1), COLUMNS))
+    found = np.int64(0)
+    for side in range(2 if both else 1):
+        sign = 1.0 if side == 0 else -1.0
+        found = search(tag, motion, j, -1, no_pieces, history.t, seen, plain, sign, closeness, rows, found)
+    return rank(rows, found, closeness, history.t[count] - history.t[0], out)
+
+
+@entry
+def peaks_of_pieces(
+    tag, ints, floats, tables, limits, count, room, room_ints, member_state, j, who, pieces, t, seen, sign, closeness,
+    rows, work,
+):  # fmt: skip
+    """The peaks of a response on pieces of steps that have been sampled; not ranked.
+
+    Constant:
+      tag: the method of integration (`method_interface`).
+      ints, floats: the packed scene (`pack_general`).
+      tables: coefficients of the method.
+      limits (6,): sizes of the history of steps (`carve_history`).
+    In:
+      count: number of steps.
+      room, room_ints: flat arrays of the history of steps (`carve_history`).
+      j: the response.
+      who: without pieces the member whose force is looked at; -1: at each place the one with the largest.
+      pieces (P, 4): step, fractions at its start and its end, member; no rows: the steps as they are.
+      t (P + 1,): ends of the pieces (s).
+      seen (P, SAMPLES, 3): value, rate (per s) and member at the samples.
+      sign: 1 for peaks of g, -1 for those of -g.
+      closeness: how far below the highest sample a peak may be, relative to it.
+    In place:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    Out:
+      rows ((LAST + 2) (P + 1), COLUMNS): the peaks; columns STEP and FRACTION are of pieces.
+      work (WORK,): counts of work, added to.
+
+    Returns how many there are.
+    """
+    model = unpack_general(ints, floats)
+    history = carve_history(model, limits, room, room_ints)
+    motion = finished(model, tables, member_state, history, count, work)
+    plain = np.zeros(seen.shape[0], np.int8)
+    return search(tag, motion, j, who, pieces, t, seen, plain, sign, closeness, rows, np.int64(0))
+
+
+@entry
+def rank_rows(rows, closeness, span, out):
+    """`rank` of all rows (K, COLUMNS); returns how many are written to out (most, COLUMNS)."""
+    return rank(rows, np.int64(rows.shape[0]), closeness, span, out)
