@@ -48,10 +48,11 @@ def row_of(time: float, value: float, step: float, fraction: float, rate: float,
 
 def parts(row: FloatArray) -> list[tuple[float, FloatArray]]:
     """What a row's derivative is put together from: shares, and rows of one member each; nothing where it is zero."""
-    if row[OTHER] == ZERO:
+    who = row.item(OTHER)
+    if who == ZERO:
         return []
-    if row[OTHER] == NOBODY:
+    if who == NOBODY:
         return [(1.0, row)]
-    other = row.copy()
-    other[WHO], other[OTHER] = row[OTHER], NOBODY
-    return [(1.0 - row[SHARE], row), (float(row[SHARE]), other)]
+    other, share = row.copy(), row.item(SHARE)
+    other[WHO], other[OTHER] = who, NOBODY
+    return [(1.0 - share, row), (share, other)]

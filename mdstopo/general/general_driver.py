@@ -199,10 +199,6 @@ class GeneralDriver:
         self.across[:] = 0.0
         return self.across
 
-    def evaluate_at(self, j: int, count: int, places: FloatArray, exact: bool, rates: bool = True) -> FloatArray:
-        """(K, 3) value, rate, member of response j at places (K, 2); the rate only where `rates` are wanted."""
-        return self.sample_response(j, places, exact, count, rates=rates)[2]
-
     def _grazing(self) -> int:
         """A member (padded) that grazes (`events`), so that the motion or a row found has no derivative; or -1."""
         if self.where[2] >= 0:

@@ -72,7 +72,15 @@ bundle(Motion, FIELDS)
 
 @kernel
 def finished(model, tables, member_state, history, count, work):
-    """A `Motion` of so many steps, with room for looking at it."""
+    """A `Motion`, with room for looking at it.
+
+    model: the compiled scene.
+    tables: coefficients of the method.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    history: the history of steps (`StepHistory`).
+    count: number of steps.
+    work (WORK,): counts of work, added to.
+    """
     n = model.mass.shape[0]
     n_row = model.size[0]
     return Motion(
@@ -236,7 +244,16 @@ def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
 
 @kernel
 def add_row(rows, found, t, w, c, sample, sign):
-    """Write a row of the sample (3,) at fraction c of piece w, whose ends are at t[w] and t[w + 1]; the new count."""
+    """Write a row of what is at a place of a piece.
+
+    rows (room, COLUMNS), found: row number `found` is written.
+    t (P + 1,): ends of the pieces (s).
+    w, c: the piece, and the fraction of it.
+    sample (3,): value, rate and member there.
+    sign: 1 for a peak of g, -1 for one of -g.
+
+    Returns how many rows there are now.
+    """
     row = rows[found]
     row[TIME] = t[w + 1] if c >= 1.0 else t[w] + c * (t[w + 1] - t[w])
     row[VALUE] = sample[G]

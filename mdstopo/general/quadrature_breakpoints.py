@@ -69,7 +69,7 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
     for j, name in looked:
 
         def look(places: FloatArray, j: int = j, square: bool = INTEGRALS[name] == 2) -> FloatArray:
-            value = driver.evaluate_at(j, count, places, False, rates=False)[:, 0]
+            value = driver.sample_response(j, places, False, count, rates=False)[2][:, 0]
             return value * value if square else value
 
         nothing = _rounding(driver, j, float(t[-1] - t[0]))

@@ -42,11 +42,11 @@ class RowGradients:
             (j, r, aside, share, part)
             for j, reduction in enumerate(driver.scene.reductions)
             if reduction not in INTEGRALS
-            for r in range(int(driver.found[j]))
+            for r in range(driver.found.item(j))
             for share, part in parts(driver.rows[j, r])
             for aside in range(1 if across is None or driver.shapes[j] != "norm" else 2)
         ]
-        wanted.sort(key=lambda row: (-row[4][[STEP, FRACTION]]).tolist())  # the latest first
+        wanted.sort(key=lambda row: (-row[4].item(STEP), -row[4].item(FRACTION)))  # the latest first
         for j, reduction in enumerate(driver.scene.reductions):
             if reduction not in INTEGRALS:
                 driver.gradients[j, : driver.found[j]] = 0.0
@@ -54,8 +54,9 @@ class RowGradients:
         for first in range(0, len(wanted), most):
             part = wanted[first : first + most]
             block = self._block(len(part))
-            block.which[:] = [(j, aside) for j, _, aside, _, _ in part]
-            block.rows[:] = [row for *_, row in part]
+            for m, (j, _, aside, _, row) in enumerate(part):
+                block.which[m] = j, aside
+                block.rows[m] = row
             driver.ready(
                 f"pull_rows {len(part)}", driver.entry.rows_vjp, *driver.steps_arguments(count), block.which,
                 block.rows, driver.room, driver.room_ints, driver.member_state, block.padded, block.out, block.starts,

@@ -1,0 +1,95 @@
+"""Peaks over time: none is missed, none is told twice, and steps that are left out hold none."""
+
+import numpy as np
+import pytest
+
+from mdstopo.engine import Evaluator
+from mdstopo.evaluation import Rows
+from mdstopo.general.extremes import COLUMNS, RATE, SIGN, TIME, VALUE
+from mdstopo.general.general_driver import PEAKS
+from tests.general.support import design_of
+from tests.general.test_row_sweep import CASES, IMPLICIT
+
+ALL = Rows(window=1.0, most=8)
+SOLVERS = pytest.mark.parametrize("solver", [{}, IMPLICIT], ids=["rk", "alpha"])
+
+
+def drivers(name, solver):
+    """Each load case's driver, with a finished motion, how many steps it has, and the places of what it looks at."""
+    case = CASES[name](**solver)
+    evaluator = Evaluator(case)
+    design = np.concatenate([design_of(case), case.start[case.n_design :]])
+    assert evaluator.evaluate(design, gradient=False, rows=ALL).status.ok
+    for load_case in evaluator.scenes:
+        driver = evaluator.driver(load_case)
+        code, count, _ = driver.run(evaluator.design(design), False)
+        assert code == 0
+        yield driver, count
+
+
+def rows_of(driver, j, count, both, fine, window=1.0):
+    """The peaks of a response, with steps left out inside (`fine`) or not."""
+    rows = np.zeros((8, COLUMNS))
+    found = driver.entry.peaks_of_steps(
+        driver.entry.TAG, driver.ints, driver.floats, driver.method.tables, driver.limits, count, driver.room,
+        driver.room_ints, driver.member_state, j, both, fine, window, rows, driver.work,
+    )  # fmt: skip
+    return rows[:found]
+
+
+@SOLVERS
+@pytest.mark.parametrize("name", CASES)
+def test_nothing_on_the_motion_is_higher_than_the_highest_peak(name, solver):
+    """Each step is looked at once more at 40 places of the method's own motion."""
+    fractions = np.linspace(0.0, 1.0, 41)
+    looked = 0
+    for driver, count in drivers(name, solver):
+        t = driver.states()[0][: count + 1].copy()
+        for j, reduction in enumerate(driver.scene.reductions):
+            if reduction not in PEAKS:
+                continue
+            looked += 1
+            both = PEAKS[reduction]
+            rows = rows_of(driver, j, count, both, not driver.method.kind.adaptive)
+            chosen = np.unique(np.linspace(0, count - 1, min(count, 150)).astype(int))
+            places = np.array([(k, c) for k in chosen for c in fractions])
+            seen = driver.sample_response(j, places, True, count)[2][:, 0].copy()
+            top = np.abs(seen).max() if both else seen.max()
+            best = rows[0, SIGN] * rows[0, VALUE]
+            assert best >= top - 1e-9 * max(abs(top), np.abs(seen).max())
+            # it is on the motion, at the time that is told
+            step = min(int(np.searchsorted(t, rows[0, TIME], side="right")) - 1, count - 1)
+            c = (rows[0, TIME] - t[step]) / (t[step + 1] - t[step])
+            value = driver.sample_response(j, np.array([[step, c]]), True, count)[2][0, 0]
+            before = driver.sample_response(j, np.array([[max(step - 1, 0), 1.0]]), True, count)[2][0, 0]
+            assert min(abs(value - rows[0, VALUE]), abs(before - rows[0, VALUE])) <= 1e-9 * max(abs(best), 1e-300)
+    assert looked
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_steps_that_are_left_out_hold_no_peak(name):
+    compared = 0
+    for driver, count in drivers(name, IMPLICIT):
+        for j, reduction in enumerate(driver.scene.reductions):
+            if reduction in PEAKS:
+                whole = rows_of(driver, j, count, PEAKS[reduction], False, 0.3)
+                sparing = rows_of(driver, j, count, PEAKS[reduction], True, 0.3)
+                assert np.array_equal(whole, sparing)
+                compared += 1
+    assert compared
+
+
+@SOLVERS
+@pytest.mark.parametrize("name", CASES)
+def test_inside_steps_rates_vanish_at_peaks_and_none_is_told_twice(name, solver):
+    for driver, count in drivers(name, solver):
+        for j, reduction in enumerate(driver.scene.reductions):
+            if reduction not in PEAKS:
+                continue
+            rows = rows_of(driver, j, count, PEAKS[reduction], False)
+            values = rows[:, SIGN] * rows[:, VALUE]
+            assert np.all(np.diff(values) <= 0.0)
+            assert len({(row[TIME], row[SIGN], row[6]) for row in rows}) == len(rows)
+            span = driver.scene.load_case.end - driver.scene.load_case.start
+            inside = (rows[:, 3] > 0.0) & (rows[:, 3] < 1.0)
+            assert np.all(np.abs(rows[inside, RATE]) * span <= 1e-4 * np.abs(rows[:, VALUE]).max())
