@@ -116,7 +116,13 @@ def evaluate_here(tag, motion, j, k, c, who):
 
 @kernel
 def evaluate_exactly(tag, motion, j, k, c, who):
-    """`evaluate_here` at fraction c of step k, where the method's own motion is."""
+    """Response j at fraction c of step k, on the method's own motion; returns what `evaluate_here` does.
+
+    tag: the method of integration (`method_interface`).
+    motion: the finished motion, whose state becomes the one looked at.
+    j: the response. k, c: the step, and the fraction of it.
+    who: the member whose force is looked at; -1: the one with the largest.
+    """
     go_to(
         tag, motion.model, motion.tables, motion.member_state, motion.history, motion.count, k, c, np.bool_(True), -1,
         motion.workspace, motion.ends, motion.lam, motion.q, motion.v, motion.work,
