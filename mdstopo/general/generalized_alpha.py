@@ -19,7 +19,17 @@ from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.forces import drive_state
 from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
-from mdstopo.general.locate import CUTS, TRIALS, cut_at, matters, narrowed, next_trial
+from mdstopo.general.locate import (
+    CUTS,
+    TRIALS,
+    cut_at,
+    foreseen_trial,
+    matters,
+    narrowed,
+    next_trial,
+    note_trial,
+    quintic_ends,
+)
 from mdstopo.general.members import meeting, scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
@@ -29,6 +39,7 @@ from mdstopo.integrators.generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,
+    FORCES,
     NEEDS_ROOM,
     NON_FINITE,
     OK,
@@ -87,6 +98,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     ends = np.zeros((4, n))
     guess = np.zeros((3, n))
     trial = np.zeros((4, n))
+    trials = np.zeros((2, 2))
+    curve = np.empty((6, n))
     cut = np.empty(CUTS + 1)
     beyond = np.zeros((CUTS + 1, 4, n))
     left = np.zeros((4, n))
@@ -245,8 +258,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
+                    piece = low
+                    stop = high
+                    quintic_ends(model, member_state, segment, t, piece, stop, left, beyond[top], workspace, lam, curve)
+                    work[FORCES] += 2
                     for tries in range(TRIALS):
-                        middle = next_trial(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), tries)
+                        foreseen = foreseen_trial(
+                            model, member_state, segment, t, piece, stop, curve, trials, tries, rounding, trial, rel
+                        )
+                        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
                         if middle < 0.0:
                             break
                         copy_state(state, kept)
@@ -259,6 +279,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             return code, count, events, t
                         relative_pose(model.pair, model.home, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, member_state, rel)
+                        note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
                         )

@@ -2,13 +2,23 @@
 
 First it has to be known that one does: members that come and go within a step show it at neither end. Looking at the
 cubic through both ends tells where they might; there the step is cut, and both pieces are looked at in the same way,
-until nothing is doubtful. Then the root is bracketed and closed in on.
+until nothing is doubtful. Then the root is bracketed and closed in on. Each trial is a step of its own, a dozen sums of
+forces; so the first is where the quintic through both ends has the root, the second is put right by how far the margin
+there is from the quintic's, and further ones are secants of trials, which are near each other. Where that leads out of
+the bracket, or takes long, Illinois' rule takes over.
 """
 
+import numpy as np
+
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.events import block_of
+from mdstopo.general.accelerations import solve_accelerations
+from mdstopo.general.dense_output import quintic
+from mdstopo.general.events import block_of, smallest_margin
+from mdstopo.general.forces import drive_state
 from mdstopo.general.members import stretch_of
+from mdstopo.general.step_history import copy_vector
 from mdstopo.mechanics.contact import contact_grazes
+from mdstopo.mechanics.geometry import relative_pose
 from mdstopo.mechanics.laws.table import law_grazes
 
 #: trials of the moment of one event
@@ -17,23 +27,169 @@ TRIALS = 100
 CUTS, EDGE = 24, 1e-7
 #: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
 NEAR, AIM = 50.0, 5.0
+#: trials that are foreseen; evaluations of the quintic's margin for its root, and how near that is found; by which
+#: share of the piece its rate is differenced
+FORESEEN, LAPS, CLOSE, BESIDE = 8, 40, 1e-9, 1e-4
 
 
 @kernel
-def next_trial(low, high, at_low, at_high, rounding, resolution, tries):
+def quintic_ends(model, member_state, segment, t, low, high, left, right, workspace, lam, ends):
+    """What the quintic through both ends of a piece of a step is made of.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time at the start of the step (s).
+      low, high: where the piece begins and ends, from there (s).
+      left, right (2 or more, n): coordinates and velocities at its ends.
+    Out:
+      ends (6, n): coordinates, velocities, accelerations at its start, then at its end.
+      workspace: workspace of a balance (`accelerations.Workspace`).
+      lam (n_row,): scratch.
+    """
+    for e in range(2):
+        state = left if e == 0 else right
+        copy_vector(state[0], ends[3 * e])
+        copy_vector(state[1], ends[3 * e + 1])
+        solve_accelerations(
+            model, member_state, segment, t + (low if e == 0 else high), ends[3 * e], ends[3 * e + 1], np.bool_(False),
+            workspace, ends[3 * e + 2], lam,
+        )  # fmt: skip
+
+
+@kernel
+def foreseen_margin(model, member_state, segment, t, low, high, ends, c, room, rel):
+    """The smallest margin on the quintic through both ends of a piece (`quintic_ends`).
+
+    model: the compiled scene.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    segment: number of the stretch of time between two breakpoints.
+    t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
+    ends (6, n): of the quintic.
+    c: fraction of the piece.
+    room (2, n), rel (n_pair, POSE): overwritten.
+    """
+    quintic(c, high - low, ends, room[0], room[1])
+    drive_state(model, segment, t + low + c * (high - low), room[0], room[1])
+    relative_pose(model.pair, model.home, room[0], room[1], rel)
+    margin, _ = smallest_margin(model, segment, member_state, rel)
+    return margin
+
+
+@kernel
+def foreseen_root(model, member_state, segment, t, low, high, ends, room, rel):
+    """Where in a piece of a step the quintic's smallest margin falls through zero, or -1: it does not.
+
+    model: the compiled scene.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    segment: number of the stretch of time between two breakpoints.
+    t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
+    ends (6, n): of the quintic (`quintic_ends`).
+    room (2, n), rel (n_pair, POSE): overwritten.
+
+    Returns a length of the step (s).
+    """
+    a = 0.0
+    b = 1.0
+    at_a = foreseen_margin(model, member_state, segment, t, low, high, ends, a, room, rel)
+    at_b = foreseen_margin(model, member_state, segment, t, low, high, ends, b, room, rel)
+    if not at_b < 0.0:
+        return -1.0
+    if at_a < -1e-3 * at_b:  # the piece begins on the switch of a member that has just left it: half-way first
+        at_a = -at_b
+    side = 0
+    c = b
+    for _ in range(LAPS):
+        c = (a * at_b - b * at_a) / (at_b - at_a)
+        if not a < c < b:
+            c = 0.5 * (a + b)
+        if b - a <= CLOSE:
+            break
+        value = foreseen_margin(model, member_state, segment, t, low, high, ends, c, room, rel)
+        if value < 0.0:
+            if b - c <= CLOSE and side == 1:
+                break
+            b = c
+            at_b = value
+            if side == 1:
+                at_a *= 0.5
+            side = 1
+        else:
+            if c - a <= CLOSE and side == -1:
+                break
+            a = c
+            at_a = value
+            if side == -1:
+                at_b *= 0.5
+            side = -1
+    return low + c * (high - low)
+
+
+@kernel
+def foreseen_trial(model, member_state, segment, t, low, high, ends, trials, tries, rounding, room, rel):
+    """Where the next trial is to be by what the quintic and the trials so far foresee, or -1: nowhere.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
+      ends (6, n): of the quintic (`quintic_ends`).
+      trials (2, 2): length of the step (s) and smallest margin of the last trial and of the one before.
+      tries: how many trials there have been.
+      rounding: what rounding leaves of a margin.
+    Out:
+      room (2, n), rel (n_pair, POSE): overwritten.
+
+    Returns a length of the step (s).
+    """
+    if tries == 0:
+        return foreseen_root(model, member_state, segment, t, low, high, ends, room, rel)
+    if tries >= FORESEEN:
+        return -1.0
+    last = trials[0, 0]
+    over = trials[0, 1] + AIM * rounding
+    if tries == 1:
+        c = min(max((last - low) / (high - low), BESIDE), 1.0 - BESIDE)
+        ahead = foreseen_margin(model, member_state, segment, t, low, high, ends, c + BESIDE, room, rel)
+        behind = foreseen_margin(model, member_state, segment, t, low, high, ends, c - BESIDE, room, rel)
+        rate = (ahead - behind) / (2.0 * BESIDE * (high - low))
+    else:
+        apart = last - trials[1, 0]
+        rate = (trials[0, 1] - trials[1, 1]) / apart if apart != 0.0 else 0.0
+    return last - over / rate if rate < 0.0 else -1.0
+
+
+@kernel
+def note_trial(trials, middle, value):
+    """trials (2, 2): the last one, at a length `middle` (s) with a margin, before the one that was the last."""
+    for i in range(2):
+        trials[1, i] = trials[0, i]
+    trials[0, 0] = middle
+    trials[0, 1] = value
+
+
+@kernel
+def next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries):
     """Where within a step to try next for the moment at which a margin vanishes; -1 where `high` is near enough.
 
-    It is the secant through both ends, aimed behind the switch by more than rounding; after many trials every other one
-    is a bisection.
+    It is where it is foreseen, if that is between the ends; else the secant through both ends, aimed behind the switch
+    by more than rounding; after many trials every other one is a bisection.
 
     low, high: lengths of the step between which it happens (s).
     at_low, at_high: the smallest margins there; at_high is negative.
+    foreseen: a length of the step, or -1.
     rounding: what rounding leaves of a margin.
     resolution: lengths that differ by no more than this are the same (s).
     tries: how many trials there have been.
     """
     if high - low <= resolution or at_high >= -NEAR * rounding:
         return -1.0
+    if low < foreseen < high:
+        return foreseen
     aim = AIM * rounding
     middle = (low * (at_high + aim) - high * (at_low + aim)) / (at_high - at_low)
     if (tries > 15 and tries % 2 == 0) or middle <= low or middle >= high:

@@ -13,7 +13,17 @@ from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
 from mdstopo.general.forces import drive_state, pose_acceleration
-from mdstopo.general.locate import CUTS, TRIALS, cut_at, matters, narrowed, next_trial
+from mdstopo.general.locate import (
+    CUTS,
+    TRIALS,
+    cut_at,
+    foreseen_trial,
+    matters,
+    narrowed,
+    next_trial,
+    note_trial,
+    quintic_ends,
+)
 from mdstopo.general.members import meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
@@ -327,6 +337,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     push = np.zeros((2, n_row))
     ends = np.empty((2, n))
     trial = np.empty((2, n))
+    trials = np.zeros((2, 2))
+    curve = np.empty((6, n))
     cut = np.empty(CUTS + 1)
     beyond = np.empty((CUTS + 1, 2, n))
     left = np.empty((2, n))
@@ -554,8 +566,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
+                    begin = low
+                    stop = high
+                    quintic_ends(model, member_state, segment, t, begin, stop, left, beyond[top], workspace, lam, curve)
+                    work[FORCES] += 2
                     for tries in range(TRIALS):
-                        middle = next_trial(low, high, at_low, at_high, rounding, 4e-16 * (abs(t) + h), tries)
+                        foreseen = foreseen_trial(
+                            model, member_state, segment, t, begin, stop, curve, trials, tries, rounding, trial, rel
+                        )
+                        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
                         if middle < 0.0:
                             break
                         advance(
@@ -564,6 +583,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         )  # fmt: skip
                         relative_pose(pair, model.home, trial[0], trial[1], rel)
                         value, who = smallest_margin(model, segment, member_state, rel)
+                        note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
                         )

@@ -5,6 +5,7 @@ import pytest
 
 import mdstopo
 from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
 from tests.general.support import load, simulate_text
 
 FALL = """
@@ -146,3 +147,15 @@ objectives: {F: {response: {member_force: {group: act}}, over_time: max}}
     motion = simulate_text(text, tolerance=1e-11)
     reached = np.sqrt(2.0 * 0.47 / 3.0)
     assert motion.at([reached]).q[0, 1] == pytest.approx(1.47, abs=1e-9)
+
+
+def test_the_moment_of_an_event_takes_few_trials():
+    """A trial is a step of twelve balances; the quintic through both ends of a step foresees the moment."""
+    evaluator = Evaluator(load("bouncing"))
+    motion = evaluator.trajectory(evaluator.case.start, "default")
+    happened = evaluator.driver("default").events
+    assert motion.status.ok
+    assert happened >= 10
+    steps = motion.work["steps"] + motion.work["rejected_steps"]
+    # the step that was too long, cuts where something may come and go, trials, and balances about the event
+    assert motion.work["force_sums"] <= 12 * steps + happened * (8 * 12 + 4)
