@@ -7,7 +7,7 @@ import numpy as np
 from mdstopo.case.model import Case
 from mdstopo.compiler.jit import entry
 from mdstopo.engine import Evaluator
-from mdstopo.mechanics.geometry import relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, scale_members
 from mdstopo.scene.packing import pack, unpack
 

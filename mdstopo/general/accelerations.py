@@ -29,7 +29,6 @@ from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
-from mdstopo.mechanics.geometry import POSE, turned_from
 from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.table import (
     joint_acceleration_slopes,
@@ -38,6 +37,7 @@ from mdstopo.mechanics.joints.table import (
     joint_rows,
     joint_stiffness,
 )
+from mdstopo.mechanics.kinematics.planar_poses import POSE, turned_from
 from mdstopo.mechanics.passes import SUMS
 
 #: what the solution at one state needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope

@@ -19,7 +19,7 @@ from mdstopo.mechanics.contact import (
     contact_margin_slopes,
     contact_next,
 )
-from mdstopo.mechanics.geometry import turned_body
+from mdstopo.mechanics.kinematics.planar_poses import turned_body
 
 
 @kernel

@@ -21,9 +21,9 @@ from mdstopo.general.contact import contact_switch
 from mdstopo.general.members import direction, stretch_of, stretched
 from mdstopo.general.model import INERTER
 from mdstopo.integrators.generalized_alpha_linear import hermite
-from mdstopo.integrators.steps import deflection
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
-from mdstopo.mechanics.geometry import relative_pose, turned_body
+from mdstopo.mechanics.kinematics.planar_poses import relative_pose, turned_body
+from mdstopo.mechanics.kinematics.planar_scales import deflection
 from mdstopo.mechanics.laws.spring import elongation_of
 from mdstopo.mechanics.laws.table import (
     law_grazes,

@@ -10,9 +10,9 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
-from mdstopo.integrators.steps import (
-    FORCES,
-    TURN,
+from mdstopo.integrators.steps import FORCES, TURN
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_scales import (
     add_gross_force,
     deflection,
     gross_loads,
@@ -21,7 +21,6 @@ from mdstopo.integrators.steps import (
     noise_of,
     rounding_of_pairs,
 )
-from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.laws.table import law_is_given, law_unstretched
 
 #: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,

@@ -15,8 +15,8 @@ from mdstopo.general.members import general_sums
 from mdstopo.general.model import INERTER
 from mdstopo.general.switches import APART, DAMPED
 from mdstopo.mechanics.angles import small_turn
-from mdstopo.mechanics.assembly import add_loads, load_tangent, pair_tangent
-from mdstopo.mechanics.geometry import add_pair_force, fill_pose, turned_body
+from mdstopo.mechanics.kinematics.planar_forces import add_loads, load_tangent, pair_tangent
+from mdstopo.mechanics.kinematics.planar_poses import add_pair_force, fill_pose, turned_body
 from mdstopo.mechanics.passes import FIRST_TANGENT, SUMS
 
 
@@ -29,7 +29,7 @@ def turn_bodies(q, turned):
 
 @part
 def turned_pose(model, p, turned, q, v, rel):
-    """`mechanics.geometry.relative_pose` of one pair, of bodies that are turned by `turn_bodies`.
+    """`planar_poses.relative_pose` of one pair, of bodies that are turned by `turn_bodies`.
 
     Constant:
       model: the compiled scene.

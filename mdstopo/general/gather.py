@@ -12,7 +12,7 @@ from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.switches import carriers
 from mdstopo.integrators.steps import DESIGN
-from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.alike import elastic_designs
 from mdstopo.mechanics.laws.table import SPRING, law
 

@@ -46,9 +46,9 @@ from mdstopo.integrators.steps import (
     SINGULAR,
     STEP_LIMIT,
     STEP_TOO_SMALL,
-    deflection,
 )
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_scales import deflection
 
 TAG = (0, 0)
 

@@ -9,18 +9,8 @@ from mdstopo.general.projection import project
 from mdstopo.general.step_history import copy_vector, keep_stage
 from mdstopo.integrators.gauss_equations import CLOSELY, fastest_rate
 from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
-from mdstopo.integrators.steps import (
-    FORCES,
-    NEWTON,
-    NEWTON_FAILED,
-    NON_FINITE,
-    OK,
-    SINGULAR,
-    TANGENTS,
-    deflection,
-    motion_weights,
-    noise_of,
-)
+from mdstopo.integrators.steps import FORCES, NEWTON, NEWTON_FAILED, NON_FINITE, OK, SINGULAR, TANGENTS
+from mdstopo.mechanics.kinematics.planar_scales import deflection, motion_weights, noise_of
 
 
 @kernel

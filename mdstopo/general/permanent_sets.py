@@ -21,7 +21,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.events import member_rows
 from mdstopo.general.members import direction, stretched
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
-from mdstopo.mechanics.geometry import POSE, pair_displacement, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     FREE_LENGTH,

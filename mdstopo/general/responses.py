@@ -19,13 +19,13 @@ from mdstopo.general.forces import inerter_force
 from mdstopo.general.method_interface import beside, derivatives
 from mdstopo.general.model import INERTER, GeneralModel
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
-from mdstopo.mechanics.geometry import add_pair_force, turned_body
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
 from mdstopo.mechanics.joints.table import FORCE, MOMENT, joint_transmitted
+from mdstopo.mechanics.kinematics.planar_points import ACROSS as ACROSS_MOTION
+from mdstopo.mechanics.kinematics.planar_points import NORM, X, Y, angle_response, point_response
+from mdstopo.mechanics.kinematics.planar_poses import add_pair_force, turned_body
 from mdstopo.mechanics.laws.table import law
-from mdstopo.responses.kinematics import ACROSS as ACROSS_MOTION
-from mdstopo.responses.kinematics import NORM, X, Y, angle_response, point_response
 
 #: the kernels of responses by their code, column KIND of `GeneralModel.response`; `code_of` fills it
 LISTED: Listed[ResponseKernels] = Listed()

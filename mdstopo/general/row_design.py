@@ -16,7 +16,7 @@ from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.switches import carriers
 from mdstopo.integrators.steps import DESIGN
-from mdstopo.mechanics.geometry import POSE, copy_rows, pair_displacement
+from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, pair_displacement
 from mdstopo.mechanics.laws.alike import alike_designs, elastic_designs_of_rows
 from mdstopo.mechanics.laws.table import FREE_LENGTH, SPRING, law
 

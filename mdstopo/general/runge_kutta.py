@@ -54,11 +54,9 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     TURN,
-    deflection,
-    largest_turn,
-    motion_weights,
 )
-from mdstopo.mechanics.geometry import POSE, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_scales import deflection, largest_turn, motion_weights
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own.

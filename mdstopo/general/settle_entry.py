@@ -9,7 +9,7 @@ from mdstopo.general.forces import drive_state, general_forces
 from mdstopo.general.members import scale_general, set_modes
 from mdstopo.general.model import INERTER, unpack_general
 from mdstopo.general.parameters import parameter_slopes
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.laws.table import FREE_LENGTH
 
 

@@ -20,7 +20,7 @@ from mdstopo.general.step_history import has_factors, mass_of
 from mdstopo.general.switches import DAMPED
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.mechanics.geometry import copy_rows
+from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 #: change of a sweep of the iterative method, relative, at which it has settled
 SETTLED = 1e-12

@@ -47,20 +47,23 @@ from mdstopo.integrators.steps import (
     add_preloads,
     carve,
     copy_tangents,
-    deflection,
-    gross_loads,
     keep_stage,
     keep_state,
-    largest_turn,
     lasting,
-    motion_weights,
-    noise_of,
-    rounding_of_pairs,
     solved_to,
 )
 from mdstopo.mechanics.active_members import active_members
-from mdstopo.mechanics.assembly import add_loads, forces
-from mdstopo.mechanics.geometry import DX, DY, POSE, copy_rows, relative_pose
+from mdstopo.mechanics.assembly import forces
+from mdstopo.mechanics.kinematics.planar_forces import add_loads
+from mdstopo.mechanics.kinematics.planar_poses import DX, DY, POSE, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_scales import (
+    deflection,
+    gross_loads,
+    largest_turn,
+    motion_weights,
+    noise_of,
+    rounding_of_pairs,
+)
 from mdstopo.mechanics.passes import K_XX, K_YY, STORED, SUMS, scale_members
 from mdstopo.mechanics.single_precision import may_use_single_precision, single_precision_forces
 from mdstopo.scene.packing import unpack

@@ -38,16 +38,18 @@ from mdstopo.integrators.steps import (
     STEP_TOO_SMALL,
     TANGENTS,
     add_preloads,
-    deflection,
-    gross_loads,
     keep_stage,
     keep_state,
+)
+from mdstopo.mechanics.assembly import forces
+from mdstopo.mechanics.kinematics.planar_poses import POSE
+from mdstopo.mechanics.kinematics.planar_scales import (
+    deflection,
+    gross_loads,
     motion_weights,
     noise_of,
     rounding_of_pairs,
 )
-from mdstopo.mechanics.assembly import forces
-from mdstopo.mechanics.geometry import POSE
 from mdstopo.mechanics.passes import K_XX, K_YY, STORED, SUMS
 
 AlphaSteps = namedtuple("AlphaSteps", FIELDS)  # type: ignore[misc]

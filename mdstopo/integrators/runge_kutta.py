@@ -29,19 +29,21 @@ from mdstopo.integrators.steps import (
     TURN,
     add_preloads,
     carve,
-    deflection,
-    gross_loads,
     keep_stage,
     keep_state,
-    largest_turn,
     lasting,
+)
+from mdstopo.mechanics.active_members import active_members
+from mdstopo.mechanics.assembly import forces
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_scales import (
+    deflection,
+    gross_loads,
+    largest_turn,
     motion_weights,
     noise_of,
     rounding_of_pairs,
 )
-from mdstopo.mechanics.active_members import active_members
-from mdstopo.mechanics.assembly import forces
-from mdstopo.mechanics.geometry import POSE, relative_pose
 from mdstopo.mechanics.passes import STORED, SUMS, member_sums, scale_members, springs_of
 from mdstopo.scene.model import DESIGN, PAIR, SCALED_STIFFNESS, START, STOP
 from mdstopo.scene.packing import unpack

@@ -13,7 +13,7 @@ from mdstopo.mechanics.assembly import (
     subtract_products,
     subtract_transposed,
 )
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.passes import SUMS
 
 

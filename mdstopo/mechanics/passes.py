@@ -11,8 +11,8 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.threads import shared, taken
 from mdstopo.compiler.vector import lanes, load, store
-from mdstopo.mechanics.geometry import POSE, copy_rows, pair_displacement, relative_pose
 from mdstopo.mechanics.grids import design_grid, sum_grid
+from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, pair_displacement, relative_pose
 from mdstopo.mechanics.laws.spring import (
     elastic_design,
     elastic_force,

@@ -4,7 +4,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.mechanics.assembly import forces
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.passes import SUMS
 from mdstopo.scene.packing import unpack
 

@@ -6,7 +6,7 @@ Along the motion dg/dt = sum over pairs of E_xi . xi', and dg/dq = T^T E_xi: bot
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.geometry import VT, VX, VY, add_pair_force, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import VT, VX, VY, add_pair_force, relative_pose
 from mdstopo.mechanics.passes import SLOPE_T, SLOPE_X, SLOPE_Y, STORED, member_sums
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.integrators.steps import ENERGY, ENERGY_RATE, FIRST, step_at
 from mdstopo.integrators.steps_interface import point_of, sample
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, member_sums, springs_of
 from mdstopo.responses.energy import energy_at, energy_of
 

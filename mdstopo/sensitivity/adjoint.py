@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.compiler.jit import part
 from mdstopo.integrators.steps import ENERGY, FIRST, Q, V
 from mdstopo.integrators.steps_interface import carried, parent_of, reach, reverse_step, stage_weights
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks

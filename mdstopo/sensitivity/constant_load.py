@@ -11,8 +11,8 @@ dropped. An approximation; the paper's Figure 6 shows how far it carries.
 import numpy as np
 
 from mdstopo.compiler.jit import entry
-from mdstopo.mechanics.assembly import pair_tangents
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_forces import pair_tangents
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.passes import (
     SUMS,
     design_gradient,

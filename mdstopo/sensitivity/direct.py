@@ -10,7 +10,7 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.integrators.steps import FIRST, Q, V, carve
 from mdstopo.integrators.steps_interface import carried, parent_of, reach, stage_weights, steps_of
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, energy_gradient, springs_of, unscale_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.scene.packing import unpack

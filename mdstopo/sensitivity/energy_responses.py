@@ -10,24 +10,12 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, part
 from mdstopo.integrators.gauss import TAG as GAUSS
-from mdstopo.integrators.steps import (
-    ENERGY,
-    FIRST,
-    FORCES,
-    SEGMENT,
-    SPRINGS,
-    TIME,
-    Q,
-    V,
-    carve,
-    deflection,
-    solved_to,
-    step_at,
-)
+from mdstopo.integrators.steps import ENERGY, FIRST, FORCES, SEGMENT, SPRINGS, TIME, Q, V, carve, solved_to, step_at
 from mdstopo.integrators.steps_interface import point_of, steps_of
 from mdstopo.mechanics.active_members import active_members
-from mdstopo.mechanics.assembly import add_loads
-from mdstopo.mechanics.geometry import POSE, add_pair_force, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_forces import add_loads
+from mdstopo.mechanics.kinematics.planar_poses import POSE, add_pair_force, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_scales import deflection
 from mdstopo.mechanics.laws.spring import elongation_of, meeting_in, passing_in, shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUM_T, SUM_X, SUM_Y, SUMS, member_sums, springs_of, unscale_gradient

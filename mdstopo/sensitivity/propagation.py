@@ -14,7 +14,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, member_kernel
 from mdstopo.integrators.steps import FIRST
 from mdstopo.integrators.steps_interface import carried, tangent_step
-from mdstopo.mechanics.geometry import POSE, add_pair_force, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, add_pair_force, relative_pose
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
 from mdstopo.scene.model import DAMPING, DESIGN, EXCESS, KIND, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, STOP
 

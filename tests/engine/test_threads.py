@@ -8,7 +8,7 @@ from mdstopo.compiler.kernel import numba as with_kernels
 from mdstopo.compiler.threads import VARIABLE
 from mdstopo.engine import Evaluator
 from mdstopo.mechanics import passes
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.scene.model import CHUNK, MANY
 from mdstopo.scene.packing import pack, unpack
 from tests.engine.scenes import read

@@ -11,7 +11,7 @@ from mdstopo.general.compile import compile_general
 from mdstopo.general.first_step import FIRST, PROBES, first_step
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.integrators.steps import FORCES, TURN, WORK
-from mdstopo.mechanics.geometry import POSE, relative_pose
+from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 
 #: a mass on a spring, kicked or pushed
 SWING = """

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mdstopo.compiler.kernel import numba as with_vectors
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.laws import alike
 from mdstopo.mechanics.passes import SUMS
 

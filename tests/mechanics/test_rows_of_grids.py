@@ -7,7 +7,7 @@ import pytest
 from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.compiler.threads import shared
 from mdstopo.engine import Evaluator
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.laws.spring import shortest_in
 from mdstopo.mechanics.laws.spring_grid import grid_shortest
 from mdstopo.mechanics.passes import SUMS, _scale_chunks, _unscale_chunks, member_sums

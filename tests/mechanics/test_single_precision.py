@@ -6,7 +6,7 @@ import pytest
 
 from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.engine import Evaluator
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.passes import SUMS, member_sums
 from mdstopo.mechanics.single_precision import may_use_single_precision, single_precision_sums
 from mdstopo.scene import compile as scenes

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mdstopo.compiler.kernel import numba as with_vectors
-from mdstopo.mechanics.geometry import POSE
+from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.laws import spring
 
 with_vectors()

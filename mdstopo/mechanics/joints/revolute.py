@@ -4,8 +4,8 @@ Parameters: s_A (2), s_B (2), -, -, -, -, Phi at home (2). Used by the fixed joi
 """
 
 from mdstopo.compiler.jit import part
-from mdstopo.mechanics.geometry import turned_body
 from mdstopo.mechanics.joints.kernels import AtHome, JointKernels
+from mdstopo.mechanics.kinematics.planar_poses import turned_body
 
 #: places of w: x, y of a body and by what angle it has turned since home, for both; cos and sin of both angles psi;
 #: then what has changed since home: x and y of both, cos and sin of both
