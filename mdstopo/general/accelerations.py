@@ -18,18 +18,20 @@ from typing import Any
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.forces import (
-    add_inerter_tangents,
-    add_inerters,
-    drive_acceleration,
-    drive_state,
-    general_forces,
-)
+from mdstopo.general.forces import add_inerters, add_tangents_of_inerters, general_forces
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
+from mdstopo.general.model import JOINT_CODE, JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
+from mdstopo.general.strides import (
+    first_freedom,
+    pair_freedoms,
+    place_in_joint,
+    place_in_pair,
+    place_of_turn,
+    sums_size,
+)
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
-from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.table import (
     joint_acceleration_slopes,
     joint_gamma,
@@ -37,10 +39,20 @@ from mdstopo.mechanics.joints.table import (
     joint_rows,
     joint_stiffness,
 )
-from mdstopo.mechanics.kinematics.planar_poses import POSE, turned_from
-from mdstopo.mechanics.passes import SUMS
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    attitude,
+    drive_acceleration,
+    drive_state,
+    freedoms,
+    joint_places,
+    most_rows,
+    place_joint,
+    point_joint_vjp,
+    pose_size,
+    rotations,
+)
 
-#: what the solution at one state needs and leaves: cos and sin of angles, relative poses, sums, forces, K, C, slope
+#: what the solution at one state needs and leaves: attitudes, relative poses, sums, forces, K, C, slope
 #: of turning loads, inerters' mass; of the joints Phi, Phi_q, gamma, G_q, G_v; the banded matrix with its pivots,
 #: right side and the scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix
 #: the inverse masses, by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own
@@ -68,30 +80,32 @@ def make_workspace(model):
     n_pair = model.pair.shape[0]
     n_joint = model.joint.shape[0]
     total = model.place.shape[0]
+    both = pair_freedoms(model)
+    rows = most_rows(model)
     return Workspace(
-        np.zeros((n // 3, 2)),
-        np.zeros((n_pair, POSE)),
-        np.zeros((n_pair, SUMS)),
+        np.zeros((model.home.shape[0], attitude(model))),
+        np.zeros((n_pair, pose_size(model))),
+        np.zeros((n_pair, sums_size(model))),
         np.zeros(n),
-        np.zeros((n_pair, 6, 6)),
-        np.zeros((n_pair, 6, 6)),
-        np.zeros(n),
-        np.zeros((n_pair, 6, 6)),
-        np.zeros((n_joint, 3)),
-        np.zeros((n_joint, 3, 6)),
-        np.zeros((n_joint, 3)),
-        np.zeros((n_joint, 3, 6)),
-        np.zeros((n_joint, 3, 6)),
+        np.zeros((n_pair, both, both)),
+        np.zeros((n_pair, both, both)),
+        np.zeros((n, rotations(model))),
+        np.zeros((n_pair, both, both)),
+        np.zeros((n_joint, rows)),
+        np.zeros((n_joint, rows, both)),
+        np.zeros((n_joint, rows)),
+        np.zeros((n_joint, rows, both)),
+        np.zeros((n_joint, rows, both)),
         np.empty((total, 3 * model.size[1] + 1)),
         np.zeros(total, np.int64),
         np.zeros(total),
         np.ones(total),
         inverse_masses(model),
         spread_masses(model),
-        np.zeros((n_joint, 3, 6)),
+        np.zeros((n_joint, rows, both)),
         np.zeros(model.size[3]),
         np.ones((2, model.size[0])),
-        np.zeros((4, PLACES)),
+        np.zeros((4, joint_places(model))),
         np.zeros(n),
         carriers(model),
         switches_of(model),
@@ -100,27 +114,19 @@ def make_workspace(model):
 
 @part
 def gather(model, j, x, out):
-    """out (6,) = the entries of x (n,) of the two bodies of joint j."""
-    a = 3 * model.joint[j, 1]
-    b = 3 * model.joint[j, 2]
-    for i in range(3):
+    """out (2 D,) = the entries of x (n,) of the two bodies of joint j."""
+    each = freedoms(model)
+    a = first_freedom(model, model.joint[j, JOINT_FIRST])
+    b = first_freedom(model, model.joint[j, JOINT_SECOND])
+    for i in range(each):
         out[i] = x[a + i]
-        out[3 + i] = x[b + i]
-
-
-@part
-def gather_turned(model, j, q, turned, w):
-    """w (PLACES,) of joint j from q (n,) and the turns of `forces.turn_bodies`."""
-    one = model.joint[j, 1]
-    two = model.joint[j, 2]
-    turns_one = turned_from(model.home, one, turned[one, 0], turned[one, 1])
-    place_turned(model.home, one, two, q, turns_one, turned_from(model.home, two, turned[two, 0], turned[two, 1]), w)
+        out[each + i] = x[b + i]
 
 
 @part
 def gather_multipliers(model, j, lam, out):
-    """out (3,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
-    for r in range(3):
+    """out (rows,) = multipliers of joint j from lam (n_row,); 0 for rows that are left out."""
+    for r in range(most_rows(model)):
         i = model.row[j, r]
         out[r] = lam[i] if i >= 0 else 0.0
 
@@ -131,10 +137,10 @@ def joint_state(model, q, v, workspace):
     w = workspace.own[0]
     wd = workspace.own[1]
     for j in range(model.joint.shape[0]):
-        gather_turned(model, j, q, workspace.turned, w)
+        place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
-        joint_rows(model.joint[j, 0], model.joint_par[j], w, workspace.phi[j], workspace.jac[j])
-        joint_gamma(model.joint[j, 0], model.joint_par[j], w, wd, workspace.gamma[j])
+        joint_rows(model.joint[j, JOINT_CODE], model.joint_par[j], w, workspace.phi[j], workspace.jac[j])
+        joint_gamma(model.joint[j, JOINT_CODE], model.joint_par[j], w, wd, workspace.gamma[j])
 
 
 @kernel
@@ -153,14 +159,14 @@ def joint_slopes(model, q, v, a, lam, workspace):
     wdd = workspace.own[2]
     mine = workspace.own[3]
     for j in range(model.joint.shape[0]):
-        gather_turned(model, j, q, workspace.turned, w)
+        place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
-        code = model.joint[j, 0]
+        code = model.joint[j, JOINT_CODE]
         par = model.joint_par[j]
         joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
-        joint_stiffness(code, par, w, mine, workspace.k[model.joint[j, 3]])
+        joint_stiffness(code, par, w, mine, workspace.k[model.joint[j, JOINT_PAIR]])
 
 
 @kernel
@@ -169,9 +175,9 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
 
     Constant:
       model: the compiled scene.
-      k, c (n_pair, 6, 6): stiffness and damping of the balance; read where a weight is not zero, as turn is.
-      turn (n,): slopes of the turning loads by the angles of their bodies.
-      mass (n_pair, 6, 6): mass of the inerters (kg, kg m, kg m^2).
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance; read where a weight is not zero, as turn is.
+      turn (n, T): slopes of the turning loads by the turns of their bodies.
+      mass (n_pair, 2 D, 2 D): mass of the inerters (kg, kg m, kg m^2).
       w_q, w_v: weights of K with G_q (s^2), and of C with G_v (s).
       transposed: whether the transpose is meant.
     In and out:
@@ -203,11 +209,11 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
     for d in range(n):
         scale[model.place[d]] = 1.0 / np.sqrt(model.mass[d]) if model.free[d] != 0 else 1.0
     for j in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             if model.row[j, r] >= 0:
                 size = 0.0
-                for i in range(6):
-                    column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                for i in range(pair_freedoms(model)):
+                    column = place_in_joint(model, j, i)
                     if model.free[column] != 0:
                         size += workspace.jac[j, r, i] ** 2 / model.mass[column]
                 scale[model.place[n + model.row[j, r]]] = 1.0 / np.sqrt(size) if size > 0.0 else 1.0
@@ -215,16 +221,17 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
         p = model.place[d]
         band[p, half] = 1.0
         if tangent and model.free[d] != 0:
-            angle = d - d % 3 + 2
-            if model.free[angle] != 0 and turn[d] != 0.0:
-                put(band, half, scale, p, model.place[angle], -w_q * turn[d], transposed)
+            for r in range(rotations(model)):
+                angle = place_of_turn(model, d, r)
+                if model.free[angle] != 0 and turn[d, r] != 0.0:
+                    put(band, half, scale, p, model.place[angle], -w_q * turn[d, r], transposed)
     for p in range(model.pair.shape[0]):
-        for i in range(6):
-            row = 3 * model.pair[p, i // 3] + i % 3
+        for i in range(pair_freedoms(model)):
+            row = place_in_pair(model, p, i)
             if model.free[row] == 0:
                 continue
-            for j in range(6):
-                column = 3 * model.pair[p, j // 3] + j % 3
+            for j in range(pair_freedoms(model)):
+                column = place_in_pair(model, p, j)
                 if model.free[column] == 0:
                     continue
                 value = mass[p, i, j]
@@ -235,13 +242,13 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
                 if value != 0.0:
                     put(band, half, scale, model.place[row], model.place[column], value, transposed)
     for j in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             own = model.row[j, r]
             if own < 0:
                 continue
             at = model.place[n + own]
-            for i in range(6):
-                column = 3 * model.joint[j, 1 + i // 3] + i % 3
+            for i in range(pair_freedoms(model)):
+                column = place_in_joint(model, j, i)
                 if model.free[column] == 0:
                     continue
                 there = model.place[column]
@@ -340,22 +347,23 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
         a[d] = workspace.f[d]
     if model.driven.shape[0] > 0 and workspace.switches[DIAGONAL] == 0:
         for p in range(model.pair.shape[0]):
-            for i in range(6):
-                row = 3 * model.pair[p, i // 3] + i % 3
-                for j in range(6):
-                    a[row] -= workspace.mass[p, i, j] * known[3 * model.pair[p, j // 3] + j % 3]
+            for i in range(pair_freedoms(model)):
+                row = place_in_pair(model, p, i)
+                for j in range(pair_freedoms(model)):
+                    a[row] -= workspace.mass[p, i, j] * known[place_in_pair(model, p, j)]
+    each = freedoms(model)
     joint = model.joint
     row = model.row
     gamma = workspace.gamma
     jac = workspace.jac
     for j in range(joint.shape[0]):
-        one = 3 * joint[j, 1]
-        two = 3 * joint[j, 2]
-        for r in range(3):
+        one = each * joint[j, JOINT_FIRST]
+        two = each * joint[j, JOINT_SECOND]
+        for r in range(most_rows(model)):
             if row[j, r] >= 0:
                 value = -gamma[j, r]
-                for i in range(3):
-                    value -= jac[j, r, i] * known[one + i] + jac[j, r, 3 + i] * known[two + i]
+                for i in range(each):
+                    value -= jac[j, r, i] * known[one + i] + jac[j, r, each + i] * known[two + i]
                 lam[row[j, r]] = value
     solve_unknowns(model, workspace, a, lam)
     for i in range(model.driven.shape[0]):
@@ -364,7 +372,7 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
         if workspace.switches[APART] == 0:
             joint_slopes(model, q, v, a, lam, workspace)
         if workspace.switches[DIAGONAL] == 0:
-            add_inerter_tangents(model, segment, member_state, q, v, a, workspace.k, workspace.c)
+            add_tangents_of_inerters(model, segment, member_state, q, v, a, workspace.k, workspace.c)
     return -1
 
 
@@ -377,62 +385,74 @@ def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
     Constant:
       model: the compiled scene.
       workspace: the workspace, with G_q and G_v.
-      k, c (n_pair, 6, 6): stiffness and damping of the balance. turn (n,): slopes of the turning loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, T): slopes of the turning loads.
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
-    pair = model.pair
     joint = model.joint
-    matrices_vjp(pair, k, z, bar_q)
+    each = freedoms(model)
+    matrices_vjp(model, k, z, bar_q)
     if workspace.switches[DAMPED] != 0:
-        matrices_vjp(pair, c, z, bar_v)
-    turns_vjp(turn, z, bar_q)
+        matrices_vjp(model, c, z, bar_v)
+    turns_vjp(model, turn, z, bar_q)
     by_q = workspace.by_q
     by_v = workspace.by_v
     row = model.row
     for j in range(joint.shape[0]):
-        one = 3 * joint[j, 1]
-        two = 3 * joint[j, 2]
-        for r in range(3):
+        one = each * joint[j, JOINT_FIRST]
+        two = each * joint[j, JOINT_SECOND]
+        for r in range(most_rows(model)):
             if row[j, r] >= 0:
                 value = y[row[j, r]]
-                for i in range(3):
+                for i in range(each):
                     bar_q[one + i] -= by_q[j, r, i] * value
-                    bar_q[two + i] -= by_q[j, r, 3 + i] * value
+                    bar_q[two + i] -= by_q[j, r, each + i] * value
                     bar_v[one + i] -= by_v[j, r, i] * value
-                    bar_v[two + i] -= by_v[j, r, 3 + i] * value
+                    bar_v[two + i] -= by_v[j, r, each + i] * value
 
 
 @kernel
-def matrices_vjp(pair, k, z, bar):
-    """bar (n,) -= K^T z, K by pairs (n_pair, 6, 6)."""
-    for p in range(pair.shape[0]):
-        _matrix_vjp(pair, p, k[p], z, bar)
+def matrices_vjp(model, k, z, bar):
+    """bar (n,) -= K^T z, K by pairs (n_pair, 2 D, 2 D)."""
+    for p in range(model.pair.shape[0]):
+        _matrix_vjp(model, p, k[p], z, bar)
 
 
 @part
-def _matrix_vjp(pair, p, m, z, bar):
-    """bar (n,) -= m^T z of pair p, m (6, 6)."""
-    one = 3 * pair[p, 0]
-    two = 3 * pair[p, 1]
-    z0 = z[one]
-    z1 = z[one + 1]
-    z2 = z[one + 2]
-    z3 = z[two]
-    z4 = z[two + 1]
-    z5 = z[two + 2]
-    for j in range(6):
-        d = one + j if j < 3 else two + j - 3
-        bar[d] -= (m[0, j] * z0 + m[1, j] * z1 + m[2, j] * z2) + (m[3, j] * z3 + m[4, j] * z4 + m[5, j] * z5)
+def _matrix_vjp(model, p, m, z, bar):
+    """bar (n,) -= m^T z of pair p, m (2 D, 2 D)."""
+    each = freedoms(model)
+    one = each * model.pair[p, 0]
+    two = each * model.pair[p, 1]
+    for j in range(2 * each):
+        d = one + j if j < each else two + j - each
+        by_first = m[0, j] * z[one]
+        by_second = m[each, j] * z[two]
+        for i in range(1, each):
+            by_first += m[i, j] * z[one + i]
+            by_second += m[each + i, j] * z[two + i]
+        bar[d] -= by_first + by_second
 
 
 @kernel
-def turns_vjp(turn, z, bar):
-    """bar (n,) += (slope of the turning loads)^T z."""
+def subtract_matrices(model, k, x, out):
+    """out (n,) -= K x, K by pairs (n_pair, 2 D, 2 D)."""
+    for p in range(model.pair.shape[0]):
+        for i in range(pair_freedoms(model)):
+            value = k[p, i, 0] * x[place_in_pair(model, p, 0)]
+            for j in range(1, pair_freedoms(model)):
+                value += k[p, i, j] * x[place_in_pair(model, p, j)]
+            out[place_in_pair(model, p, i)] -= value
+
+
+@kernel
+def turns_vjp(model, turn, z, bar):
+    """bar (n,) += (slope of the turning loads)^T z, turn (n, T)."""
     for d in range(z.shape[0]):
-        bar[d - d % 3 + 2] += turn[d] * z[d]
+        for r in range(rotations(model)):
+            bar[place_of_turn(model, d, r)] += turn[d, r] * z[d]
 
 
 @kernel
@@ -442,8 +462,8 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
     Constant:
       model: the compiled scene.
       workspace: the workspace (`carries`, `switches`).
-      k, c (n_pair, 6, 6): stiffness and damping of these pairs, without the joints'. turn (n,): slopes of the turning
-        loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of these pairs, without the joints'.
+      turn (n, T): slopes of the turning loads.
       z (n,): virtual displacements; driven parts are 0.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
@@ -451,10 +471,10 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
     damped = workspace.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
         if workspace.carries[p] != 0:
-            _matrix_vjp(model.pair, p, k[p], z, bar_q)
+            _matrix_vjp(model, p, k[p], z, bar_q)
             if damped:
-                _matrix_vjp(model.pair, p, c[p], z, bar_v)
-    turns_vjp(turn, z, bar_q)
+                _matrix_vjp(model, p, c[p], z, bar_v)
+    turns_vjp(model, turn, z, bar_q)
 
 
 @kernel
@@ -479,33 +499,25 @@ def joints_vjp(model, workspace, q, v, a, lam, z, y, bar_q, bar_v):
     mine = workspace.own[3]
     row = model.row
     for j in range(model.joint.shape[0]):
-        code = model.joint[j, 0]
+        code = model.joint[j, JOINT_CODE]
         par = model.joint_par[j]
-        one = 3 * model.joint[j, 1]
-        two = 3 * model.joint[j, 2]
-        gather_turned(model, j, q, workspace.turned, w)
+        place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
-        if joint_is_point(code):  # what other rows have is constant
-            y0 = y[row[j, 0]] if row[j, 0] >= 0 else 0.0
-            y1 = y[row[j, 1]] if row[j, 1] >= 0 else 0.0
-            first, second, rate_first, rate_second = revolute_vjp(par, w, wd, wdd, mine, y0, y1, z[one + 2], z[two + 2])
-            bar_q[one + 2] -= first
-            bar_q[two + 2] -= second
-            bar_v[one + 2] -= rate_first
-            bar_v[two + 2] -= rate_second
+        if joint_is_point(code):
+            point_joint_vjp(model, j, w, wd, wdd, mine, z, y, bar_q, bar_v)
             continue
-        stiffness = workspace.k[model.joint[j, 3]]
+        stiffness = workspace.k[model.joint[j, JOINT_PAIR]]
         stiffness[:] = 0.0
         joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
         joint_stiffness(code, par, w, mine, stiffness)
-        _matrix_vjp(model.pair, model.joint[j, 3], stiffness, z, bar_q)
-        for r in range(3):
+        _matrix_vjp(model, model.joint[j, JOINT_PAIR], stiffness, z, bar_q)
+        for r in range(most_rows(model)):
             if row[j, r] >= 0:
                 value = y[row[j, r]]
-                for i in range(6):
-                    d = one + i if i < 3 else two + i - 3
+                for i in range(pair_freedoms(model)):
+                    d = place_in_joint(model, j, i)
                     bar_q[d] -= workspace.by_q[j, r, i] * value
                     bar_v[d] -= workspace.by_v[j, r, i] * value
 
@@ -519,27 +531,28 @@ def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
     Constant:
       model: the compiled scene.
       workspace: the workspace, with G_q and G_v.
-      k, c (n_pair, 6, 6): stiffness and damping of the balance. turn (n,): slopes of the turning loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, T): slopes of the turning loads.
       dq, dv (n,): changes of coordinates and velocities.
     Out:
       force (n,), row (n_row,): changes of the right side, added to.
     """
     damped = workspace.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
-        for i in range(6):
+        for i in range(pair_freedoms(model)):
             value = 0.0
-            for j in range(6):
-                column = 3 * model.pair[p, j // 3] + j % 3
+            for j in range(pair_freedoms(model)):
+                column = place_in_pair(model, p, j)
                 value += k[p, i, j] * dq[column]
                 if damped:
                     value += c[p, i, j] * dv[column]
-            force[3 * model.pair[p, i // 3] + i % 3] -= value
+            force[place_in_pair(model, p, i)] -= value
     for d in range(dq.shape[0]):
-        force[d] += turn[d] * dq[d - d % 3 + 2]
+        for r in range(rotations(model)):
+            force[d] += turn[d, r] * dq[place_of_turn(model, d, r)]
     for j in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             own = model.row[j, r]
             if own >= 0:
-                for i in range(6):
-                    column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                for i in range(pair_freedoms(model)):
+                    column = place_in_joint(model, j, i)
                     row[own] -= workspace.by_q[j, r, i] * dq[column] + workspace.by_v[j, r, i] * dv[column]

@@ -14,6 +14,7 @@ from mdstopo.general.accelerations import accelerations_vjp, factor_matrix, solv
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.method_interface import point_of, step_back, weights_of
+from mdstopo.general.model import KIND, SUBJECT
 from mdstopo.general.parameters import add_event, add_times
 from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.responses import (
@@ -28,8 +29,9 @@ from mdstopo.general.responses import (
     response,
     value_at,
 )
-from mdstopo.general.step_history import copy_vector, restore_modes
+from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES
+from mdstopo.mechanics.kinematics.kinematics_interface import difference, retract
 
 #: an integrand that is a norm has no direction at a stage where it is below ASIDE of its value inside the step; below
 #: VANISHING, any that has kinks may have turned round; and two forces may differ by VANISHING, relative, where one
@@ -59,11 +61,11 @@ def apply_saltation_transposed(model, history, state, lam_q, lam_v, bar_set, dro
     Out:
       out (M_padded + P,): what parameters do to the events' times and to the sets made there, added behind the members.
     """
-    last = history.index[state, 3]
-    first = history.index[state - 1, 3] if state > 0 else last
+    last = history.index[state, EVENTS]
+    first = history.index[state - 1, EVENTS] if state > 0 else last
     for back in range(last - first):
         e = last - 1 - back
-        if history.event[e, 0] != state:
+        if history.event[e, STATE] != state:
             continue
         pulled = 0.0
         for d in range(lam_v.shape[0]):
@@ -118,26 +120,27 @@ def sweep(
     fraction[0] = c
     spread = bars.shape[0] > 0
     while w >= 0:
-        o = history.index[w, 0]
-        end = history.index[w + 1, 0]
+        o = history.index[w, FIRST]
+        end = history.index[w + 1, FIRST]
         b = bars[o:end] if spread else bars
         r = rows_bar[o:end] if spread else rows_bar
         step_back(
             tag, model, tables, history, w, fraction, lam_q.reshape((1, n)), lam_v.reshape((1, n)), lam_x, b, r, z, y,
             workspace, work,
         )  # fmt: skip
-        restore_modes(history, history.index[w, 3], member_state)
-        segment = history.index[w, 2]
+        restore_modes(history, history.index[w, EVENTS], member_state)
+        segment = history.index[w, SEGMENT]
         add_designs(model, segment, history, o, member_state, z[0, : end - o], out, work)
         if bar_set.shape[0] > 0:
             for j in range(end - o):
-                stage = history.stage[o + j]
-                add_sets(model, segment, member_state, stage[0], stage[1], z[0, j], 0.0, bar_set)
+                add_sets(
+                    model, segment, member_state, history.stage_q[o + j], history.stage_v[o + j], z[0, j], 0.0, bar_set
+                )
                 if spread:
                     for i in range(bar_set.shape[0]):
                         bar_set[i] += sets_bar[o + j, i]
         fraction[0] = 1.0
-        before = history.index[w, 1]
+        before = history.index[w, PARENT]
         if model.varied.shape[0] > 0:
             add_times(model, history, member_state, count, before + 1, looked, square, lam_v, 0.0, out)
         if before >= 0:
@@ -172,7 +175,7 @@ def row_cotangents(
     """
     n = model.mass.shape[0]
     n_row = model.size[0]
-    q = np.empty(n)
+    q = np.empty(model.q0.shape[0])
     v = np.empty(n)
     a = np.empty(n)
     lam = np.empty(n_row)
@@ -181,17 +184,16 @@ def row_cotangents(
     k = int(row[2])
     c = row[3]
     w = k
-    segment = history.index[k, 2]
+    segment = history.index[k, SEGMENT]
     if c <= 0.0 or c >= 1.0:
-        state = history.state[k if c <= 0.0 else k + 1]
-        copy_vector(state[0], q)
-        copy_vector(state[1], v)
+        copy_vector(history.q[k if c <= 0.0 else k + 1], q)
+        copy_vector(history.v[k if c <= 0.0 else k + 1], v)
         if c <= 0.0:
             w = k - 1
     else:
         w = point_of(tag, model, tables, member_state, history, count, k, c, np.bool_(True), workspace, q, v, work)
     t = history.t[k] + c * (history.t[k + 1] - history.t[k])
-    restore_modes(history, history.index[k, 3], member_state)
+    restore_modes(history, history.index[k, EVENTS], member_state)
     rate = row[4]
     if across:
         at_end = c <= 0.0 or c >= 1.0  # a row inside a step needs no rate
@@ -212,7 +214,7 @@ def row_cotangents(
     accelerations_vjp(model, workspace, workspace.k, workspace.c, workspace.turn, z, row_bar, bars[0], bars[1])
     free_only(model, bars[0])
     free_only(model, bars[1])
-    weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
+    weight = 1.0 if model.response[j, KIND] == ENERGY else 0.0
     add_design(model, segment, t, member_state, q, v, a, z, weight, out, work)
     sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
     explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, out)
@@ -243,8 +245,8 @@ def _first_event(history, state):
     """The first event of a state whose time varies, or -1."""
     if state == 0:
         return -1
-    for e in range(history.index[state - 1, 3], history.index[state, 3]):
-        if history.event[e, 0] != state:
+    for e in range(history.index[state - 1, EVENTS], history.index[state, EVENTS]):
+        if history.event[e, STATE] != state:
             continue
         for part in range(2):
             for d in range(history.saltation.shape[2]):
@@ -276,7 +278,7 @@ def integral_gradient(
     Returns the integral ([g] s, or [g]^2 s).
     """
     n = model.mass.shape[0]
-    stages = history.index[count, 0] if gradient else 0
+    stages = history.index[count, FIRST] if gradient else 0
     bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, model.size[0]))
     sets_bar = np.zeros((stages, count_sets(model)))
@@ -310,17 +312,24 @@ def event_drops(model, member_state, history, count, j, square, workspace):
       member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
       workspace: workspace of a balance, overwritten.
     """
-    events = history.index[count, 3]
+    events = history.index[count, EVENTS]
     drops = np.zeros(events)
     values = np.empty(2)
     for e in range(events):
-        state = history.event[e, 0]
+        state = history.event[e, STATE]
         if state <= 0 or state >= count:
             continue
         for side in range(2):
             restore_modes(history, e + side, member_state)
             values[side] = value_at(
-                model, member_state, history.index[state - 1, 2], history.t[state], history.state[state], j, workspace
+                model,
+                member_state,
+                history.index[state - 1, SEGMENT],
+                history.t[state],
+                history.q[state],
+                history.v[state],
+                j,
+                workspace,
             )
         if square:
             values *= values
@@ -344,16 +353,25 @@ def at_stage(model, member_state, segment, history, at, j, who, workspace, own, 
 
     Returns g_j, and the member.
     """
-    stage = history.stage[at]
+    q = history.stage_q[at]
+    v = history.stage_v[at]
+    a = history.stage_a[at]
     t = history.when[at]
-    if model.response[j, 0] == ENERGY:
-        general_forces(model, member_state, segment, t, stage[0], stage[1], np.bool_(False), workspace)
-    if who < 0 and model.response[j, 0] == MEMBER_FORCE:
-        who = largest_force(model, member_state, segment, t, model.response[j, 5], stage[0], stage[1], stage[2])
-    value = response(
-        model, member_state, segment, j, who, t, stage[0], stage[1], stage[2], history.lam[at], workspace, own, own_rows
-    )
+    if model.response[j, KIND] == ENERGY:
+        general_forces(model, member_state, segment, t, q, v, np.bool_(False), workspace)
+    if who < 0 and model.response[j, KIND] == MEMBER_FORCE:
+        who = largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a)
+    value = response(model, member_state, segment, j, who, t, q, v, a, history.lam[at], workspace, own, own_rows)
     return value, who
+
+
+@kernel
+def sign_at_stage(model, segment, j, who, member_state, history, at):
+    """`gather.force_sign` at stage `at` of the history of steps."""
+    return force_sign(
+        model, segment, j, who, history.when[at], member_state, history.stage_q[at], history.stage_v[at],
+        history.stage_a[at],
+    )  # fmt: skip
 
 
 @kernel
@@ -394,26 +412,31 @@ def one_sided(
         who = mine
     if value > VANISHING * size:
         return value, who, same
-    if model.response[j, 0] == MEMBER_FORCE:
-        a, b = history.stage[at], history.stage[inside]
-        here = force_sign(model, segment, j, who, history.when[at], member_state, a[0], a[1], a[2])
-        if here == force_sign(model, segment, j, who, history.when[inside], member_state, b[0], b[1], b[2]):
+    if model.response[j, KIND] == MEMBER_FORCE:
+        here = sign_at_stage(model, segment, j, who, member_state, history, at)
+        if here == sign_at_stage(model, segment, j, who, member_state, history, inside):
             return value, who, same
         _turn(own, own_rows)
         return -value, who, np.bool_(True)
     if value <= ASIDE * size:  # no direction of its own: that of a state a little inside
-        state = np.empty((3, n))
+        q = np.empty(model.q0.shape[0])
+        v = np.empty(n)
+        a = np.empty(n)
         lam = np.empty(model.size[0])
-        for i in range(3):
-            for d in range(n):
-                state[i, d] = history.stage[at, i, d] + ASIDE * (history.stage[inside, i, d] - history.stage[at, i, d])
+        way = np.empty(n)
+        difference(model, history.stage_q[inside], history.stage_q[at], way)
+        for d in range(n):
+            way[d] *= ASIDE
+            v[d] = history.stage_v[at, d] + ASIDE * (history.stage_v[inside, d] - history.stage_v[at, d])
+            a[d] = history.stage_a[at, d] + ASIDE * (history.stage_a[inside, d] - history.stage_a[at, d])
+        retract(model, history.stage_q[at], way, q)
         for r in range(model.size[0]):
             lam[r] = history.lam[at, r] + ASIDE * (history.lam[inside, r] - history.lam[at, r])
         t = history.when[at]
-        response(model, member_state, segment, j, who, t, state[0], state[1], state[2], lam, workspace, own, own_rows)
+        response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, own, own_rows)
         return value, who, same
     turned = 0.0
-    for i in range(3):
+    for i in range(slopes.shape[0]):
         for d in range(n):
             turned += own[i, d] * slopes[i, d]
     for r in range(model.size[0]):
@@ -465,21 +488,21 @@ def integral_cotangents(
     total = 0.0
     out[:] = 0.0
     none = np.zeros(n)
-    kind = model.response[j, 0]
+    kind = model.response[j, KIND]
     energy = kind == ENERGY
     bends = kinked(model, j)
     slopes = np.zeros((3, n))
     rows = np.zeros(n_row)
     mine = -1
     size = 0.0
-    tied = np.empty(members_of(model, model.response[j, 5]) if kind == MEMBER_FORCE else 1, np.int64)
+    tied = np.empty(members_of(model, model.response[j, SUBJECT]) if kind == MEMBER_FORCE else 1, np.int64)
     ties = 1
     for w in range(count):
-        restore_modes(history, history.index[w, 3], member_state)
-        segment = history.index[w, 2]
+        restore_modes(history, history.index[w, EVENTS], member_state)
+        segment = history.index[w, SEGMENT]
         weights_of(tag, model, tables, history, w, weight)
-        o = history.index[w, 0]
-        stages = history.index[w + 1, 0] - o
+        o = history.index[w, FIRST]
+        stages = history.index[w + 1, FIRST] - o
         # of two stages the first is where the step begins; one that has its end alone begins where the last one ended
         inside = o + (stages - 1) // 2 if stages > 1 else o - 1
         if bends:
@@ -490,15 +513,19 @@ def integral_cotangents(
                     member_state,
                     segment,
                     history.when[inside],
-                    model.response[j, 5],
-                    history.stage[inside],
+                    model.response[j, SUBJECT],
+                    history.stage_q[inside],
+                    history.stage_v[inside],
+                    history.stage_a[inside],
                     size,
                     tied,
                 )
-        for i in range(history.index[w + 1, 0] - o):
+        for i in range(history.index[w + 1, FIRST] - o):
             if weight[i] == 0.0:
                 continue
-            stage = history.stage[o + i]
+            q = history.stage_q[o + i]
+            v = history.stage_v[o + i]
+            a = history.stage_a[o + i]
             t = history.when[o + i]
             value, who = at_stage(model, member_state, segment, history, o + i, j, -1, workspace, own, own_rows)
             turned = np.bool_(False)
@@ -512,7 +539,7 @@ def integral_cotangents(
             if not gradient:
                 continue
             if energy:
-                add_design(model, segment, t, member_state, stage[0], stage[1], stage[2], none, factor, out, work)
+                add_design(model, segment, t, member_state, q, v, a, none, factor, out, work)
             shares = ties if who == mine and ties > 1 else 1
             factor /= shares
             bars[o + i] = 0.0
@@ -522,28 +549,15 @@ def integral_cotangents(
                     at_stage(model, member_state, segment, history, o + i, j, who, workspace, own, own_rows)
                     if turned:
                         _turn(own, own_rows)
-                for part in range(3):
+                for part in range(own.shape[0]):
                     for d in range(n):
                         bars[o + i, part, d] += factor * own[part, d]
                 for r in range(n_row):
                     rows_bar[o + i, r] = factor * own_rows[r]
-                sign = force_sign(model, segment, j, who, t, member_state, stage[0], stage[1], stage[2])
+                sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
                 if turned:
                     sign = -sign
-                explicit_part(model, segment, j, who, t, member_state, stage[0], stage[1], stage[2], factor * sign, out)
+                explicit_part(model, segment, j, who, t, member_state, q, v, a, factor * sign, out)
                 if sets_bar.shape[1] > 0:
-                    add_looked_sets(
-                        model,
-                        member_state,
-                        segment,
-                        j,
-                        who,
-                        t,
-                        stage[0],
-                        stage[1],
-                        stage[2],
-                        own,
-                        factor,
-                        sets_bar[o + i],
-                    )
+                    add_looked_sets(model, member_state, segment, j, who, t, q, v, a, own, factor, sets_bar[o + i])
     return total

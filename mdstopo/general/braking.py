@@ -9,9 +9,10 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_unknowns
-from mdstopo.general.contact import contact_rows
-from mdstopo.general.members import rate_of_row
+from mdstopo.general.members import MODE, rate_of_row
+from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import CLOSED, MU, SLIP, C, K, contact_force
+from mdstopo.mechanics.kinematics.kinematics_interface import contact_rows
 
 #: a step this long, relative to the time in which friction brakes by `slip`, has no error but that of rounding
 SETTLED = 0.1
@@ -27,7 +28,7 @@ HELD, HOPELESS = 1000, 10.0
 
 
 @kernel
-def friction_error(model, member_state, vectors, s, h, start, ends, a, noise, shaken, tolerance):
+def friction_error(model, member_state, vectors, s, h, q0, v0, q1, v1, a, noise, shaken, tolerance):
     """Estimated error of a step's sliding velocities relative to `slip`, the largest of all contacts that drag.
 
     What counts is the error of T / (mu N) = tanh(slide / slip), of which 1 / (slip (1 + (slide / slip)^2)) is the slope
@@ -38,7 +39,7 @@ def friction_error(model, member_state, vectors, s, h, start, ends, a, noise, sh
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       vectors: the plane VECTORS of the method's table (`integrators.runge_kutta_tables`).
       s, h: number of stages; length of the step (s).
-      start, ends (2, n): q, v at both ends of the step.
+      q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends of the step.
       a (s or more, n): accelerations of its stages.
       noise (n_pair,): what rounding leaves of relative positions (m).
       shaken: what it leaves of the members' forces (N).
@@ -47,31 +48,31 @@ def friction_error(model, member_state, vectors, s, h, start, ends, a, noise, sh
     Returns the error, 0 where no contact drags, NaN where one appears.
     """
     first = model.member.shape[1]
-    rows = np.empty((2, 6))
-    rates = np.empty((2, 6))
+    rows = np.empty((2, pair_freedoms(model)))
+    rates = np.empty((2, pair_freedoms(model)))
     worst = 0.0
     for j in range(model.contact_pair.shape[0]):
         c = model.contact[j]
-        if int(member_state[1, first + j]) != CLOSED or c[MU] == 0.0:
+        if int(member_state[MODE, first + j]) != CLOSED or c[MU] == 0.0:
             continue
         p = model.contact_pair[j]
-        _, height = contact_rows(model, j, start[0], start[1], rows, rates)
-        slide = rate_of_row(model, p, rows[0], start[1])
-        normal = -c[K] * height - c[C] * rate_of_row(model, p, rows[1], start[1])
-        contact_rows(model, j, ends[0], ends[1], rows, rates)
-        after = rate_of_row(model, p, rows[0], ends[1])
+        _, height = contact_rows(model, j, q0, v0, rows, rates)
+        slide = rate_of_row(model, p, rows[0], v0)
+        normal = -c[K] * height - c[C] * rate_of_row(model, p, rows[1], v0)
+        contact_rows(model, j, q1, v1, rows, rates)
+        after = rate_of_row(model, p, rows[0], v1)
         slow = min(abs(slide), abs(after)) if slide * after > 0.0 else 0.0
         fine = 0.0
         coarse = 0.0
         parts = 0.0
         rising = 0.0
         mobility = 0.0
-        for r in range(6):
-            d = 3 * model.pair[p, r // 3] + r % 3
+        for r in range(pair_freedoms(model)):
+            d = place_in_pair(model, p, r)
             if model.free[d] != 0:
                 mobility += rows[0, r] * rows[0, r] / model.mass[d]
-            parts += abs(rows[0, r] * ends[1, d])
-            rising += abs(rows[1, r] * ends[1, d])
+            parts += abs(rows[0, r] * v1[d])
+            rising += abs(rows[1, r] * v1[d])
             for i in range(s):
                 fine += rows[0, r] * vectors[4, i] * a[i, d]
                 coarse += rows[0, r] * vectors[6, i] * a[i, d]
@@ -108,19 +109,19 @@ def brake_rate(model, member_state, q, v, enough, workspace):
 
     Returns the rate (1/s), and the column of `member_state` of the contact that brakes most, or -1.
     """
-    n = q.shape[0]
+    n = v.shape[0]
     first = model.member.shape[1]
     count = model.contact_pair.shape[0]
-    rows = np.empty((2, 6))
-    rates = np.empty((2, 6))
-    kept = np.empty((2 * count, 6))
+    rows = np.empty((2, pair_freedoms(model)))
+    rates = np.empty((2, pair_freedoms(model)))
+    kept = np.empty((2 * count, pair_freedoms(model)))
     slope = np.zeros(2 * count)
     total = 0.0
     largest = 0.0
     who = -1
     for j in range(count):
         c = model.contact[j]
-        if int(member_state[1, first + j]) != CLOSED or (c[MU] == 0.0 and c[C] == 0.0):
+        if int(member_state[MODE, first + j]) != CLOSED or (c[MU] == 0.0 and c[C] == 0.0):
             continue
         p = model.contact_pair[j]
         _, height = contact_rows(model, j, q, v, rows, rates)
@@ -130,9 +131,9 @@ def brake_rate(model, member_state, q, v, enough, workspace):
         slope[2 * j + 1] = abs(by_rise)
         for i in range(2):
             mobility = 0.0
-            for r in range(6):
+            for r in range(pair_freedoms(model)):
                 kept[2 * j + i, r] = rows[i, r]
-                d = 3 * model.pair[p, r // 3] + r % 3
+                d = place_in_pair(model, p, r)
                 if model.free[d] != 0:
                     mobility += rows[i, r] * rows[i, r] / model.mass[d]
             total += slope[2 * j + i] * mobility
@@ -149,8 +150,8 @@ def brake_rate(model, member_state, q, v, enough, workspace):
             continue
         push[:] = 0.0
         p = model.contact_pair[i // 2]
-        for r in range(6):
-            push[3 * model.pair[p, r // 3] + r % 3] = kept[i, r]
+        for r in range(pair_freedoms(model)):
+            push[place_in_pair(model, p, r)] = kept[i, r]
         if held.shape[0] > 0:
             held[:] = 0.0
             solve_unknowns(model, workspace, push, held)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.general.extremes import FRACTIONS, row_of
-from mdstopo.general.model import COUNT, GROUP, OFFSET
+from mdstopo.general.model import COUNT, GROUP, OFFSET, SUBJECT
 from mdstopo.general.responses import MEMBER_FORCE
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -105,5 +105,5 @@ def compare(
 def members_of(driver: "GeneralDriver", j: int) -> int:
     """How many members the group has that response j looks at."""
     block = driver.scene.model.block
-    own = block[block[:, GROUP] == driver.scene.model.response[j, 5]]
+    own = block[block[:, GROUP] == driver.scene.model.response[j, SUBJECT]]
     return int((own[:, OFFSET] + own[:, COUNT]).max())

@@ -18,6 +18,8 @@ from mdstopo.general.variables import adds_damping, each_member, lasting_times, 
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
+from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.compile import home_of
 from mdstopo.scene.loads import generalised_loads
@@ -36,7 +38,7 @@ class GeneralScene:
     load_case; model: the arrays; bodies: names in the order of the state, ground last; n_bodies: without it; damped:
     whether anything depends on velocity; skipped: what was left out, and why; redundant: joints with rows that others
     imply; responses, reductions: what is looked at and how, objectives first, in the case's order; contacts: each in
-    words.
+    words; kinematics: how bodies move.
     """
 
     load_case: LoadCase
@@ -49,11 +51,12 @@ class GeneralScene:
     responses: tuple[Response, ...]
     reductions: tuple[str, ...]
     contacts: tuple[str, ...] = ()
+    kinematics: Kinematics = PLANAR
 
     @cached_property
     def n(self) -> int:
-        """Coordinates of the bodies."""
-        return 3 * self.n_bodies
+        """Freedoms of the bodies."""
+        return self.kinematics.freedoms * self.n_bodies
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -74,20 +77,22 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     include_kernels(case)
     names = (*(body.name for body in case.bodies), GROUND)
     index = {name: i for i, name in enumerate(names)}
-    n = 3 * len(names)
+    each = PLANAR.freedoms
+    n = each * len(names)
     mass, v0 = np.ones(n), np.zeros(n)
     home = home_of(load_case, len(names))
     for i, body in enumerate(load_case.bodies):
-        mass[3 * i : 3 * i + 3] = body.mass, body.mass, body.inertia
-        v0[3 * i : 3 * i + 3] = *body.velocity, body.angular_velocity
+        own = slice(each * i, each * (i + 1))
+        mass[own] = body.mass, body.mass, body.inertia
+        v0[own] = *body.velocity, body.angular_velocity
 
     fine = has_coarse_steps(case.solver)
     more = lasting_times(case, fine) + motion_times(load_case)
     times = breakpoints(load_case, more)
-    driven, drive = drives(load_case, times, home[:, :3].ravel(), v0)
+    driven, drive = drives(load_case, times, home[:, : PLANAR.coordinates].ravel(), v0)
     _refuse_impacts(case, load_case, driven, drive, times)
     free = np.ones(n, dtype=np.int64)
-    free[-3:] = 0
+    free[-each:] = 0
     free[driven] = 0
 
     pairs: dict[tuple[int, int], int] = {}
@@ -106,14 +111,17 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     loads = generalised_loads(load_case, index, times)
     responses, reductions = looked_at(case, load_case.name)
     response, response_par = _responses(case, responses, index)
-    layout = arrange(case, joint, joint_par, free, mass, home, pair)
+    layout = arrange(case, joint, joint_par, free, mass, home, pair, PLANAR)
     _refuse_redundant(case, load_case, layout.redundant)
     damped = _damped(case, responses, reductions)
     model = GeneralModel(
-        free=free, mass=mass, q0=np.zeros(n), v0=v0, home=home, pair=pair, reach=reach, **members, times=times,
-        **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven, drive=drive, joint=joint,
+        free=free, mass=mass, q0=np.zeros(PLANAR.coordinates * len(names)), v0=v0, home=home, pair=pair, reach=reach,
+        **members, times=times, **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven,
+        drive=drive, joint=joint,
         joint_par=joint_par, row=layout.row, place=layout.place,
-        size=np.array([*layout.size, int(damped), len(layout.steady)], dtype=np.int64), line=layout.line,
+        size=np.array(
+            [*layout.size, int(damped), len(layout.steady), PLANAR.rotations, PLANAR.attitude], dtype=np.int64
+        ), line=layout.line,
         envelope=layout.envelope, product=layout.product, steady=layout.steady,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
         varied=varied(case, members["block"]),
@@ -134,7 +142,7 @@ def _refuse_impacts(case: Case, load_case: LoadCase, driven: IndexArray, drive: 
     size = np.abs(drive[:, :, 1]).max(axis=0, initial=0.0) + 1e-300
     mistakes = []
     for i, d in enumerate(driven.tolist()):
-        name = names[d // 3]
+        name = names[d // PLANAR.freedoms]
         if name in jointed and len(jump) and jump[:, i].max() > 1e-9 * size[i]:
             when = times[1 + int(jump[:, i].argmax())]
             places = [f"load_cases.{load_case.name}.motions", "motions"]

@@ -13,9 +13,11 @@ from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, explicit_part, force_sign
 from mdstopo.general.members import unscale_general
 from mdstopo.general.method_interface import point_of
-from mdstopo.general.model import unpack_general
+from mdstopo.general.model import KIND, unpack_general
 from mdstopo.general.responses import ENERGY, response
-from mdstopo.general.step_history import carve_history, copy_vector, restore_modes
+from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
+from mdstopo.mechanics.kinematics.kinematics_interface import most_rows
 
 
 @entry
@@ -62,7 +64,7 @@ def hold(
     n = model.mass.shape[0]
     n_row = model.size[0]
     no = np.bool_(False)
-    q = np.empty(n)
+    q = np.empty(model.q0.shape[0])
     v = np.empty(n)
     a = np.empty(n)
     lam = np.empty(n_row)
@@ -71,19 +73,19 @@ def hold(
     k = int(row[2])
     c = row[3]
     who = int(row[6])
-    segment = history.index[k, 2]
+    segment = history.index[k, SEGMENT]
     if c <= 0.0 or c >= 1.0:
-        copy_vector(history.state[k if c <= 0.0 else k + 1, 0], q)
-        copy_vector(history.state[k if c <= 0.0 else k + 1, 1], v)
+        copy_vector(history.q[k if c <= 0.0 else k + 1], q)
+        copy_vector(history.v[k if c <= 0.0 else k + 1], v)
     else:
         point_of(tag, model, tables, member_state, history, count, k, c, no, workspace, q, v, work)
     t = history.t[k] + c * (history.t[k + 1] - history.t[k])
-    restore_modes(history, history.index[k, 3], member_state)
+    restore_modes(history, history.index[k, EVENTS], member_state)
     solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
     response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
     if z.shape[0] > 0:
         padded[:] = 0.0
-        weight = 1.0 if model.response[j, 0] == ENERGY else 0.0
+        weight = 1.0 if model.response[j, KIND] == ENERGY else 0.0
         add_design(model, segment, t, member_state, q, v, a, z, weight, padded, work)
         sign = force_sign(model, segment, j, who, t, member_state, q, v, a)
         explicit_part(model, segment, j, who, t, member_state, q, v, a, sign, padded)
@@ -97,15 +99,15 @@ def hold(
     for r in range(n_row):
         right[n + r] = row_bar[r]
     for p in range(model.pair.shape[0]):
-        for i in range(6):
-            for m in range(6):
-                line = 3 * model.pair[p, i // 3] + i % 3
-                matrix[line, 3 * model.pair[p, m // 3] + m % 3] += workspace.k[p, i, m]
+        for i in range(pair_freedoms(model)):
+            for m in range(pair_freedoms(model)):
+                line = place_in_pair(model, p, i)
+                matrix[line, place_in_pair(model, p, m)] += workspace.k[p, i, m]
     for joint in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             own = model.row[joint, r]
             if own >= 0:
-                for i in range(6):
-                    d = 3 * model.joint[joint, 1 + i // 3] + i % 3
+                for i in range(pair_freedoms(model)):
+                    d = place_in_joint(model, joint, i)
                     matrix[n + own, d] += workspace.jac[joint, r, i]
                     matrix[d, n + own] += workspace.jac[joint, r, i]

@@ -4,11 +4,12 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.forces import drive_state
 from mdstopo.general.method_interface import beside, point_of
-from mdstopo.general.model import unpack_general
+from mdstopo.general.model import KIND, SUBJECT, unpack_general
 from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
-from mdstopo.general.step_history import carve_history, copy_vector, restore_modes
+from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, quintic
 
 
 @entry
@@ -27,6 +28,7 @@ def sample_response(
     j,
     who,
     places,
+    out_q,
     out,
     lam_out,
     seen,
@@ -51,7 +53,7 @@ def sample_response(
     In place:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     Out:
-      out (3, K, n): coordinates, velocities, accelerations.
+      out_q (K, n_q), out (2, K, n): coordinates, and velocities and accelerations.
       lam_out (K, n_row + n_driven): multipliers of the solved rows, then those of the driven coordinates, what
         M a + Phi_q^T lam = F leaves to them.
       seen (K, 3): value of the response, its rate (per s), number of the member.
@@ -65,25 +67,43 @@ def sample_response(
     no = np.bool_(False)
     bars = np.empty((3, n))
     row_bar = np.empty(n_row)
-    near = np.empty((4, n))
-    ends = np.empty((6, n))
+    near_q = np.empty(model.q0.shape[0])
+    near = np.empty((3, n))
+    ends_q = np.empty((2, model.q0.shape[0]))
+    ends = np.empty((2, 2, n))
     last = -1
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
-        q = out[0, i]
-        v = out[1, i]
-        a = out[2, i]
+        q = out_q[i]
+        v = out[0, i]
+        a = out[1, i]
         lam = lam_out[i, :n_row]
-        segment = history.index[k, 2]
+        segment = history.index[k, SEGMENT]
         last = go_to(
-            tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends, lam, q, v, work
+            tag,
+            model,
+            tables,
+            member_state,
+            history,
+            count,
+            k,
+            c,
+            exact,
+            last,
+            workspace,
+            ends_q,
+            ends,
+            lam,
+            q,
+            v,
+            work,
         )
         t = time_at(history, k, c)
         seen[i, 2] = who
-        if j >= 0 and model.response[j, 0] == MEMBER_FORCE and who < 0:
+        if j >= 0 and model.response[j, KIND] == MEMBER_FORCE and who < 0:
             solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
-            seen[i, 2] = largest_force(model, member_state, segment, t, model.response[j, 5], q, v, a)
+            seen[i, 2] = largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a)
         value, rate = rated(
             tag,
             model,
@@ -102,6 +122,7 @@ def sample_response(
             lam,
             bars,
             row_bar,
+            near_q,
             near,
         )
         seen[i, 0] = value
@@ -143,13 +164,15 @@ def compare(
     n = model.mass.shape[0]
     n_row = model.size[0]
     no = np.bool_(False)
-    group = model.response[j, 5]
-    q = np.empty(n)
+    group = model.response[j, SUBJECT]
+    q = np.empty(model.q0.shape[0])
     v = np.empty(n)
     a = np.empty(n)
     lam = np.empty(n_row)
-    near = np.empty((3, n))
-    ends = np.empty((6, n))
+    near_q = np.empty(model.q0.shape[0])
+    near = np.empty((2, n))
+    ends_q = np.empty((2, model.q0.shape[0]))
+    ends = np.empty((2, 2, n))
     force = np.empty(top.shape[0])
     last = -1
     for i in range(top.shape[0]):
@@ -157,9 +180,25 @@ def compare(
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
-        segment = history.index[k, 2]
+        segment = history.index[k, SEGMENT]
         last = go_to(
-            tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends, lam, q, v, work
+            tag,
+            model,
+            tables,
+            member_state,
+            history,
+            count,
+            k,
+            c,
+            exact,
+            last,
+            workspace,
+            ends_q,
+            ends,
+            lam,
+            q,
+            v,
+            work,
         )
         t = time_at(history, k, c)
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
@@ -174,9 +213,9 @@ def compare(
         apart = APART * (history.t[k + 1] - history.t[k])
         for side in (-1.0, 1.0):
             e = side * apart
-            beside(tag, history, k, c, e, q, v, a, near[0], near[1])
-            solve_accelerations(model, member_state, segment, t + e, near[0], near[1], no, workspace, near[2], lam)
-            group_forces(model, member_state, segment, t + e, group, near[0], near[1], near[2], force)
+            beside(tag, model, history, k, c, e, q, v, a, near_q, near[0])
+            solve_accelerations(model, member_state, segment, t + e, near_q, near[0], no, workspace, near[1], lam)
+            group_forces(model, member_state, segment, t + e, group, near_q, near[0], near[1], force)
             for m in range(who.shape[0]):
                 seen[m, i, 1] += side * force[who[m]] / (2.0 * apart)
 
@@ -190,7 +229,9 @@ def time_at(history, k, c):
 
 
 @kernel
-def go_to(tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends, lam, q, v, work):
+def go_to(
+    tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends_q, ends, lam, q, v, work
+):
     """The state at a fraction of a step, with the modes of that step.
 
     Constant:
@@ -206,54 +247,37 @@ def go_to(tag, model, tables, member_state, history, count, k, c, exact, last, w
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
         The modes become those of step k.
       history: the history of steps (`StepHistory`).
-      ends (6, n): coordinates, velocities, accelerations of the quintic's start, then of its end.
+      ends_q (2, n_q), ends (2, 2, n): coordinates, and velocities and accelerations, of the quintic's start and end.
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
       lam (n_row,): scratch.
-      q, v (n,): the state (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): the state.
       work (WORK,): counts of work, added to.
 
     Returns the number of the step whose ends are in `ends` now.
     """
     no = np.bool_(False)
     h = history.t[k + 1] - history.t[k]
-    segment = history.index[k, 2]
-    restore_modes(history, history.index[k, 3], member_state)
+    segment = history.index[k, SEGMENT]
+    restore_modes(history, history.index[k, EVENTS], member_state)
     if c <= 0.0 or c >= 1.0:
-        state = history.state[k if c <= 0.0 else k + 1]
-        copy_vector(state[0], q)
-        copy_vector(state[1], v)
+        copy_vector(history.q[k if c <= 0.0 else k + 1], q)
+        copy_vector(history.v[k if c <= 0.0 else k + 1], v)
     elif exact:
         point_of(tag, model, tables, member_state, history, count, k, c, no, workspace, q, v, work)
     else:
         if k != last:
             for e in range(2):
-                copy_vector(history.state[k + e, 0], ends[3 * e])
-                copy_vector(history.state[k + e, 1], ends[3 * e + 1])
+                copy_vector(history.q[k + e], ends_q[e])
+                copy_vector(history.v[k + e], ends[e, 0])
                 solve_accelerations(
-                    model, member_state, segment, history.t[k + e], ends[3 * e], ends[3 * e + 1], no, workspace,
-                    ends[3 * e + 2], lam,
+                    model, member_state, segment, history.t[k + e], ends_q[e], ends[e, 0], no, workspace, ends[e, 1],
+                    lam,
                 )  # fmt: skip
             last = k
-        quintic(c, h, ends, q, v)
+        quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], q, v)
     drive_state(model, segment, time_at(history, k, c), q, v)
     return last
-
-
-@kernel
-def quintic(c, h, ends, q, v):
-    """q, v (n,) at fraction c of a step from both ends' positions, velocities and accelerations, ends (6, n)."""
-    for d in range(q.shape[0]):
-        v0 = ends[1, d]
-        a0 = ends[2, d]
-        j = ends[3, d] - ends[0, d] - h * (v0 + 0.5 * h * a0)
-        w = h * (ends[4, d] - v0 - h * a0)
-        b = h * h * (ends[5, d] - a0)
-        x3 = 10.0 * j - 4.0 * w + 0.5 * b
-        x4 = -15.0 * j + 7.0 * w - b
-        x5 = 6.0 * j - 3.0 * w + 0.5 * b
-        q[d] = ends[0, d] + c * (h * v0 + c * (0.5 * h * h * a0 + c * (x3 + c * (x4 + c * x5))))
-        v[d] = v0 + c * (h * a0 + c * (3.0 * x3 + c * (4.0 * x4 + c * 5.0 * x5)) / h)
 
 
 @kernel
@@ -261,14 +285,14 @@ def held_back(model, workspace, d, a, lam):
     """What inerters and joints take at coordinate d: (sum s b B^T B a + Phi_q^T lam)_d."""
     total = 0.0
     for p in range(model.pair.shape[0]):
-        for i in range(6):
-            if 3 * model.pair[p, i // 3] + i % 3 == d:
-                for j in range(6):
-                    total += workspace.mass[p, i, j] * a[3 * model.pair[p, j // 3] + j % 3]
+        for i in range(pair_freedoms(model)):
+            if place_in_pair(model, p, i) == d:
+                for j in range(pair_freedoms(model)):
+                    total += workspace.mass[p, i, j] * a[place_in_pair(model, p, j)]
     for j in range(model.joint.shape[0]):
-        for i in range(6):
-            if 3 * model.joint[j, 1 + i // 3] + i % 3 == d:
-                for r in range(3):
+        for i in range(pair_freedoms(model)):
+            if place_in_joint(model, j, i) == d:
+                for r in range(most_rows(model)):
                     if model.row[j, r] >= 0:
                         total += workspace.jac[j, r, i] * lam[model.row[j, r]]
     return total

@@ -10,14 +10,15 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
-from mdstopo.general.events import member_rows
 from mdstopo.general.forces import inerter_force
-from mdstopo.general.members import unscale_general
+from mdstopo.general.members import MODE, SCALE, SET, level_of, unscale_general
 from mdstopo.general.method_interface import step_forward
-from mdstopo.general.model import INERTER, unpack_general
+from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START, unpack_general
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
-from mdstopo.general.step_history import carve_history, restore_modes
+from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, carve_history, restore_modes
+from mdstopo.general.strides import pair_freedoms, place_in_pair
+from mdstopo.mechanics.kinematics.kinematics_interface import member_rows
 from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 
@@ -42,7 +43,7 @@ def step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, workspac
     Returns whether all sweeps settled.
     """
     n = model.mass.shape[0]
-    s = history.index[w + 1, 0] - history.index[w, 0]
+    s = history.index[w + 1, FIRST] - history.index[w, FIRST]
     dq = np.empty(n)
     dv = np.empty(n)
     dx = np.empty((2, n))
@@ -72,11 +73,11 @@ def step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, workspac
         for d in range(n):
             out[b, d] = dq[d]
             out[b, n + d] = dv[d]
-            out[b, 2 * n + d] = dx[0, d]
-            out[b, 3 * n + d] = dx[1, d]
+            for carried in range(2):
+                out[b, (2 + carried) * n + d] = dx[carried, d]
         if bars.shape[0] > 0:
             for j in range(s):
-                for part in range(3):
+                for part in range(bars.shape[1]):
                     for d in range(n):
                         out[b, 4 * n] += bars[j, part, d] * changes[j, part, d]
                 for r in range(model.size[0]):
@@ -95,14 +96,15 @@ def own_force(model, k, i, segment, t, member_state, q, v, a, row, row_rate):
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
     Out:
-      row (6,): B_i over the coordinates of both bodies. row_rate (6,): its derivative by time; not set for an inerter.
+      row (2 D,): B_i over the freedoms of both bodies.
+      row_rate (2 D,): its derivative by time; not set for an inerter.
     """
-    if model.block[k, 3] == INERTER:
+    if model.block[k, CODE] == INERTER:
         return inerter_force(model, k, i, q, v, a, row)
-    x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-    x -= member_state[2, i]
-    value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    f, _, _, _, _ = law(model.block[k, 3], model.law[k], x, rate, int(member_state[1, i]), t, value, model.curves)
+    x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
+    x -= member_state[SET, i]
+    value = level_of(model, segment, k, t)
+    f, _, _, _, _ = law(model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves)
     return f
 
 
@@ -145,12 +147,12 @@ def through_step(
     Returns whether all sweeps settled.
     """
     n = model.mass.shape[0]
-    o = history.index[w, 0]
-    s = history.index[w + 1, 0] - o
-    segment = history.index[w, 2]
-    row = np.empty(6)
-    row_rate = np.empty(6)
-    restore_modes(history, history.index[w, 3], member_state)
+    o = history.index[w, FIRST]
+    s = history.index[w + 1, FIRST] - o
+    segment = history.index[w, SEGMENT]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
+    restore_modes(history, history.index[w, EVENTS], member_state)
     settled = step_map(tag, model, tables, history, w, c, sweeps, bars, rows_bar, workspace, matrix)
     width = 4 * n + 1
     slots = sets.shape[0]
@@ -161,9 +163,9 @@ def through_step(
             for j in range(sets_bar.shape[0]):
                 by_set[m, 4 * n] += sets_bar[j, m]
     for k in range(model.block.shape[0]):
-        if model.block[k, 4] < 0:
+        if model.block[k, DESIGN] < 0:
             continue
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
             spare[:] = 0.0
             for b in range(4 * n):
                 value = column[i, b]
@@ -172,22 +174,12 @@ def through_step(
                         spare[d] += value * matrix[b, d]
             if model.active[segment, k] != 0:
                 for j in range(s):
-                    stage = history.stage[o + j]
                     f = own_force(
-                        model,
-                        k,
-                        i,
-                        segment,
-                        history.when[o + j],
-                        member_state,
-                        stage[0],
-                        stage[1],
-                        stage[2],
-                        row,
-                        row_rate,
-                    )
-                    for r in range(6):
-                        b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
+                        model, k, i, segment, history.when[o + j], member_state, history.stage_q[o + j],
+                        history.stage_v[o + j], history.stage_a[o + j], row, row_rate,
+                    )  # fmt: skip
+                    for r in range(pair_freedoms(model)):
+                        b = (4 + j) * n + place_in_pair(model, model.block[k, PAIR], r)
                         for d in range(width):
                             spare[d] -= f * row[r] * matrix[b, d]
             for m in range(slots):
@@ -219,10 +211,10 @@ def _parameters_through_step(model, member_state, history, w, column, sets, by_s
       spare (4 n + 1,): scratch.
     """
     n = model.mass.shape[0]
-    o = history.index[w, 0]
-    segment = history.index[w, 2]
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    o = history.index[w, FIRST]
+    segment = history.index[w, SEGMENT]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     width = 4 * n + 1
     members = model.member.shape[1]
     for c in range(members, column.shape[0]):
@@ -237,16 +229,15 @@ def _parameters_through_step(model, member_state, history, w, column, sets, by_s
             place = model.varied[e, 1]
             if model.varied[e, 2] != c - members or place > FREE_LENGTH or model.active[segment, k] == 0:
                 continue
-            for j in range(history.index[w + 1, 0] - o):
-                stage = history.stage[o + j]
-                for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+            for j in range(history.index[w + 1, FIRST] - o):
+                for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
                     slope, _ = parameter_slopes(
-                        model, k, i, place, segment, history.when[o + j], member_state, stage[0], stage[1], stage[2],
-                        row, row_rate,
+                        model, k, i, place, segment, history.when[o + j], member_state, history.stage_q[o + j],
+                        history.stage_v[o + j], history.stage_a[o + j], row, row_rate,
                     )  # fmt: skip
-                    slope *= member_state[0, i]
-                    for r in range(6):
-                        b = (4 + j) * n + 3 * model.pair[model.block[k, 0], r // 3] + r % 3
+                    slope *= member_state[SCALE, i]
+                    for r in range(pair_freedoms(model)):
+                        b = (4 + j) * n + place_in_pair(model, model.block[k, PAIR], r)
                         for d in range(width):
                             spare[d] -= slope * row[r] * matrix[b, d]
         for m in range(sets.shape[0]):
@@ -301,8 +292,8 @@ def jump(model, history, member_state, count, state, column, sets, drops, j, squ
     if state == 0:
         return
     members = model.member.shape[1]
-    for e in range(history.index[state - 1, 3], history.index[state, 3]):
-        if history.event[e, 0] != state:
+    for e in range(history.index[state - 1, EVENTS], history.index[state, EVENTS]):
+        if history.event[e, STATE] != state:
             continue
         for i in range(column.shape[0]):
             later = 0.0
@@ -334,7 +325,7 @@ def begin(model, history, first, column, sets):
         for d in range(first.shape[1]):
             column[i, d] = first[i, d]
     if (first.shape[0] > 0 or model.varied.shape[0] > 0) and sets.shape[0] > 0:
-        for e in range(history.index[0, 3]):
+        for e in range(history.index[0, EVENTS]):
             sets_forward(model, history, e, column, sets)
 
 
@@ -390,7 +381,7 @@ def push(
     matrix = np.empty((21 * n, 4 * n + 1))
     spare = np.empty(4 * n + 1)
     bars = np.zeros((3, n))
-    stages = history.index[count, 0] if integral > 0 else 0
+    stages = history.index[count, FIRST] if integral > 0 else 0
     stage_bars = np.zeros((stages, 3, n))
     rows_bar = np.zeros((stages, n_row))
     slots = count_sets(model)
@@ -412,13 +403,13 @@ def push(
         w, c = row_cotangents(
             tag, model, tables, member_state, history, count, j, row, across, workspace, bars, bar_set, padded, work
         )
-        last = w if w <= count else history.index[w, 1] + 1  # a partial step lies behind the others
+        last = w if w <= count else history.index[w, PARENT] + 1  # a partial step lies behind the others
     looked = j if integral > 0 else np.int64(-1)
     if model.varied.shape[0] > 0 and last >= 0 and w >= 0:
         shift_times(model, history, member_state, count, np.int64(0), looked, integral == 2, column)
     for k in range(last):
-        o = history.index[k, 0]
-        end = history.index[k + 1, 0]
+        o = history.index[k, FIRST]
+        end = history.index[k + 1, FIRST]
         own = stage_bars[o:end] if integral > 0 else stage_bars
         own_rows = rows_bar[o:end] if integral > 0 else rows_bar
         own_sets = sets_bar[o:end] if integral > 0 else sets_bar

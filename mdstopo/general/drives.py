@@ -10,6 +10,7 @@ import numpy as np
 
 from mdstopo.case.model import LoadCase, Prescribed, Table
 from mdstopo.case.spline import slopes
+from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.signals import segment_values
 
@@ -18,7 +19,7 @@ def prescribed(load_case: LoadCase) -> Iterator[tuple[int, str, Prescribed]]:
     """(coordinate, axis, what is prescribed) of every driven coordinate, by body as declared, then x, y, angle."""
     names = [body.name for body in load_case.bodies]
     for motion in load_case.motions:
-        first = 3 * names.index(motion.body)
+        first = PLANAR.freedoms * names.index(motion.body)
         for axis, part in enumerate((motion.x, motion.y, motion.angle)):
             if part is not None:
                 yield first + axis, ("x", "y", "angle")[axis], part

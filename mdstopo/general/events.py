@@ -16,15 +16,21 @@ import math
 
 import numpy as np
 
-from mdstopo.compiler.jit import inline, kernel
+from mdstopo.compiler.jit import kernel
 from mdstopo.general.contact import contact_switch
-from mdstopo.general.members import direction, stretch_of, stretched
-from mdstopo.general.model import INERTER
-from mdstopo.integrators.generalized_alpha_linear import hermite
+from mdstopo.general.members import MODE, SCALE, SET
+from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START, STOP
+from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
-from mdstopo.mechanics.kinematics.planar_poses import relative_pose, turned_body
-from mdstopo.mechanics.kinematics.planar_scales import deflection
-from mdstopo.mechanics.laws.spring import elongation_of
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    cubic,
+    deflection,
+    member_motion,
+    member_rows,
+    relative_pose,
+    stretch_of,
+    turning_rate,
+)
 from mdstopo.mechanics.laws.table import (
     law_grazes,
     law_has_pieces,
@@ -44,7 +50,7 @@ SLACK = 0.03
 def has_switches(model, knots):
     """Whether any member can switch at all; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
-        code = model.block[k, 3]
+        code = model.block[k, CODE]
         if code != INERTER and law_switches(code, model.law[k]) and (knots or not law_has_pieces(code)):
             return True
     return model.contact_pair.shape[0] > 0
@@ -56,23 +62,22 @@ def smallest_margin(model, segment, member_state, rel):
     best = np.inf
     who = -1
     for k in range(model.block.shape[0]):
-        code = model.block[k, 3]
+        code = model.block[k, CODE]
         if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
             continue
-        r = rel[model.block[k, 0]]
-        lo = model.block[k, 1]
-        for i in range(lo, lo + model.block[k, 5]):
-            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
-            rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - member_state[2, i]
-            s = law_margin(code, model.law[k], x, rate, int(member_state[1, i]), model.curves)
+        r = rel[model.block[k, PAIR]]
+        lo = model.block[k, START]
+        for i in range(lo, lo + model.block[k, COUNT]):
+            _, x, rate = member_motion(model, i, r)
+            x -= member_state[SET, i]
+            s = law_margin(code, model.law[k], x, rate, int(member_state[MODE, i]), model.curves)
             if s < best:
                 best = s
                 who = i
     for j in range(model.contact_pair.shape[0]):
         i = model.member.shape[1] + j
         along, height, _, rise = contact_pose(model.contact[j], rel[model.contact_pair[j]])
-        s = contact_margin(model.contact[j], along, height, rise, int(member_state[1, i]))
+        s = contact_margin(model.contact[j], along, height, rise, int(member_state[MODE, i]))
         if s < best:
             best = s
             who = i
@@ -100,26 +105,24 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
     near = 2.0
     low = np.inf
     for k in range(model.block.shape[0]):
-        code = model.block[k, 3]
+        code = model.block[k, CODE]
         if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
             continue
-        p = model.block[k, 0]
-        lo = model.block[k, 1]
-        for i in range(lo, lo + model.block[k, 5]):
-            mode = int(member_state[1, i])
+        p = model.block[k, PAIR]
+        lo = model.block[k, START]
+        for i in range(lo, lo + model.block[k, COUNT]):
+            mode = int(member_state[MODE, i])
             r = rel0[p]
-            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
-            rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - member_state[2, i]
+            _, x, rate = member_motion(model, i, r)
+            x -= member_state[SET, i]
             s0 = law_margin(code, model.law[k], x, rate, mode, model.curves)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
                 continue
             d0 = h * by_x * rate
             r = rel1[p]
-            length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
-            rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - member_state[2, i]
+            _, x, rate = member_motion(model, i, r)
+            x -= member_state[SET, i]
             s1 = law_margin(code, model.law[k], x, rate, mode, model.curves)
             by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
             if by_rate != 0.0:
@@ -133,7 +136,7 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
                 near = c
     for j in range(model.contact_pair.shape[0]):
         row = model.contact[j]
-        mode = int(member_state[1, model.member.shape[1] + j])
+        mode = int(member_state[MODE, model.member.shape[1] + j])
         p = model.contact_pair[j]
         along, height, slide, rise = contact_pose(row, rel0[p])
         by_along, by_height, by_rise = contact_margin_slopes(row, along, height, rise, mode)
@@ -177,21 +180,21 @@ def probes_needed(model, segment, rel0, rel1):
     """In how many parts a step is looked through: more where the bodies move far compared with a member's length."""
     needed = 4.0
     for k in range(model.block.shape[0]):
-        code = model.block[k, 3]
+        code = model.block[k, CODE]
         if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
             continue
-        p = model.block[k, 0]
-        moved = deflection(rel1, rel0, model.reach, p)
-        lo = model.block[k, 1]
-        for i in range(lo, lo + model.block[k, 5]):
+        p = model.block[k, PAIR]
+        moved = deflection(model, rel1, rel0, p)
+        lo = model.block[k, START]
+        for i in range(lo, lo + model.block[k, COUNT]):
             for r in (rel0[p], rel1[p]):
-                length, _, _, _, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+                length, _, _ = member_motion(model, i, r)
                 needed = max(needed, min(8.0 * moved / max(length, 1e-300), 200.0))
-            turn = abs(rel1[p, 6]) + abs(rel0[p, 6])
+            turn = turning_rate(model, rel1, p) + turning_rate(model, rel0, p)
             needed = max(needed, min(4.0 * turn, 8.0))
     for j in range(model.contact_pair.shape[0]):
         p = model.contact_pair[j]
-        needed = max(needed, min(4.0 * (abs(rel1[p, 6]) + abs(rel0[p, 6])), 8.0))
+        needed = max(needed, min(4.0 * (turning_rate(model, rel1, p) + turning_rate(model, rel0, p)), 8.0))
     return int(needed)
 
 
@@ -206,17 +209,16 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q0, v0, q1, v1 (n,): coordinates and velocities at both ends (m, rad; m/s, rad/s).
+      q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends.
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
       noise: how far below zero a margin is by rounding alone (m).
 
     Returns the earliest fraction, or 2; and the fraction of the lowest margin that may be below zero in truth, or 2.
     """
-    n = q0.shape[0]
     parts = probes_needed(model, segment, rel0, rel1)
-    q = np.empty(n)
-    v = np.empty(n)
+    q = np.empty(q0.shape[0])
+    v = np.empty(v0.shape[0])
     before = rel0.copy()
     rel = np.empty(rel0.shape)
     near = 2.0
@@ -224,13 +226,10 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
     for part in range(1, parts + 1):
         c = part / parts
         if part == parts:
-            relative_pose(model.pair, model.home, q1, v1, rel)
+            relative_pose(model, q1, v1, rel)
         else:
-            a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
-            for d in range(n):
-                q[d] = a0 * q0[d] + a1 * q1[d] + h * (b0 * v0[d] + b1 * v1[d])
-                v[d] = (da0 * q0[d] + da1 * q1[d]) / h + db0 * v0[d] + db1 * v1[d]
-            relative_pose(model.pair, model.home, q, v, rel)
+            cubic(model, c, h, q0, v0, q1, v1, q, v)
+            relative_pose(model, q, v, rel)
             margin, _ = smallest_margin(model, segment, member_state, rel)
             if margin < -noise:
                 return c, near
@@ -244,81 +243,6 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
             for i in range(rel.shape[1]):
                 before[p, i] = rel[p, i]
     return 2.0, near
-
-
-@inline
-def member_between(model, i, one, two, q, turn_one, turn_two):
-    """Where a member lies between two bodies.
-
-    Constant:
-      model: the compiled scene.
-      i: the member (padded).
-      one, two: its bodies.
-      q (n,): coordinates (m, rad).
-      turn_one, turn_two: of `turned_body`, for each body.
-
-    Returns its arms p and q (px, py, qx, qy) and its vector (x, y) in global axes, its length, and Delta (m).
-    """
-    m = model.member
-    ca, sa, ca_since, sa_since = turn_one
-    cb, sb, cb_since, sb_since = turn_two
-    a = 3 * one
-    b = 3 * two
-    px = ca * m[0, i] - sa * m[1, i]
-    py = sa * m[0, i] + ca * m[1, i]
-    qx = cb * m[2, i] - sb * m[3, i]
-    qy = sb * m[2, i] + cb * m[3, i]
-    wx = q[b] - q[a]
-    wy = q[b + 1] - q[a + 1]
-    x = model.home[two, 0] - model.home[one, 0] + wx + qx - px
-    y = model.home[two, 1] - model.home[one, 1] + wy + qy - py
-    ux = wx + (cb_since * m[2, i] - sb_since * m[3, i]) - (ca_since * m[0, i] - sa_since * m[1, i])
-    uy = wy + (sb_since * m[2, i] + cb_since * m[3, i]) - (sa_since * m[0, i] + ca_since * m[1, i])
-    length = math.sqrt(x * x + y * y)
-    return px, py, qx, qy, x, y, length, elongation_of(x, y, length, ux, uy, m[4, i], m[5, i])
-
-
-@kernel
-def member_rows(model, p, i, q, v, row, row_rate):
-    """Delta and dDelta/dt of a member (m, m/s), and its row of the compatibility matrix.
-
-    Constant:
-      model: the compiled scene.
-      p, i: the pair, and the member (padded).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
-    Out:
-      row, row_rate (6,): B and dB/dt over the coordinates of both bodies.
-    """
-    one = model.pair[p, 0]
-    two = model.pair[p, 1]
-    a = 3 * one
-    b = 3 * two
-    turn_one = turned_body(model.home, one, q[a + 2])
-    turn_two = turned_body(model.home, two, q[b + 2])
-    px, py, qx, qy, ux, uy, length, stretch = member_between(model, i, one, two, q, turn_one, turn_two)
-    y = 1.0 / length if length > 1e-15 else 0.0
-    ex = ux * y
-    ey = uy * y
-    wa = v[a + 2]
-    wb = v[b + 2]
-    dx = v[b] - wb * qy - v[a] + wa * py
-    dy = v[b + 1] + wb * qx - v[a + 1] - wa * px
-    rate = ex * dx + ey * dy
-    fx = y * (dx - rate * ex)
-    fy = y * (dy - rate * ey)
-    row[0] = -ex
-    row[1] = -ey
-    row[2] = ex * py - ey * px
-    row[3] = ex
-    row[4] = ey
-    row[5] = ey * qx - ex * qy
-    row_rate[0] = -fx
-    row_rate[1] = -fy
-    row_rate[2] = fx * py - fy * px + wa * (ex * px + ey * py)
-    row_rate[3] = fx
-    row_rate[4] = fy
-    row_rate[5] = fy * qx - fx * qy - wb * (ex * qx + ey * qy)
-    return stretch, rate
 
 
 @kernel
@@ -338,17 +262,17 @@ def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
     Returns the mode it goes to, how far its margin goes beyond zero, what a touch that only just happens does
     (`law_grazes`), -s_x / s' (`switch_of`), and by how much its permanent set grows (m).
     """
-    old = int(member_state[1, who])
+    old = int(member_state[MODE, who])
     if who >= model.member.shape[1]:
         j = who - model.member.shape[1]
         new, beyond = contact_switch(model, member_state, q, v, a, j, slopes)
         return new, beyond, contact_grazes(model.contact[j], old), 0.0, 0.0
     k = block_of(model, who)
-    code = model.block[k, 3]
+    code = model.block[k, CODE]
     new, beyond, by_set = switch_of(model, segment, member_state, q, v, a, who, k, slopes)
-    x, _ = stretch_of(model.member, who, rel[model.block[k, 0]])
-    x -= member_state[2, who]
-    first = member_state[0, who] != 0.0 and member_state[2, who] == 0.0
+    x, _ = stretch_of(model, who, rel[model.block[k, PAIR]])
+    x -= member_state[SET, who]
+    first = member_state[SCALE, who] != 0.0 and member_state[SET, who] == 0.0
     kind = law_grazes(code, model.law[k], x, old) if first else 0
     if law_has_pieces(code):  # nothing jumps at a knot: when it is passed makes no difference
         slopes[:] = 0.0
@@ -371,26 +295,26 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
     Out:
       slopes (2, n): s_q / s', s_v / s'.
     """
-    n = q.shape[0]
-    p = model.block[k, 0]
-    code = model.block[k, 3]
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    n = v.shape[0]
+    p = model.block[k, PAIR]
+    code = model.block[k, CODE]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     x, rate = member_rows(model, p, i, q, v, row, row_rate)
-    x -= member_state[2, i]
+    x -= member_state[SET, i]
     second = 0.0
-    for r in range(6):
-        d = 3 * model.pair[p, r // 3] + r % 3
+    for r in range(pair_freedoms(model)):
+        d = place_in_pair(model, p, r)
         second += row[r] * a[d] + row_rate[r] * v[d]
-    mode = int(member_state[1, i])
+    mode = int(member_state[MODE, i])
     by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
     speed = by_x * rate + by_rate * second
     for d in range(n):
         slopes[0, d] = 0.0
         slopes[1, d] = 0.0
     if speed != 0.0:
-        for r in range(6):
-            d = 3 * model.pair[p, r // 3] + r % 3
+        for r in range(pair_freedoms(model)):
+            d = place_in_pair(model, p, r)
             slopes[0, d] = (by_x * row[r] + by_rate * row_rate[r]) / speed
             slopes[1, d] = by_rate * row[r] / speed
     bend = 2.0 * abs(by_x * second)
@@ -403,6 +327,6 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
 def block_of(model, i):
     """The block of padded member i."""
     for k in range(model.block.shape[0]):
-        if model.block[k, 1] <= i and i < model.block[k, 2]:
+        if model.block[k, START] <= i and i < model.block[k, STOP]:
             return k
     return -1

@@ -10,15 +10,23 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
+from mdstopo.general.members import SCALE
+from mdstopo.general.model import CODE, COUNT, PAIR, START
+from mdstopo.general.strides import first_freedom
 from mdstopo.integrators.steps import FORCES, TURN
-from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
-from mdstopo.mechanics.kinematics.planar_scales import (
+from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_gross_force,
+    advance_coordinates,
+    arm_of,
     deflection,
+    freedoms,
     gross_loads,
     largest_turn,
     motion_weights,
     noise_of,
+    pose_size,
+    relative_pose,
+    retract,
     rounding_of_pairs,
 )
 from mdstopo.mechanics.laws.table import law_is_given, law_unstretched
@@ -34,7 +42,7 @@ PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
 @kernel
 def unstretched_force(model, k):
     """The largest force of a member of block k at unit strength that does not come from its elongation."""
-    code = model.block[k, 3]
+    code = model.block[k, CODE]
     most = law_unstretched(code, model.law[k])
     if law_is_given(code):
         for segment in range(model.level.shape[0]):
@@ -69,9 +77,9 @@ def rounding_at_start(model, member_state, rel, v, stiffness, strain, noise):
         force = unstretched_force(model, k)
         if force > 0.0:
             total = 0.0
-            for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-                total += member_state[0, i]
-            add_gross_force(model.pair, rel, model.reach, model.block[k, 0], force * total, load)
+            for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+                total += member_state[SCALE, i]
+            add_gross_force(model, rel, model.block[k, PAIR], force * total, load)
     for d in range(n):
         inverse[d] = 1.0 / model.mass[d] if model.free[d] != 0 else 0.0
     rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise)
@@ -79,22 +87,23 @@ def rounding_at_start(model, member_state, rel, v, stiffness, strain, noise):
     for p in range(noise.shape[0]):
         most = max(most, noise[p])
     for p in range(noise.shape[0]):
-        arm = np.sqrt(rel[p, 0] * rel[p, 0] + rel[p, 1] * rel[p, 1]) + model.reach[p]
+        arm = arm_of(model, rel, p)
         driven = False
         for side in range(2):
             body = model.pair[p, side]
-            for axis in range(3):
-                driven = driven or (body + 1 < n // 3 and model.free[3 * body + axis] == 0)
+            first = first_freedom(model, body)
+            for d in range(first, first + freedoms(model)):
+                driven = driven or (body + 1 < model.home.shape[0] and model.free[d] == 0)
         noise[p] = 1e-15 * arm if driven else min(max(noise[p], most), 1e-15 * arm + 1e-300)
 
 
 @kernel
-def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):
+def motion_scale(model, q, rel, rel0, motion, noise, tolerance, scale):
     """What the errors of each pair's motion are measured against.
 
     Constant:
-      pair (n_pair, 2), reach (n_pair,): of the compiled scene.
-      q (n,): coordinates (m, rad). rel, rel0 (n_pair, POSE): relative poses now, and at the start.
+      model: the compiled scene.
+      q (n_q,): coordinates. rel, rel0 (n_pair, POSE): relative poses now, and at the start.
       motion (n_pair,): how far each pair has moved so far (m).
       noise (n_pair,): what rounding leaves of that (m).
       tolerance: error that a step may have, relative.
@@ -102,11 +111,11 @@ def motion_scale(pair, q, rel, rel0, reach, motion, noise, tolerance, scale):
       scale (n_pair,): the lengths that errors are measured against (m).
     """
     widest = 0.0
-    for p in range(pair.shape[0]):
-        scale[p] = max(motion[p], deflection(rel, rel0, reach, p))
+    for p in range(model.pair.shape[0]):
+        scale[p] = max(motion[p], deflection(model, rel, rel0, p))
         widest = max(widest, scale[p])
-    for p in range(pair.shape[0]):
-        lost = noise_of(pair, noise, rel, reach, q, p)
+    for p in range(model.pair.shape[0]):
+        lost = noise_of(model, noise, rel, q, p)
         scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
 
 
@@ -120,25 +129,26 @@ def first_step(
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       end: time beyond which it does not lead (s).
-      q0, v0, a0 (n,): coordinates, velocities, accelerations at the start (m, rad; per s; per s^2).
+      q0 (n_q,), v0, a0 (n,): coordinates, velocities, accelerations at the start.
       rel0 (n_pair, POSE): relative poses at the start.
       motion, noise (n_pair,): how far each pair is strained at the start, and what rounding leaves of that (m).
       tolerance, order: error that a step may have, relative; order of the method.
     Out:
-      lam (n_row,), q, v, a (n,): scratch.
+      lam (n_row,), q (n_q,), v, a (n,): scratch.
       workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
     """
-    n = q0.shape[0]
+    n = v0.shape[0]
     n_pair = model.pair.shape[0]
     t = model.times[0]
-    rel = np.empty((n_pair, POSE))
+    rel = np.empty((n_pair, pose_size(model)))
     scale = np.empty(n_pair)
     weight = np.empty(n)
+    more = np.empty(n)
     h = end - t
     for _ in range(PROBES):
+        advance_coordinates(model, q0, v0, a0, h, q)
         for d in range(n):
-            q[d] = q0[d] + h * (v0[d] + 0.5 * h * a0[d])
             v[d] = v0[d] + h * a0[d]
         singular = solve_accelerations(
             model, member_state, np.int64(0), t + h, q, v, np.bool_(False), workspace, a, lam
@@ -147,20 +157,21 @@ def first_step(
         finite = True
         for d in range(n):
             finite = finite and np.isfinite(a[d])
-            if model.free[d] != 0:  # with the accelerations' slope: a motion that begins with none has a size, too
-                q[d] += h * h / 6.0 * (a[d] - a0[d])
+            # with the accelerations' slope: a motion that begins with none has a size, too
+            more[d] = h * h / 6.0 * (a[d] - a0[d]) if model.free[d] != 0 else 0.0
+        retract(model, q, more, q)
         if singular >= 0 or not finite:
             h *= 0.1
             continue
-        relative_pose(model.pair, model.home, q, v, rel)
-        motion_scale(model.pair, q, rel, rel0, model.reach, motion, noise, tolerance, scale)
-        motion_weights(model.pair, rel, model.reach, scale, weight)
+        relative_pose(model, q, v, rel)
+        motion_scale(model, q, rel, rel0, motion, noise, tolerance, scale)
+        motion_weights(model, rel, scale, weight)
         theta = 0.0
         for d in range(n):
             theta = max(theta, 0.5 * h * h * weight[d] * abs(a[d] - a0[d]))
         if theta <= ENOUGH:
             tau = h / np.sqrt(max(theta, 1e-30))
-            turned = largest_turn(model.pair, q0, q) / h
+            turned = largest_turn(model, q0, q) / h
             allowed = tau * (tolerance / FIRST[1 if model.size[2] != 0 else 0]) ** (1.0 / order)
             return min(allowed, TURN / max(turned, 1e-300))
         h *= max(np.sqrt(AIM / theta), 0.1) if theta < HOPELESS else 0.1

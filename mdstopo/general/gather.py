@@ -3,17 +3,27 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.compiler.padding import whole_vectors
-from mdstopo.general.forces import inerter_force, turn_bodies, turned_pose
-from mdstopo.general.members import block_design, rate_of_row, stretched
-from mdstopo.general.model import INERTER
+from mdstopo.general.forces import inerter_force
+from mdstopo.general.members import MODE, SET, level_of, rate_of_row
+from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, INERTER, KIND, OFFSET, PAIR, START, SUBJECT
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.step_history import has_factors
+from mdstopo.general.strides import pair_freedoms
 from mdstopo.general.switches import carriers
-from mdstopo.integrators.steps import DESIGN
-from mdstopo.mechanics.kinematics.planar_poses import POSE, pair_displacement, relative_pose
-from mdstopo.mechanics.laws.alike import elastic_designs
+from mdstopo.integrators.steps import DESIGN as DESIGN_STATES
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    attitude,
+    freedoms,
+    member_designs,
+    motion_of_ends,
+    pair_displacement,
+    pose_size,
+    relative_pose,
+    spring_designs,
+    turn_bodies,
+    turned_pose,
+)
 from mdstopo.mechanics.laws.table import SPRING, law
 
 
@@ -35,17 +45,15 @@ def add_design(model, segment, t, member_state, q, v, a, z, weight, out, work):
       work (WORK,): counts of work, added to.
     """
     n = model.mass.shape[0]
-    work[DESIGN] += 1
+    work[DESIGN_STATES] += 1
     when = np.empty(1)
-    stage = np.empty((1, 3, n))
-    turned = np.empty((1, n // 3, 2))
+    turned = np.empty((1, model.home.shape[0], attitude(model)))
     when[0] = t
-    for d in range(n):
-        stage[0, 0, d] = q[d]
-        stage[0, 1, d] = v[d]
-        stage[0, 2, d] = a[d]
-    turn_bodies(q, turned[0])
-    _add(model, segment, when, member_state, stage, turned, z.reshape((1, n)), weight, out)
+    turn_bodies(model, q, turned[0])
+    _add(
+        model, segment, when, member_state, q.reshape((1, q.shape[0])), v.reshape((1, n)), a.reshape((1, n)), turned,
+        z.reshape((1, n)), weight, out,
+    )  # fmt: skip
 
 
 @kernel
@@ -63,25 +71,28 @@ def add_designs(model, segment, history, o, member_state, z, out, work):
       work (WORK,): counts of work, added to.
     """
     end = o + z.shape[0]
-    work[DESIGN] += z.shape[0]
+    work[DESIGN_STATES] += z.shape[0]
     if has_factors(history):
         turned = history.turned[o:end]
     else:
-        turned = np.empty((z.shape[0], model.mass.shape[0] // 3, 2))
+        turned = np.empty((z.shape[0], model.home.shape[0], attitude(model)))
         for j in range(z.shape[0]):
-            turn_bodies(history.stage[o + j, 0], turned[j])
-    _add(model, segment, history.when[o:end], member_state, history.stage[o:end], turned, z, 0.0, out)
+            turn_bodies(model, history.stage_q[o + j], turned[j])
+    _add(
+        model, segment, history.when[o:end], member_state, history.stage_q[o:end], history.stage_v[o:end],
+        history.stage_a[o:end], turned, z, 0.0, out,
+    )  # fmt: skip
 
 
 @kernel
-def _add(model, segment, when, member_state, stage, turned, z, weight, out):
+def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
     """`add_design` at S states of one segment.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`. when (S,): times (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      stage (S, 3, n): coordinates, velocities, accelerations. turned (S, n_body, 2): of `forces.turn_bodies`.
+      q (S, n_q), v, a (S, n): coordinates, velocities, accelerations. turned (S, n_body, A): of `turn_bodies`.
       z (S, n): virtual displacements.
       weight: of the stored energy.
     Out:
@@ -89,46 +100,45 @@ def _add(model, segment, when, member_state, stage, turned, z, weight, out):
     """
     count = z.shape[0]
     n_pair = model.pair.shape[0]
-    rel = np.empty((count, n_pair, POSE))
-    u = np.empty((count, n_pair, 3))
-    row = np.empty(6)
+    rel = np.empty((count, n_pair, pose_size(model)))
+    u = np.empty((count, n_pair, freedoms(model)))
+    row = np.empty(pair_freedoms(model))
     carries = carriers(model)
     for j in range(count):
         for p in range(n_pair):
             if carries[p] != 0:
-                turned_pose(model, p, turned[j], stage[j, 0], stage[j, 1], rel[j])
-                _virtual(model.pair, rel[j], p, z[j], u[j, p])
+                turned_pose(model, p, turned[j], q[j], v[j], rel[j])
+                _virtual(model, rel[j], p, z[j], u[j, p])
     for k in range(model.block.shape[0]):
-        code = model.block[k, 3]
-        if model.block[k, 4] < 0 or model.active[segment, k] == 0:
+        code = model.block[k, CODE]
+        if model.block[k, DESIGN] < 0 or model.active[segment, k] == 0:
             continue
-        p = model.block[k, 0]
-        lo = model.block[k, 1]
+        p = model.block[k, PAIR]
+        lo = model.block[k, START]
         if code == SPRING and weight == 0.0 and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
-            width = model.member.shape[1]
-            rows = model.member.reshape(6 * width)
-            stop = lo + whole_vectors(model.block[k, 5])
-            elastic_designs(rows, width, lo, stop, model.law[k, 0], rel, u, p, out)
+            spring_designs(model, model.law[k], lo, model.block[k, COUNT], rel, u, p, out)
             continue
         for j in range(count):
             if code != INERTER:
-                block_design(model, k, segment, when[j], member_state, member_state[1], rel[j, p], u[j, p], weight, out)
+                level = level_of(model, segment, k, when[j])
+                member_designs(
+                    model, code, model.law[k], lo, model.block[k, COUNT], when[j], level, member_state,
+                    member_state[MODE], rel[j, p], u[j, p], weight, out,
+                )  # fmt: skip
                 continue
-            for i in range(lo, lo + model.block[k, 5]):
-                f = inerter_force(model, k, i, stage[j, 0], stage[j, 1], stage[j, 2], row)
+            for i in range(lo, lo + model.block[k, COUNT]):
+                f = inerter_force(model, k, i, q[j], v[j], a[j], row)
                 out[i] -= f * rate_of_row(model, p, row, z[j])
     if model.varied.shape[0] > 0:
         for j in range(count):
-            add_parameters(
-                model, segment, when[j], member_state, stage[j, 0], stage[j, 1], stage[j, 2], z[j], weight, out
-            )
+            add_parameters(model, segment, when[j], member_state, q[j], v[j], a[j], z[j], weight, out)
 
 
 @kernel
-def _virtual(pair, rel, p, z, out):
-    """out (3,) = -T z of pair p: the virtual change of its relative pose, with the sign turned."""
-    pair_displacement(pair, rel, p, z, out)
-    for i in range(3):
+def _virtual(model, rel, p, z, out):
+    """out (D,) = -T z of pair p: the virtual change of its relative pose, with the sign turned."""
+    pair_displacement(model, rel, p, z, out)
+    for i in range(freedoms(model)):
         out[i] = -out[i]
 
 
@@ -148,11 +158,11 @@ def explicit_part(model, segment, j, who, t, member_state, q, v, a, scale, out):
     Out:
       out (M_padded + P,): scale times the derivative of f* by alpha^mu and by parameters, added to.
     """
-    if model.response[j, 0] != MEMBER_FORCE:
+    if model.response[j, KIND] != MEMBER_FORCE:
         return
     _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out)
     if model.varied.shape[0] > 0:
-        add_force_parameters(model, segment, model.response[j, 5], who, t, member_state, q, v, a, scale, out)
+        add_force_parameters(model, segment, model.response[j, SUBJECT], who, t, member_state, q, v, a, scale, out)
 
 
 @kernel
@@ -169,11 +179,11 @@ def force_sign(model, segment, j, who, t, member_state, q, v, a):
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
     """
-    if model.response[j, 0] != MEMBER_FORCE:
+    if model.response[j, KIND] != MEMBER_FORCE:
         return 1.0
-    slopes = np.empty((3, 6))
-    own = np.empty((2, 6))
-    f, _ = member_force(model, member_state, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+    slopes = np.empty((3, pair_freedoms(model)))
+    own = np.empty((2, pair_freedoms(model)))
+    f, _ = member_force(model, member_state, segment, t, model.response[j, SUBJECT], who, q, v, a, slopes, own)
     return 1.0 if f >= 0.0 else -1.0
 
 
@@ -191,19 +201,19 @@ def _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out):
     Out:
       out (M_padded,): added to.
     """
-    row = np.empty(6)
-    rel = np.empty((model.pair.shape[0], POSE))
-    relative_pose(model.pair, model.home, q, v, rel)
+    row = np.empty(pair_freedoms(model))
+    rel = np.empty((model.pair.shape[0], pose_size(model)))
+    relative_pose(model, q, v, rel)
     for k in range(model.block.shape[0]):
-        if model.block[k, 6] != model.response[j, 5] or model.active[segment, k] == 0:
+        if model.block[k, GROUP] != model.response[j, SUBJECT] or model.active[segment, k] == 0:
             continue
-        if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
+        if who < model.block[k, OFFSET] or who >= model.block[k, OFFSET] + model.block[k, COUNT]:
             continue
-        i = model.block[k, 1] + who - model.block[k, 7]
-        if model.block[k, 3] == INERTER:
+        i = model.block[k, START] + who - model.block[k, OFFSET]
+        if model.block[k, CODE] == INERTER:
             f = inerter_force(model, k, i, q, v, a, row)
         else:
-            f = _unit_force(model, k, i, segment, t, rel[model.block[k, 0]], member_state)
+            f = _unit_force(model, k, i, segment, t, rel[model.block[k, PAIR]], member_state)
         out[i] += scale * f
 
 
@@ -218,15 +228,10 @@ def _unit_force(model, k, i, segment, t, r, member_state):
       r (POSE,): relative pose of its pair.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
     """
-    c = r[2]
-    s = r[3]
-    ax = c * model.member[2, i] - s * model.member[3, i]
-    ay = s * model.member[2, i] + c * model.member[3, i]
-    x = r[0] + ax - model.member[0, i]
-    y = r[1] + ay - model.member[1, i]
-    length = np.sqrt(x * x + y * y)
-    rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
-    value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    stretch = stretched(model.member, i, r, length) - member_state[2, i]
-    f, _, _, _, _ = law(model.block[k, 3], model.law[k], stretch, rate, int(member_state[1, i]), t, value, model.curves)
+    stretch, rate = motion_of_ends(model, i, r)
+    stretch -= member_state[SET, i]
+    value = level_of(model, segment, k, t)
+    f, _, _, _, _ = law(
+        model.block[k, CODE], model.law[k], stretch, rate, int(member_state[MODE, i]), t, value, model.curves
+    )
     return f

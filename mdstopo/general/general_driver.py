@@ -25,7 +25,7 @@ from mdstopo.general.extremes import (
 )
 from mdstopo.general.kinks import landed
 from mdstopo.general.minima import minima
-from mdstopo.general.model import COUNT, GROUP, INERTER, OFFSET, START, GeneralModel, pack_general
+from mdstopo.general.model import COUNT, GROUP, INERTER, JOINT_FIRST, OFFSET, START, GeneralModel, pack_general
 from mdstopo.general.quadrature_breakpoints import INTEGRALS, ROUNDS, quadrature_breakpoints, reduced
 from mdstopo.general.ready import Ready
 from mdstopo.general.row_gradients import RowGradients
@@ -85,7 +85,10 @@ class GeneralDriver:
         self.where = np.full(3, -1, dtype=np.int64)
         n = len(model.mass)
         #: arrays for the results of `evaluate_one`, and of `_integral_with_gradient`
-        self._one = np.zeros((1, 2)), np.zeros((3, 1, n)), np.zeros((1, self._multipliers)), np.zeros((1, 3))
+        self._one = (
+            np.zeros((1, 2)), np.zeros((1, len(model.q0))), np.zeros((2, 1, n)), np.zeros((1, self._multipliers)),
+            np.zeros((1, 3)),
+        )  # fmt: skip
         self._integral_gradient = np.zeros(n_design + varied)
         self._row_gradients = RowGradients(self)
         self._make_rows(ROWS)
@@ -143,7 +146,7 @@ class GeneralDriver:
         from mdstopo.general.start_entry import assemble
 
         q, v = model.q0.copy(), model.v0.copy()
-        phi, rates = np.zeros((len(model.joint), 3)), np.zeros((len(model.joint), 3))
+        phi, rates = np.zeros((2, *model.row.shape))
         move = self.case.solver.assemble
         assemble(self.ints, self.floats, q, v, move, phi, rates)
         size = size_of(self.case)
@@ -307,14 +310,14 @@ class GeneralDriver:
             if steps is None
             else steps.kept
         )
-        out = np.zeros((3, len(places), len(model.mass)))
+        q, out = np.zeros((len(places), len(model.q0))), np.zeros((2, len(places), len(model.mass)))
         lam = np.zeros((len(places), self._multipliers))
         seen = np.zeros((len(places), 3))
         self.entry.sample_response(
             self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, member_state, exact, rates, j,
-            who, places, out, lam, seen, self.work,
+            who, places, q, out, lam, seen, self.work,
         )  # fmt: skip
-        return out, lam, seen
+        return np.stack([q, *out]), lam, seen
 
     @property
     def _multipliers(self) -> int:
@@ -324,12 +327,12 @@ class GeneralDriver:
     def evaluate_one(self, j: int, count: int, place: FloatArray, who: int = -1) -> FloatArray:
         """(3,) value, rate, member of response j at one place (2,), exactly; who: as of `sample_response`. The array is
         the driver's own: the next call overwrites it."""
-        places, out, lam, seen = self._one
+        places, q, out, lam, seen = self._one
         places[0] = place
         self.ready(
             "sample_response", self.entry.sample_response, self.entry.TAG, self.ints, self.floats, self.method.tables,
-            self.limits, count, self.room, self.room_ints, self.member_state, True, True, j, who, places, out, lam,
-            seen, self.work,
+            self.limits, count, self.room, self.room_ints, self.member_state, True, True, j, who, places, q, out,
+            lam, seen, self.work,
         )  # fmt: skip
         found: FloatArray = seen[0]
         return found
@@ -461,8 +464,16 @@ class GeneralDriver:
 
     def _with_start(self) -> GeneralModel:
         """The model with the start as it was assembled or has settled."""
-        floats, n = self._packed[1], len(self.scene.model.mass)
-        return self._model._replace(q0=floats[n : 2 * n].copy(), v0=floats[2 * n : 3 * n].copy())
+        q0, v0 = self.packed_start()
+        return self._model._replace(q0=q0, v0=v0)
+
+    def packed_start(self) -> tuple[FloatArray, FloatArray]:
+        """Coordinates (n_q,) and velocities (n,) at the start, as kernels have them: copies."""
+        model = self.scene.model
+        begin = len(model.mass)
+        ends = np.cumsum([begin, len(model.q0), len(model.v0)])
+        q0, v0 = np.split(self._packed[1][: ends[-1]], ends[:-1])[1:]
+        return q0.copy(), v0.copy()
 
     def _explain(self, code: int, time: float) -> str:
         if code == OK:
@@ -476,13 +487,15 @@ class GeneralDriver:
         if code == STEP_LIMIT and self.where[0] >= 0:
             who = self.member(int(self.where[0]))
             return f"{when}; {who} brakes too fast for explicit steps: a larger slip or a smaller damping needs fewer"
-        v = self.states()[1][self._steps_until(time), 1, : self.scene.n]
+        v = self.states()[2][self._steps_until(time), : self.scene.n]
         return f"{when}; the fastest body is {fastest_body(self.scene.bodies, v)}"
 
-    def states(self) -> tuple[FloatArray, FloatArray]:
-        """Times and states in the driver's room, with the room for more behind them."""
-        steps, n = int(self.limits[1]) + 1, len(self.scene.model.mass)
-        return self.room[:steps], self.room[steps : steps + 2 * n * steps].reshape(steps, 2, n)
+    def states(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Times, coordinates and velocities in the driver's room, with the room for more behind them."""
+        steps, model = int(self.limits[1]) + 1, self.scene.model
+        ends = np.cumsum([steps, steps * len(model.q0), steps * len(model.v0)])
+        t, q, v = np.split(self.room[: ends[-1]], ends[:-1])
+        return t, q.reshape(steps, -1), v.reshape(steps, -1)
 
     def _steps_until(self, time: float) -> int:
         return int(np.argmin(np.abs(self.states()[0] - time)))
@@ -496,7 +509,7 @@ class GeneralDriver:
         unknown = int(np.flatnonzero(model.place == place)[0])
         if unknown >= n:
             return describe(self.case.joints[int(np.argwhere(model.row == unknown - n)[0, 0])])
-        body = unknown // 3
+        body = unknown // self.scene.kinematics.freedoms
         tied = [joint for joint in self.case.joints if self.scene.bodies[body] in joint.bodies]
         return describe(tied[0]) if tied else f"body {self.scene.bodies[body]}"
 
@@ -526,9 +539,9 @@ class GeneralSteps:
         packed = driver.ints, driver.floats
         self.kept = packed, driver.limits, driver.room.copy(), driver.room_ints.copy(), driver.member_state.copy()
         self.count = count
-        t, state = driver.states()
+        t, q, v = driver.states()
         self.t: FloatArray = t[: count + 1].copy()
-        self.state: FloatArray = state[: count + 1].copy()
+        self.state: FloatArray = np.stack([q[: count + 1], v[: count + 1]], axis=1)
 
     def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """q, v, a (3, T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
@@ -557,31 +570,32 @@ class GeneralSteps:
         if n_row < len(places):
             from mdstopo.general.start_entry import slopes_of
 
-            jac = np.zeros((len(model.joint), 3, 6))
+            each = self._driver.scene.kinematics.freedoms
+            phi, jac = np.zeros(model.row.shape), np.zeros((*model.row.shape, 2 * each))
             for k in range(len(q)):
-                slopes_of(model.joint, model.joint_par, model.home, q[k].copy(), np.zeros((len(model.joint), 3)), jac)
+                slopes_of(model.joint, model.joint_par, model.home, q[k].copy(), phi, jac)
                 dense = np.zeros((len(places), len(model.mass)))
                 for i, (j, r) in enumerate(places):
-                    for c in range(6):
-                        dense[i, 3 * int(model.joint[j, 1 + c // 3]) + c % 3] += jac[j, r, c]
+                    for c in range(2 * each):
+                        dense[i, each * int(model.joint[j, JOINT_FIRST + c // each]) + c % each] += jac[j, r, c]
                 dense[:, model.free == 0] = 0.0
                 lam[k] = np.linalg.lstsq(dense.T, dense.T @ lam[k], rcond=1e-10)[0]
         return np.concatenate([lam, solved[:, n_row:]], axis=1)
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
-        """Joint name -> Fx, Fy, M (T, 3) on its first body, at states q (T, n) with lam (T, n_rows)."""
+        """Joint name -> force and moment (T, D) on its first body, at states q (T, n_q) with lam (T, n_rows)."""
         from mdstopo.general.start_entry import reactions
 
         model = self._driver.scene.model
-        row = np.full((len(model.joint), 3), -1, dtype=np.int64)
+        row = np.full(model.row.shape, -1, dtype=np.int64)
         i = 0
         for j in range(len(model.joint)):
             for r in range(int(model.joint[j, 4])):
                 row[j, r] = i
                 i += 1
-        full = np.zeros((len(q), len(model.mass)))
+        full = np.zeros((len(q), len(model.q0)))
         full[:, : q.shape[1]] = q
-        out = np.zeros((len(q), len(model.joint), 3))
+        out = np.zeros((len(q), len(model.joint), self._driver.scene.kinematics.freedoms))
         reactions(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
         return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}
 

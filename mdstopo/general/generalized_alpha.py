@@ -17,8 +17,7 @@ from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.events import first_sign, has_switches, smallest_margin
 from mdstopo.general.first_step import rounding_at_start
-from mdstopo.general.forces import drive_state
-from mdstopo.general.generalized_alpha_step import advance, copy_state, rate_of
+from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, rate_of
 from mdstopo.general.locate import (
     CUTS,
     TRIALS,
@@ -30,11 +29,25 @@ from mdstopo.general.locate import (
     note_trial,
     quintic_ends,
 )
-from mdstopo.general.members import meeting, scale_general
+from mdstopo.general.members import MODE, SET, meeting, scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_size, start_modes
-from mdstopo.general.step_history import carve_history, copy_vector, keep_state
+from mdstopo.general.step_history import (
+    EVENTS,
+    FIRST,
+    GRAZES,
+    MEMBER,
+    NEW,
+    OLD,
+    PARENT,
+    SEGMENT,
+    STATE,
+    carve_history,
+    copy_vector,
+    keep_state,
+)
+from mdstopo.general.strides import energy_column
 from mdstopo.integrators.generalized_alpha import FEWEST
 from mdstopo.integrators.steps import (
     ACCEPTED,
@@ -47,8 +60,14 @@ from mdstopo.integrators.steps import (
     STEP_LIMIT,
     STEP_TOO_SMALL,
 )
-from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
-from mdstopo.mechanics.kinematics.planar_scales import deflection
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    deflection,
+    drive_state,
+    pair_stiffness,
+    pose_size,
+    relative_pose,
+)
+from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 TAG = (0, 0)
 
@@ -77,38 +96,44 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     """
     model = unpack_general(ints, floats)
     newton_tolerance = settings[1]
-    n = model.q0.shape[0]
+    n_q = model.q0.shape[0]
+    n = model.v0.shape[0]
     n_pair = model.pair.shape[0]
     n_row = model.size[0]
     history = carve_history(model, limits, room, room_ints)
     history.mass[0] = 0.0
     scale_general(model.block, model.power, alpha, member_state)
-    member_state[1] = 0.0
-    member_state[2] = 0.0
+    member_state[MODE] = 0.0
+    member_state[SET] = 0.0
     times = model.times
     workspace = make_workspace(model)
     no = np.bool_(False)
     size = scene_size(model)
     rounding = ROUNDING * size
     nowhere = np.int64(-1)
-    rel = np.empty((n_pair, POSE))
-    rel0 = np.empty((n_pair, POSE))
-    before = np.empty((n_pair, POSE))
-    state = np.zeros((4, n))
-    ends = np.zeros((4, n))
+    rel = np.empty((n_pair, pose_size(model)))
+    rel0 = np.empty((n_pair, pose_size(model)))
+    before = np.empty((n_pair, pose_size(model)))
+    q = np.zeros(n_q)
+    state = np.zeros((3, n))
+    end_q = np.zeros(n_q)
+    ends = np.zeros((3, n))
     guess = np.zeros((3, n))
-    trial = np.zeros((4, n))
+    trial_q = np.zeros(n_q)
+    trial = np.zeros((3, n))
     trials = np.zeros((2, 2))
-    curve = np.empty((6, n))
+    curve_q = np.empty((2, n_q))
+    curve = np.empty((2, 2, n))
     cut = np.empty(CUTS + 1)
-    beyond = np.zeros((CUTS + 1, 4, n))
-    left = np.zeros((4, n))
-    kept = np.zeros((4, n))
+    beyond_q = np.zeros((CUTS + 1, n_q))
+    beyond = np.zeros((CUTS + 1, 3, n))
+    left_q = np.zeros(n_q)
+    left_v = np.zeros(n)
+    kept = np.zeros((3, n))
     push = np.zeros((2, n_row))
     lam = np.zeros(n_row)
     a0 = np.zeros(n)
-    q = state[0]
-    v = state[1]
+    v = state[VELOCITY]
     copy_vector(model.q0, q)
     copy_vector(model.v0, v)
     for i in range(where.shape[0]):
@@ -128,15 +153,16 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
-    relative_pose(model.pair, model.home, q, v, rel0)
+    relative_pose(model, q, v, rel0)
     extent = np.zeros((2, n_pair))
     motion = extent[0]
     noise = extent[1]
     stiffness = np.empty(n_pair)
     for p in range(n_pair):
-        stiffness[p] = workspace.sums[p, 7] + workspace.sums[p, 11]
-        if workspace.sums[p, 3] > 0.0 and stiffness[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * workspace.sums[p, 3] / stiffness[p])
+        stiffness[p] = pair_stiffness(model, workspace.sums, p)
+        energy = workspace.sums[p, energy_column(model)]
+        if energy > 0.0 and stiffness[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * energy / stiffness[p])
     rounding_at_start(model, member_state, rel0, v, stiffness, motion, noise)
     span = times[times.shape[0] - 1] - t
     step = settings[2]
@@ -146,22 +172,22 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     events = np.int64(0)
     if switching:
         for i in range(member_state.shape[1] - 1):
-            if member_state[1, i] != 0.0:
+            if member_state[MODE, i] != 0.0:
                 if events >= history.event.shape[0]:
                     return NEEDS_ROOM, 0, 0, t
-                history.event[events, 0] = 0
-                history.event[events, 1] = i
-                history.event[events, 2] = 0
-                history.event[events, 3] = int(member_state[1, i])
-                history.event[events, 4] = 0
+                history.event[events, STATE] = 0
+                history.event[events, MEMBER] = i
+                history.event[events, OLD] = 0
+                history.event[events, NEW] = int(member_state[MODE, i])
+                history.event[events, GRAZES] = 0
                 history.kept[events, 0] = 0.0
-                history.kept[events, 1] = member_state[2, i]
+                history.kept[events, 1] = member_state[SET, i]
                 history.kept[events, 2] = 0.0
                 history.saltation[events] = 0.0
                 events += 1
-        member_state[1, member_state.shape[1] - 1] = events
+        member_state[MODE, member_state.shape[1] - 1] = events
     keep_state(history, 0, t, q, v, push[0], push[1])
-    history.index[0, 0] = 0
+    history.index[0, FIRST] = 0
     count = np.int64(0)
     stages = np.int64(0)
     crowd_time = t
@@ -198,13 +224,13 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             lands = done + 1.0 >= pieces
             starting = np.bool_(known == 0)
             code, used, singular = advance(
-                model, tables[0], member_state, segment, t, h, starting, state, guess, newton_tolerance, size, stages,
-                workspace, history, ends, push, extent, rel0, work,
+                model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance, size,
+                stages, workspace, history, end_q, ends, push, extent, rel0, work,
             )  # fmt: skip
             if code != OK:
                 where[0] = singular
                 return code, count, events, t
-            relative_pose(model.pair, model.home, ends[0], ends[1], rel)
+            relative_pose(model, end_q, ends[VELOCITY], rel)
             happens = False
             who = nowhere
             if switching:
@@ -214,13 +240,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 top = 0
                 cuts = 0
                 cut[0] = h
-                copy_state(ends, beyond[0])
-                copy_state(state, left)
+                copy_vector(end_q, beyond_q[0])
+                copy_rows(ends, beyond[0])
+                copy_vector(q, left_q)
+                copy_vector(v, left_v)
                 while top >= 0:  # as `runge_kutta.simulate` does
-                    relative_pose(model.pair, model.home, left[0], left[1], before)
-                    relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model, left_q, left_v, before)
+                    relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
                     dip, near = first_sign(
-                        model, segment, member_state, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
+                        model, segment, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before, rel,
                         cut[top] - low, rounding,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
@@ -228,21 +256,22 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         if top == 0 and margin < -rounding:
                             break
                         low = cut[top]
-                        copy_state(beyond[top], left)
+                        copy_vector(beyond_q[top], left_q)
+                        copy_vector(beyond[top, VELOCITY], left_v)
                         top -= 1
                         continue
                     cuts += 1
                     top += 1
                     cut[top] = middle
-                    copy_state(state, kept)
+                    copy_rows(state, kept)
                     code, _, singular = advance(
-                        model, tables[0], member_state, segment, t, middle, starting, kept, guess, newton_tolerance,
-                        size, nowhere, workspace, history, beyond[top], push, extent, rel0, work,
+                        model, tables[0], member_state, segment, t, middle, starting, q, kept, guess, newton_tolerance,
+                        size, nowhere, workspace, history, beyond_q[top], beyond[top], push, extent, rel0, work,
                     )  # fmt: skip
                     if code != OK:
                         where[0] = singular
                         return code, count, events, t
-                    relative_pose(model.pair, model.home, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
                     value, near_who = smallest_margin(model, segment, member_state, rel)
                     if value < -rounding:
                         high = middle
@@ -251,7 +280,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         break
                     if value < graze and matters(model, member_state, rel, near_who):
                         where[2] = near_who
-                relative_pose(model.pair, model.home, left[0], left[1], before)
+                relative_pose(model, left_q, left_v, before)
                 happens = margin < -rounding
                 if happens:
                     at_low, _ = smallest_margin(model, segment, member_state, before)
@@ -260,24 +289,29 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     side = 0
                     piece = low
                     stop = high
-                    quintic_ends(model, member_state, segment, t, piece, stop, left, beyond[top], workspace, lam, curve)
+                    quintic_ends(
+                        model, member_state, segment, t, piece, stop, left_q, left_v, beyond_q[top],
+                        beyond[top, VELOCITY], workspace, lam, curve_q, curve,
+                    )  # fmt: skip
                     work[FORCES] += 2
                     for tries in range(TRIALS):
                         foreseen = foreseen_trial(
-                            model, member_state, segment, t, piece, stop, curve, trials, tries, rounding, trial, rel
-                        )
+                            model, member_state, segment, t, piece, stop, curve_q, curve, trials, tries, rounding,
+                            trial_q, trial[VELOCITY], rel,
+                        )  # fmt: skip
                         middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
                         if middle < 0.0:
                             break
-                        copy_state(state, kept)
+                        copy_rows(state, kept)
                         code, _, singular = advance(
-                            model, tables[0], member_state, segment, t, middle, starting, kept, guess, newton_tolerance,
-                            size, nowhere, workspace, history, trial, push, extent, rel0, work,
+                            model, tables[0], member_state, segment, t, middle, starting, q, kept, guess,
+                            newton_tolerance, size, nowhere, workspace, history, trial_q, trial, push, extent,
+                            rel0, work,
                         )  # fmt: skip
                         if code != OK:
                             where[0] = singular
                             return code, count, events, t
-                        relative_pose(model.pair, model.home, trial[0], trial[1], rel)
+                        relative_pose(model, trial_q, trial[VELOCITY], rel)
                         value, who = smallest_margin(model, segment, member_state, rel)
                         note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
@@ -286,41 +320,44 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     h = high
                     lands = lands and t + h >= end
                     code, used, singular = advance(
-                        model, tables[0], member_state, segment, t, h, starting, state, guess, newton_tolerance, size,
-                        stages, workspace, history, ends, push, extent, rel0, work,
+                        model, tables[0], member_state, segment, t, h, starting, q, state, guess, newton_tolerance,
+                        size, stages, workspace, history, end_q, ends, push, extent, rel0, work,
                     )  # fmt: skip
-                relative_pose(model.pair, model.home, ends[0], ends[1], rel)
+                relative_pose(model, end_q, ends[VELOCITY], rel)
             finite = True
+            for d in range(n_q):
+                finite = finite and np.isfinite(end_q[d])
             for d in range(n):
-                finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
+                finite = finite and np.isfinite(ends[VELOCITY, d])
             if not finite:
                 return NON_FINITE, count, events, t
             for p in range(n_pair):
-                motion[p] = max(motion[p], deflection(rel, rel0, model.reach, p))
+                motion[p] = max(motion[p], deflection(model, rel, rel0, p))
             if where[1] < 0:
-                relative_pose(model.pair, model.home, q, v, before)
+                relative_pose(model, q, v, before)
                 where[1] = meeting(model, segment, t, member_state, before, rel)
             done += 1.0
             known += 1
             t = end if lands else (t + h if happens else begin + h * done)
             # x of the steps before; in the first ones it counts as having been constant
-            for back in range(3):
-                source = 2 - back - 1
-                for d in range(n):
-                    guess[2 - back, d] = guess[source, d] if source >= 0 else state[3, d]
+            for d in range(n):
+                guess[2, d] = guess[1, d]
+                guess[1, d] = guess[0, d]
+                guess[0, d] = state[AUXILIARY, d]
             if known <= 3:
                 for d in range(n):
-                    slope = ends[3, d] - state[3, d]
-                    guess[0, d] = ends[3, d] - slope
-                    guess[1, d] = ends[3, d] - 2.0 * slope
-                    guess[2, d] = ends[3, d] - 3.0 * slope
-            copy_state(ends, state)
-            history.index[count, 1] = count - 1
-            history.index[count, 2] = segment
-            history.index[count, 3] = events
+                    slope = ends[AUXILIARY, d] - state[AUXILIARY, d]
+                    guess[0, d] = ends[AUXILIARY, d] - slope
+                    guess[1, d] = ends[AUXILIARY, d] - 2.0 * slope
+                    guess[2, d] = ends[AUXILIARY, d] - 3.0 * slope
+            copy_vector(end_q, q)
+            copy_rows(ends, state)
+            history.index[count, PARENT] = count - 1
+            history.index[count, SEGMENT] = segment
+            history.index[count, EVENTS] = events
             stages += used
             count += 1
-            history.index[count, 0] = stages
+            history.index[count, FIRST] = stages
             keep_state(history, count, t, q, v, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
@@ -341,6 +378,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 done = 0.0
                 known = 0
                 pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
-            history.index[count, 3] = events
-    history.index[count + 1, 0] = stages  # no step follows (`weights_of`)
+            history.index[count, EVENTS] = events
+    history.index[count + 1, FIRST] = stages  # no step follows (`weights_of`)
     return OK, count, events, t

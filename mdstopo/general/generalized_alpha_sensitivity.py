@@ -11,10 +11,11 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
+from mdstopo.general.step_history import FIRST
 from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
 from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
-from mdstopo.integrators.generalized_alpha_linear import cubic, hermite
 from mdstopo.integrators.steps import REVERSE
+from mdstopo.mechanics.kinematics.kinematics_interface import cubic, cubic_jvp, cubic_vjp, retract_jvp, retract_vjp
 
 
 @kernel
@@ -24,28 +25,29 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
     Constant:
       history, k, c: the history of steps, the step, and a fraction of it.
     Out:
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
 
-    Not needed here: tag, model, tables, member_state, count, keep, workspace, work.
+    Not needed here: tag, tables, member_state, count, keep, workspace, work.
     """
-    cubic(history.state[k], history.state[k + 1], history.t[k + 1] - history.t[k], c, q, v)
+    h = history.t[k + 1] - history.t[k]
+    cubic(model, c, h, history.q[k], history.v[k], history.q[k + 1], history.v[k + 1], q, v)
     return k
 
 
 @kernel
-def beside(tag, history, k, c, e, q, v, a, q_out, v_out):
+def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
     """The cubic of step k, a little later than at fraction c.
 
     Constant:
       history, k, c: the history of steps, the step, and a fraction of it.
       e: how much later (s); below 0: earlier.
     Out:
-      q_out, v_out (n,): coordinates and velocities then (m, rad; m/s, rad/s).
+      q_out (n_q,), v_out (n,): coordinates and velocities then.
 
     Not needed here: tag; q, v, a, which are those at c.
     """
     h = history.t[k + 1] - history.t[k]
-    cubic(history.state[k], history.state[k + 1], h, c + e / h, q_out, v_out)
+    cubic(model, c + e / h, h, history.q[k], history.v[k], history.q[k + 1], history.v[k + 1], q_out, v_out)
 
 
 @kernel
@@ -67,12 +69,12 @@ def weights_of(tag, model, tables, history, w, out):
     """
     h = history.t[w + 1] - history.t[w]
     out[:] = 0.0
-    last = history.index[w + 1, 0] - history.index[w, 0] - 1
+    last = history.index[w + 1, FIRST] - history.index[w, FIRST] - 1
     out[last] = 0.5 * h
     if last > 0:
         out[0] = 0.5 * h
     # a following step without a stage at its start leaves that half to this step's end
-    if history.index[w + 2, 0] - history.index[w + 1, 0] == 1:
+    if history.index[w + 2, FIRST] - history.index[w + 1, FIRST] == 1:
         out[last] += 0.5 * (history.t[w + 2] - history.t[w + 1])
 
 
@@ -97,8 +99,8 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
       work (WORK,): counts of work, added to.
     """
     count, n = lam_q.shape
-    o = history.index[w, 0]
-    last = history.index[w + 1, 0] - 1 - o
+    o = history.index[w, FIRST]
+    last = history.index[w + 1, FIRST] - 1 - o
     h = history.t[w + 1] - history.t[w]
     weights = alpha_weights(tables[0])
     bar_q = np.zeros((count, n))
@@ -109,15 +111,13 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
     start_v = np.zeros((count, n))
     work[REVERSE] += count
     for m in range(count):
-        q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c[m])
-        for d in range(n):
-            start_q[m, d] = q0 * lam_q[m, d] + dq0 / h * lam_v[m, d]
-            start_v[m, d] = h * v0 * lam_q[m, d] + dv0 * lam_v[m, d]
-            bar_q[m, d] = q1 * lam_q[m, d] + dq1 / h * lam_v[m, d]
-            bar_v[m, d] = h * v1 * lam_q[m, d] + dv1 * lam_v[m, d]
-    state = history.state[w + 1]
+        cubic_vjp(
+            model, c[m], h, history.q[w], history.v[w], history.q[w + 1], history.v[w + 1], lam_q[m], lam_v[m],
+            start_q[m], start_v[m], bar_q[m], bar_v[m],
+        )  # fmt: skip
+    pulled = np.empty((2, n))
     push = history.push[w + 1]
-    project_back(model, state[0], state[1], push[0], push[1], workspace, bar_q, bar_v)
+    project_back(model, history.q[w + 1], history.v[w + 1], push[0], push[1], workspace, bar_q, bar_v)
     for j in range(last, -1, -1):
         e1, _, _, beta, gamma, _ = weights
         w_q = h * h * beta * e1 if j == last else 0.0
@@ -125,8 +125,8 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
         prepare_stage_back(model, history, o + j, w_q, w_v, workspace)
         for m in range(count):
             _stage_row_back(
-                model, history, o, j, last, h, weights, bars, rows_bar, lam_x[m], z[m, j], y, bar_q[m], bar_v[m],
-                bar_a[m], bar_x[m], start_q[m], start_v[m], workspace,
+                model, history, w, o, j, last, h, weights, bars, rows_bar, lam_x[m], z[m, j], y, bar_q[m], bar_v[m],
+                bar_a[m], bar_x[m], start_q[m], start_v[m], pulled, workspace,
             )  # fmt: skip
     for m in range(count):
         for d in range(n):
@@ -139,15 +139,15 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
 
 @part
 def _stage_row_back(
-    model, history, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q, start_v,
-    workspace,
+    model, history, w, o, j, last, h, weights, bars, rows_bar, lam_x, x, y, bar_q, bar_v, bar_a, bar_x, start_q,
+    start_v, pulled, workspace,
 ):  # fmt: skip
     """Stage j of `step_back`, which is prepared, for one row of cotangents.
 
     Constant:
       model: the compiled scene.
-      history, o, j, last: the history of steps, the first stage of the step, the number of this stage in it, and of its
-        last.
+      history, w, o, j, last: the history of steps, the step, its first stage, the number of this stage in it, and of
+        its last.
       h: length of the step (s).
       weights: of the method (`integrators.generalized_alpha.weights_of`).
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers, or no rows.
@@ -160,6 +160,7 @@ def _stage_row_back(
     Out:
       x (n,): the virtual displacement of the stage's balance.
       y (n_row,): adjoint variables of the joints' rows.
+      pulled (2, n): scratch.
     """
     n = x.shape[0]
     e1, e2, e3, beta, gamma, lag = weights
@@ -174,9 +175,15 @@ def _stage_row_back(
             bar_v[d] += bars[j, 1, d]
         for r in range(y.shape[0]):
             y[r] = rows_bar[j, r]
+    at_start = history.q[w]
+    at_stage = history.stage_q[o + j]
+    from_q = pulled[0]
+    from_shift = pulled[1]
+    if j == last:
+        retract_vjp(model, at_start, at_stage, bar_q, from_q, from_shift)
     for d in range(n):
         if j == last:
-            x[d] = lam_x[0, d] + e1 * (lam_x[1, d] + h * (h * beta * bar_q[d] + gamma * bar_v[d]))
+            x[d] = lam_x[0, d] + e1 * (lam_x[1, d] + h * (h * beta * from_shift[d] + gamma * bar_v[d]))
         else:
             x[d] = bar_a[d] if j == 0 else -bar_x[d]
         if spread:
@@ -185,13 +192,16 @@ def _stage_row_back(
     for i in range(model.driven.shape[0]):
         bar_q[model.driven[i]] = 0.0
         bar_v[model.driven[i]] = 0.0
+    retract_vjp(
+        model, at_start, at_stage, bar_q, from_q, from_shift
+    )  # of the first stage, which is not shifted: as it is
     for d in range(n):
-        start_q[d] += bar_q[d]
+        start_q[d] += from_q[d]
         start_v[d] += bar_v[d]
         if j == last:
-            reach_q = h * h * bar_q[d]
+            reach_q = h * h * from_shift[d]
             reach_v = h * bar_v[d]
-            start_v[d] += h * bar_q[d]
+            start_v[d] += h * from_shift[d]
             carried = lam_x[1, d] + beta * reach_q + gamma * reach_v
             bar_a[d] = e2 * carried
             bar_x[d] = (0.5 - beta) * reach_q + (1.0 - gamma) * reach_v - e3 * carried
@@ -201,8 +211,8 @@ def _stage_row_back(
                 bar_a[d] += 2.0 * bar_x[d]
         elif j == 1:
             ahead = lag * h
-            start_v[d] += ahead * bar_q[d]
-            bar_a[d] += ahead * (0.5 * ahead * bar_q[d] + bar_v[d])
+            start_v[d] += ahead * from_shift[d]
+            bar_a[d] += ahead * (0.5 * ahead * from_shift[d] + bar_v[d])
 
 
 @kernel
@@ -225,14 +235,15 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     Returns whether all sweeps settled.
     """
     n = dq.shape[0]
-    o = history.index[w, 0]
-    last = history.index[w + 1, 0] - 1 - o
+    o = history.index[w, FIRST]
+    last = history.index[w + 1, FIRST] - 1 - o
     h = history.t[w + 1] - history.t[w]
     e1, e2, e3, beta, gamma, lag = alpha_weights(tables[0])
     da = dx[0]
     aux = dx[1]
     end_q = np.empty(n)
     end_v = np.empty(n)
+    shift = np.empty(n)
     settled = True
     for j in range(last + 1):
         x = changes[j, 0]
@@ -243,14 +254,16 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
             f[d] = force[j, d]
             if j == last:
                 carry = e2 * da[d] - e3 * aux[d]
-                x[d] = dq[d] + h * (dv[d] + h * ((0.5 - beta) * aux[d] + beta * carry))
+                shift[d] = h * (dv[d] + h * ((0.5 - beta) * aux[d] + beta * carry))
                 u[d] = dv[d] + h * ((1.0 - gamma) * aux[d] + gamma * carry)
             elif j == 0:
-                x[d] = dq[d]
+                shift[d] = 0.0
                 u[d] = dv[d]
             else:
-                x[d] = dq[d] + lag * h * (dv[d] + 0.5 * lag * h * da[d])
+                shift[d] = lag * h * (dv[d] + 0.5 * lag * h * da[d])
                 u[d] = dv[d] + lag * h * da[d]
+        retract_jvp(model, history.q[w], history.stage_q[o + j], dq, shift, x)
+        for d in range(n):
             if model.free[d] == 0:
                 x[d] = 0.0
                 u[d] = 0.0
@@ -271,14 +284,9 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     for d in range(n):
         end_q[d] = changes[last, 0, d]
         end_v[d] = changes[last, 1, d]
-    state = history.state[w + 1]
     push = history.push[w + 1]
-    project_forward(model, state[0], state[1], push[0], push[1], workspace, end_q, end_v)
-    q0, v0, q1, v1, dq0, dv0, dq1, dv1 = hermite(c)
-    for d in range(n):
-        start = dq[d]
-        dq[d] = q0 * start + q1 * end_q[d] + h * (v0 * dv[d] + v1 * end_v[d])
-        dv[d] = (dq0 * start + dq1 * end_q[d]) / h + dv0 * dv[d] + dv1 * end_v[d]
+    project_forward(model, history.q[w + 1], history.v[w + 1], push[0], push[1], workspace, end_q, end_v)
+    cubic_jvp(model, c, h, history.q[w], history.v[w], history.q[w + 1], history.v[w + 1], dq, dv, end_q, end_v)
     return settled
 
 

@@ -3,33 +3,60 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.accelerations import factor_matrix, solve_accelerations, solve_unknowns
-from mdstopo.general.forces import drive_state, turned_pose
+from mdstopo.general.accelerations import factor_matrix, solve_accelerations, solve_unknowns, subtract_matrices
 from mdstopo.general.projection import project
 from mdstopo.general.step_history import copy_vector, keep_stage
-from mdstopo.integrators.gauss_equations import CLOSELY, fastest_rate
+from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
+from mdstopo.integrators.gauss_equations import CLOSELY
 from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import FORCES, NEWTON, NEWTON_FAILED, NON_FINITE, OK, SINGULAR, TANGENTS
-from mdstopo.mechanics.kinematics.planar_scales import deflection, motion_weights, noise_of
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    advance_coordinates,
+    deflection,
+    drive_state,
+    most_rows,
+    motion_weights,
+    noise_of,
+    retract,
+    turned_pose,
+)
+
+#: rows of what a step hands to the next beside coordinates: velocities, accelerations, the method's auxiliary ones
+VELOCITY, ACCELERATION, AUXILIARY = range(3)
 
 
 @kernel
 def rate_of(model, workspace):
     """Angular frequency of the fastest vibration at the balanced state in the workspace, rad/s (an estimate)."""
     n = model.mass.shape[0]
-    n_pair = model.pair.shape[0]
     inverse = np.zeros(n)
     for d in range(n):
         if model.free[d] != 0:
             inverse[d] = 1.0 / model.mass[d]
-    return fastest_rate(
-        model.pair,
-        inverse,
-        workspace.k.reshape((1, n_pair, 6, 6)),
-        workspace.c.reshape((1, n_pair, 6, 6)),
-        np.bool_(True),
-        CLOSELY,
-    )
+    x = np.empty(n)
+    y = np.empty(n)
+    rate = 0.0
+    for kind in range(2):  # as `integrators.gauss_equations.fastest_rate` does
+        for d in range(n):
+            x[d] = np.sqrt(inverse[d]) * (1.0 + 0.1 * (d % 7))
+        value = 0.0
+        for _ in range(12):
+            last = value
+            size = 0.0
+            for d in range(n):
+                if inverse[d] > 0.0:
+                    size += x[d] * x[d] / inverse[d]
+            value = np.sqrt(size)
+            if value == 0.0 or abs(value - last) <= CLOSELY * value:
+                break
+            for d in range(n):
+                x[d] /= value
+                y[d] = 0.0
+            subtract_matrices(model, workspace.k if kind == 0 else workspace.c, x, y)
+            for d in range(n):
+                x[d] = inverse[d] * y[d]
+        rate = np.sqrt(value) if kind == 0 else max(rate, 1.5 * value)
+    return rate
 
 
 @kernel
@@ -41,6 +68,7 @@ def advance(
     t,
     h,
     starting,
+    q0,
     state,
     guess,
     newton_tolerance,
@@ -48,6 +76,7 @@ def advance(
     o,
     workspace,
     history,
+    end_q,
     ends,
     push,
     extent,
@@ -68,11 +97,12 @@ def advance(
       o: number of the first stage to be kept; below 0 none is.
       extent (2, n_pair): how far each pair has moved so far from its pose at the start, and its noise (m).
       rel0 (n_pair, POSE): relative poses at the start.
+      q0 (n_q,): coordinates at the start of the step.
     In and out:
-      state (4, n): q, v, a, x at the start of the step; the last two are set where `starting`.
+      state (3, n): v, a, x at the start of the step; the last two are set where `starting`.
     Out:
       history: the history of steps, to which the stages are written.
-      ends (4, n): the same at the end; q, v on the joints.
+      end_q (n_q,), ends (3, n): coordinates, and v, a, x at the end; q, v on the joints.
       push (2, n_row): the multipliers that put them there (`projection`).
       workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
@@ -83,10 +113,12 @@ def advance(
     n_row = model.size[0]
     e1, e2, e3, beta, gamma, lag = weights_of(radius)
     yes = np.bool_(True)
-    q = np.empty(n)
+    q = np.empty(q0.shape[0])
     v = np.empty(n)
-    a = state[2]
-    x = state[3]
+    v0 = state[VELOCITY]
+    a = state[ACCELERATION]
+    x = state[AUXILIARY]
+    shift = np.empty(n)
     now = np.empty(n)
     x_now = np.empty(n)
     balanced = np.empty(n)
@@ -97,8 +129,8 @@ def advance(
     scale = np.empty(model.pair.shape[0])
     stages = 0
     if starting:
-        copy_vector(state[0], q)
-        copy_vector(state[1], v)
+        copy_vector(q0, q)
+        copy_vector(v0, v)
         singular = solve_accelerations(model, member_state, segment, t, q, v, yes, workspace, a, lam)
         work[FORCES] += 1
         work[TANGENTS] += 1
@@ -110,9 +142,9 @@ def advance(
         copy_vector(a, x)
         if lag > 0.0 and h * rate_of(model, workspace) < RESOLVED:
             ahead = lag * h
+            advance_coordinates(model, q0, v0, a, ahead, q)
             for d in range(n):
-                q[d] = state[0, d] + ahead * (state[1, d] + 0.5 * ahead * a[d])
-                v[d] = state[1, d] + ahead * a[d]
+                v[d] = v0[d] + ahead * a[d]
             singular = solve_accelerations(model, member_state, segment, t + ahead, q, v, yes, workspace, balanced, lam)
             work[FORCES] += 1
             work[TANGENTS] += 1
@@ -132,8 +164,9 @@ def advance(
                 if newton == 0 and not starting:
                     x_now[d] = 4.0 * (x[d] + guess[1, d]) - 6.0 * guess[0, d] - guess[2, d]
                 now[d] = (x_now[d] - e2 * a[d] + e3 * x[d]) / e1
-                q[d] = state[0, d] + h * (state[1, d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
-                v[d] = state[1, d] + h * ((1.0 - gamma) * x[d] + gamma * x_now[d])
+                shift[d] = h * (v0[d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
+                v[d] = v0[d] + h * ((1.0 - gamma) * x[d] + gamma * x_now[d])
+            retract(model, q0, shift, q)
             previous = np.inf
         singular = solve_accelerations(model, member_state, segment, t + h, q, v, yes, workspace, balanced, lam)
         work[FORCES] += 1
@@ -148,16 +181,16 @@ def advance(
             delta[d] = model.mass[d] * balanced[d]
         row[:] = 0.0
         for p in range(model.pair.shape[0]):
-            for i in range(6):
+            for i in range(pair_freedoms(model)):
                 total = 0.0
-                for j in range(6):
-                    total += workspace.mass[p, i, j] * balanced[3 * model.pair[p, j // 3] + j % 3]
-                delta[3 * model.pair[p, i // 3] + i % 3] += total
+                for j in range(pair_freedoms(model)):
+                    total += workspace.mass[p, i, j] * balanced[place_in_pair(model, p, j)]
+                delta[place_in_pair(model, p, i)] += total
         for j in range(model.joint.shape[0]):
-            for r in range(3):
+            for r in range(most_rows(model)):
                 if model.row[j, r] >= 0:
-                    for i in range(6):
-                        column = 3 * model.joint[j, 1 + i // 3] + i % 3
+                    for i in range(pair_freedoms(model)):
+                        column = place_in_joint(model, j, i)
                         row[model.row[j, r]] += workspace.jac[j, r, i] * balanced[column]
         factor_matrix(
             model,
@@ -174,21 +207,21 @@ def advance(
         rounding = 1e-8
         for p in range(model.pair.shape[0]):
             turned_pose(model, p, workspace.turned, q, v, workspace.rel)
-            reached = max(extent[0, p], deflection(workspace.rel, rel0, model.reach, p))
-            lost = noise_of(model.pair, extent[1], workspace.rel, model.reach, q, p)
+            reached = max(extent[0, p], deflection(model, workspace.rel, rel0, p))
+            lost = noise_of(model, extent[1], workspace.rel, q, p)
             scale[p] = max(reached, 1e3 * lost)
             rounding = max(rounding, 100.0 * lost / scale[p])
-        motion_weights(model.pair, rel0, model.reach, scale, weight)
+        motion_weights(model, rel0, scale, weight)
         e = 0.0
         for d in range(n):
-            moved = h * h * beta * e1 * delta[d]
+            shift[d] = h * h * beta * e1 * delta[d]
             now[d] += delta[d]
             x_now[d] = e1 * now[d] + e2 * a[d] - e3 * x[d]
-            q[d] += moved
             v[d] += h * gamma * e1 * delta[d]
-            change = weight[d] * abs(moved)
+            change = weight[d] * abs(shift[d])
             if not change <= e and not np.isnan(e):
                 e = change
+        retract(model, q, shift, q)
         if e <= newton_tolerance or (e >= 0.5 * previous and e < rounding):
             break
         previous = e
@@ -201,17 +234,9 @@ def advance(
         for r in range(n_row):
             lam[r] += row[r]
         keep_stage(history, o + stages, t + h, q, v, now, lam, workspace, yes)
-    copy_vector(q, ends[0])
-    copy_vector(v, ends[1])
-    copy_vector(now, ends[2])
-    copy_vector(x_now, ends[3])
-    singular = project(model, size, ends[0], ends[1], workspace, push[0], push[1])
+    copy_vector(q, end_q)
+    copy_vector(v, ends[VELOCITY])
+    copy_vector(now, ends[ACCELERATION])
+    copy_vector(x_now, ends[AUXILIARY])
+    singular = project(model, size, end_q, ends[VELOCITY], workspace, push[0], push[1])
     return (SINGULAR if singular >= 0 else OK), stages + 1, singular
-
-
-@kernel
-def copy_state(source, target):
-    """target (4, n) = source."""
-    for i in range(4):
-        for d in range(source.shape[1]):
-            target[i, d] = source[i, d]

@@ -18,6 +18,8 @@ part in it (`weakest`).
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.general.strides import pair_freedoms, place_in_joint
+from mdstopo.mechanics.kinematics.kinematics_interface import freedoms, most_rows
 
 #: a pivot, or an eigenvalue, of a scaled matrix below this means that joints contradict or repeat each other here
 SINGULAR = 1e-12
@@ -41,13 +43,13 @@ def inverse_masses(model):
 
 @kernel
 def spread_masses(model):
-    """(n_joint, 3, 6): `inverse_masses` of the coordinate that each slope of the joints is a derivative by."""
+    """(n_joint, rows, 2 D): `inverse_masses` of the coordinate that each slope of the joints is a derivative by."""
     inverse = inverse_masses(model)
-    spread = np.empty((model.joint.shape[0], 3, 6))
+    spread = np.empty((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
     for j in range(spread.shape[0]):
-        for r in range(3):
-            for i in range(6):
-                spread[j, r, i] = inverse[3 * model.joint[j, 1 + i // 3] + i % 3]
+        for r in range(most_rows(model)):
+            for i in range(pair_freedoms(model)):
+                spread[j, r, i] = inverse[place_in_joint(model, j, i)]
     return spread
 
 
@@ -57,12 +59,12 @@ def factor_joints(model, spread, jac, pull, gram, diagonal, thorough, x):
 
     Constant:
       model: the compiled scene.
-      spread (n_joint, 3, 6): inverse mass of the coordinate of each slope (`spread_masses`).
+      spread (n_joint, rows, 2 D): inverse mass of the coordinate of each slope (`spread_masses`).
     In:
-      jac (n_joint, 3, 6): slopes Phi_q of the joints' rows by the coordinates of their two bodies.
+      jac (n_joint, rows, 2 D): slopes Phi_q of the joints' rows by the coordinates of their two bodies.
       thorough: whether the factors are searched for a small eigenvalue, too (`weakest`).
     Out:
-      pull (n_joint, 3, 6): Phi_q M^-1.
+      pull (n_joint, rows, 2 D): Phi_q M^-1.
       gram (size[3],): L by rows, each from its first entry on; what stands on the diagonal is not used.
       diagonal (2, n_row): the diagonal of the matrix, and the inverse of D.
       x (n_row,): scratch.
@@ -232,7 +234,7 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
       model: the compiled scene.
       inverse (n,): inverse masses, 0 of driven coordinates (`inverse_masses`).
     In:
-      pull (n_joint, 3, 6), gram (size[3],), diagonal (2, n_row): the factors, as `factor_joints` leaves them.
+      pull (n_joint, rows, 2 D), gram (size[3],), diagonal (2, n_row): the factors, as `factor_joints` leaves them.
     In place:
       a (n,): f (N, N m), then the accelerations; 0 where they are driven.
       lam (n_row,): g, then the multipliers.
@@ -242,13 +244,14 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
     envelope = model.envelope
     weighed = pull.reshape(pull.size)
     count = line.shape[0]
+    each = freedoms(model)
     for r in range(count):
         e = line[r, 0]
         first = 0.0
         second = 0.0
-        for i in range(3):
+        for i in range(each):
             first += weighed[index(e + i)] * a[index(line[r, 1] + i)]
-            second += weighed[index(e + 3 + i)] * a[index(line[r, 2] + i)]
+            second += weighed[index(e + each + i)] * a[index(line[r, 2] + i)]
         x[index(line[r, 3])] = first + second - lam[r]
     substitute(envelope, gram, diagonal, x)
     for d in range(a.shape[0]):
@@ -257,9 +260,9 @@ def solve_joints(model, inverse, pull, gram, diagonal, x, a, lam):
         e = line[r, 0]
         value = x[index(line[r, 3])]
         lam[r] = value
-        for i in range(3):
+        for i in range(each):
             a[index(line[r, 1] + i)] -= weighed[index(e + i)] * value
-            a[index(line[r, 2] + i)] -= weighed[index(e + 3 + i)] * value
+            a[index(line[r, 2] + i)] -= weighed[index(e + each + i)] * value
 
 
 @kernel

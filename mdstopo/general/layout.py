@@ -5,14 +5,16 @@ watches that it stays fulfilled. Unknowns are ordered so that bodies that are ti
 Cuthill-McKee where there are many); so are the rows alone, for the matrix that is left of them without the bodies.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from mdstopo.case.model import Case
+from mdstopo.general.model import JOINT_FIRST
 from mdstopo.mechanics.joints.table import LISTED
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.model import FloatArray, IndexArray
 
 #: a row of which no larger share than this is independent of the others is implied by them
@@ -45,24 +47,27 @@ def arrange(
     mass: FloatArray,
     home: FloatArray,
     pair: IndexArray,
+    bodies: Kinematics,
 ) -> Layout:
     """Choose the rows of the joints that are solved, and order the unknowns and these rows.
 
     case: for the joints' names.
     joint (n_joint, 5), joint_par (n_joint, 12): the joints, as in `GeneralModel`.
-    free (n,): 1 for coordinates that are unknowns, 0 for driven ones.
-    mass (n,): m, m, J of each body (kg, kg m^2).
-    home (n / 3, 5): where the bodies stand by the case, as in `GeneralModel`; rows are compared there.
+    free (n,): 1 for freedoms that are unknowns, 0 for driven ones.
+    mass (n,): mass (kg) or inertia (kg m^2) of each freedom.
+    home (n_body, n_home): where the bodies stand by the case, as in `GeneralModel`; rows are compared there.
     pair (n_pair, 2): the two bodies of each pair.
+    bodies: how they move.
     """
-    row = np.full((len(joint), 3), -1, dtype=np.int64)
+    each = bodies.freedoms
+    row = np.full((len(joint), bodies.rows), -1, dtype=np.int64)
     redundant: list[str] = []
     columns: list[list[int]] = []
     if len(joint):
-        jac = _slopes(joint, joint_par, home)
+        jac = _slopes(joint, joint_par, home, bodies)
         kept: list[FloatArray] = []
         for j, (_, a, b, _, rows) in enumerate(joint.tolist()):
-            coordinates = [*range(3 * a, 3 * a + 3), *range(3 * b, 3 * b + 3)]
+            coordinates = [*range(each * a, each * (a + 1)), *range(each * b, each * (b + 1))]
             for r in range(rows):
                 dense = np.zeros(len(free))
                 np.add.at(dense, coordinates, jac[j, r])
@@ -78,22 +83,27 @@ def arrange(
                 kept.append(dense / own)
                 row[j, r] = len(columns)
                 columns.append([d for d in coordinates if free[d]])
-    place, half = _order(len(free), free, pair, columns)
-    meet = _meetings(joint, free)
+    place, half = _order(len(free), free, pair, columns, each)
+    meet = _meetings(joint, free, each)
     order, envelope, entries = _order_rows(row, meet, len(columns), many=len(place) > FEW)
     line = np.zeros((len(columns), 4), dtype=np.int64)
+
+    def slopes_at(j: int, r: int) -> int:
+        """Where the slopes of row r of joint j begin among those of all joints."""
+        return 2 * each * (bodies.rows * j + r)
+
     for j, r in np.argwhere(row >= 0).tolist():
-        line[row[j, r]] = 18 * j + 6 * r, 3 * joint[j, 1], 3 * joint[j, 2], order[row[j, r]]
+        line[row[j, r]] = slopes_at(j, r), each * joint[j, 1], each * joint[j, 2], order[row[j, r]]
     products, steady = [], np.zeros(entries)
     if len(joint):
         inverse = np.where(free == 1, 1.0 / mass, 0.0)
-        for entry, a, b, axis in _products(row, meet, order, envelope):
-            one, two = (divmod(each // 6, 3) for each in (a, b))
+        for entry, a, b, axis in _products(row, meet, order, envelope, slopes_at, each):
+            one, two = (divmod(place // (2 * each), bodies.rows) for place in (a, b))
             fixed = [axis in LISTED[int(joint[j, 0])].steady[r] for j, r in (one, two)]
-            slopes = [float(jac.flat[each + axis]) for each in (a, b)]
+            slopes = [float(jac.flat[place + axis]) for place in (a, b)]
             if all(fixed):
-                body = int(joint[one[0], 1 + a % 6 // 3])
-                steady[entry] += slopes[0] * slopes[1] * inverse[3 * body + axis]
+                body = int(joint[one[0], JOINT_FIRST + a % (2 * each) // each])
+                steady[entry] += slopes[0] * slopes[1] * inverse[each * body + axis]
             elif not any(known and slope == 0.0 for known, slope in zip(fixed, slopes, strict=True)):
                 products.append((entry, a + axis, b + axis))
     return Layout(
@@ -102,24 +112,25 @@ def arrange(
     )  # fmt: skip
 
 
-def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray) -> FloatArray:
-    """(n_joint, 3, 6): Phi_q of the joints at home."""
+def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: Kinematics) -> FloatArray:
+    """(n_joint, rows, 2 D): Phi_q of the joints at home."""
     from mdstopo.general.start_entry import slopes_of
 
-    jac = np.zeros((len(joint), 3, 6))
-    slopes_of(joint, joint_par, home, np.zeros(3 * len(home)), np.zeros((len(joint), 3)), jac)
+    jac = np.zeros((len(joint), bodies.rows, 2 * bodies.freedoms))
+    q = np.zeros(bodies.coordinates * len(home))
+    slopes_of(joint, joint_par, home, q, np.zeros((len(joint), bodies.rows)), jac)
     return jac
 
 
-def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]]) -> tuple[IndexArray, int]:
+def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]], each: int) -> tuple[IndexArray, int]:
     """Place of each coordinate and row in the banded matrix, and how far from the diagonal its farthest entry is."""
     total = n + len(columns)
     links: set[tuple[int, int]] = set()
     for a, b in pair.tolist():
-        both = [d for body in (a, b) for d in range(3 * body, 3 * body + 3) if free[d]]
+        both = [d for body in (a, b) for d in range(each * body, each * (body + 1)) if free[d]]
         links.update((i, j) for i in both for j in both)
-    for body in range(n // 3):
-        own = [d for d in range(3 * body, 3 * body + 3) if free[d]]
+    for body in range(n // each):
+        own = [d for d in range(each * body, each * (body + 1)) if free[d]]
         links.update((i, j) for i in own for j in own)
     for r, coordinates in enumerate(columns):
         links.update((n + r, d) for d in coordinates)
@@ -127,7 +138,7 @@ def _order(n: int, free: IndexArray, pair: IndexArray, columns: list[list[int]])
     return place, _width(links, place)
 
 
-def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
+def _meetings(joint: IndexArray, free: IndexArray, each: int) -> IndexArray:
     """(n_meet, 4): a joint, its side, another joint or itself, its side, where both are on one body that can move.
 
     Sides are 0 for a joint's first body and 1 for its second.
@@ -139,7 +150,7 @@ def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
     found = [
         (*one, *other)
         for body, sides in on.items()
-        if free[3 * body : 3 * body + 3].any()
+        if free[each * body : each * (body + 1)].any()
         for i, one in enumerate(sides)
         for other in sides[: i + 1]
     ]
@@ -147,20 +158,25 @@ def _meetings(joint: IndexArray, free: IndexArray) -> IndexArray:
 
 
 def _products(
-    row: IndexArray, meet: IndexArray, order: IndexArray, envelope: IndexArray
+    row: IndexArray,
+    meet: IndexArray,
+    order: IndexArray,
+    envelope: IndexArray,
+    slopes_at: Callable[[int, int], int],
+    each: int,
 ) -> Iterator[tuple[int, int, int, int]]:
     """The products that the joints' own matrix is made of, one after the other.
 
     Of each: the entry that it is added to; where the slopes of two rows by the coordinates of one body begin among
-    those of all joints; and which of the three coordinates is meant.
+    those of all joints; and which of its coordinates is meant.
     """
     for j, side, k, other in meet.tolist():
-        for r, s in product(range(3), range(3)):
+        for r, s in product(range(row.shape[1]), repeat=2):
             if row[j, r] >= 0 and row[k, s] >= 0 and (j != k or s <= r):
                 low, high = sorted((int(order[row[j, r]]), int(order[row[k, s]])))
-                for axis in range(3):
+                for axis in range(each):
                     entry = int(envelope[high, 1]) + low
-                    yield entry, 18 * j + 6 * r + 3 * side, 18 * k + 6 * s + 3 * other, axis
+                    yield entry, slopes_at(j, r) + each * side, slopes_at(k, s) + each * other, axis
 
 
 def _order_rows(row: IndexArray, meet: IndexArray, count: int, many: bool) -> tuple[IndexArray, IndexArray, int]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from mdstopo.general.competing_members import compare, members_of
 from mdstopo.general.extremes import FRACTIONS
+from mdstopo.general.model import KIND
 from mdstopo.general.responses import MEMBER_FORCE, TIE
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -77,7 +78,7 @@ def changes(leads_of: list[Lead], t: FloatArray) -> list[float]:
 
 def is_led(driver: "GeneralDriver", j: int) -> bool:
     """Whether response j is the largest force of several members."""
-    return bool(driver.scene.model.response[j, 0] == MEMBER_FORCE) and members_of(driver, j) > 1
+    return bool(driver.scene.model.response[j, KIND] == MEMBER_FORCE) and members_of(driver, j) > 1
 
 
 def _forces(

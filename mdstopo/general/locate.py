@@ -12,13 +12,12 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
-from mdstopo.general.dense_output import quintic
 from mdstopo.general.events import block_of, smallest_margin
-from mdstopo.general.forces import drive_state
-from mdstopo.general.members import stretch_of
+from mdstopo.general.members import MODE, SCALE, SET
+from mdstopo.general.model import CODE, PAIR
 from mdstopo.general.step_history import copy_vector
 from mdstopo.mechanics.contact import contact_grazes
-from mdstopo.mechanics.geometry import relative_pose
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic, relative_pose, stretch_of
 from mdstopo.mechanics.laws.table import law_grazes
 
 #: trials of the moment of one event
@@ -33,7 +32,7 @@ FORESEEN, LAPS, CLOSE, BESIDE = 8, 40, 1e-9, 1e-4
 
 
 @kernel
-def quintic_ends(model, member_state, segment, t, low, high, left, right, workspace, lam, ends):
+def quintic_ends(model, member_state, segment, t, low, high, q0, v0, q1, v1, workspace, lam, ends_q, ends):
     """What the quintic through both ends of a piece of a step is made of.
 
     Constant:
@@ -43,58 +42,57 @@ def quintic_ends(model, member_state, segment, t, low, high, left, right, worksp
       segment: number of the stretch of time between two breakpoints.
       t: time at the start of the step (s).
       low, high: where the piece begins and ends, from there (s).
-      left, right (2 or more, n): coordinates and velocities at its ends.
+      q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at its ends.
     Out:
-      ends (6, n): coordinates, velocities, accelerations at its start, then at its end.
+      ends_q (2, n_q), ends (2, 2, n): coordinates, and velocities and accelerations, at its start and its end.
       workspace: workspace of a balance (`accelerations.Workspace`).
       lam (n_row,): scratch.
     """
     for e in range(2):
-        state = left if e == 0 else right
-        copy_vector(state[0], ends[3 * e])
-        copy_vector(state[1], ends[3 * e + 1])
+        copy_vector(q0 if e == 0 else q1, ends_q[e])
+        copy_vector(v0 if e == 0 else v1, ends[e, 0])
         solve_accelerations(
-            model, member_state, segment, t + (low if e == 0 else high), ends[3 * e], ends[3 * e + 1], np.bool_(False),
-            workspace, ends[3 * e + 2], lam,
+            model, member_state, segment, t + (low if e == 0 else high), ends_q[e], ends[e, 0], np.bool_(False),
+            workspace, ends[e, 1], lam,
         )  # fmt: skip
 
 
 @kernel
-def foreseen_margin(model, member_state, segment, t, low, high, ends, c, room, rel):
+def foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c, room_q, room_v, rel):
     """The smallest margin on the quintic through both ends of a piece (`quintic_ends`).
 
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     segment: number of the stretch of time between two breakpoints.
     t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
-    ends (6, n): of the quintic.
+    ends_q (2, n_q), ends (2, 2, n): of the quintic.
     c: fraction of the piece.
-    room (2, n), rel (n_pair, POSE): overwritten.
+    room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
     """
-    quintic(c, high - low, ends, room[0], room[1])
-    drive_state(model, segment, t + low + c * (high - low), room[0], room[1])
-    relative_pose(model.pair, model.home, room[0], room[1], rel)
+    quintic(model, c, high - low, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], room_q, room_v)
+    drive_state(model, segment, t + low + c * (high - low), room_q, room_v)
+    relative_pose(model, room_q, room_v, rel)
     margin, _ = smallest_margin(model, segment, member_state, rel)
     return margin
 
 
 @kernel
-def foreseen_root(model, member_state, segment, t, low, high, ends, room, rel):
+def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room_q, room_v, rel):
     """Where in a piece of a step the quintic's smallest margin falls through zero, or -1: it does not.
 
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     segment: number of the stretch of time between two breakpoints.
     t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
-    ends (6, n): of the quintic (`quintic_ends`).
-    room (2, n), rel (n_pair, POSE): overwritten.
+    ends_q (2, n_q), ends (2, 2, n): of the quintic (`quintic_ends`).
+    room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
 
     Returns a length of the step (s).
     """
     a = 0.0
     b = 1.0
-    at_a = foreseen_margin(model, member_state, segment, t, low, high, ends, a, room, rel)
-    at_b = foreseen_margin(model, member_state, segment, t, low, high, ends, b, room, rel)
+    at_a = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, a, room_q, room_v, rel)
+    at_b = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, b, room_q, room_v, rel)
     if not at_b < 0.0:
         return -1.0
     if at_a < -1e-3 * at_b:  # the piece begins on the switch of a member that has just left it: half-way first
@@ -107,7 +105,7 @@ def foreseen_root(model, member_state, segment, t, low, high, ends, room, rel):
             c = 0.5 * (a + b)
         if b - a <= CLOSE:
             break
-        value = foreseen_margin(model, member_state, segment, t, low, high, ends, c, room, rel)
+        value = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c, room_q, room_v, rel)
         if value < 0.0:
             if b - c <= CLOSE and side == 1:
                 break
@@ -128,7 +126,9 @@ def foreseen_root(model, member_state, segment, t, low, high, ends, room, rel):
 
 
 @kernel
-def foreseen_trial(model, member_state, segment, t, low, high, ends, trials, tries, rounding, room, rel):
+def foreseen_trial(
+    model, member_state, segment, t, low, high, ends_q, ends, trials, tries, rounding, room_q, room_v, rel
+):
     """Where the next trial is to be by what the quintic and the trials so far foresee, or -1: nowhere.
 
     Constant:
@@ -137,25 +137,29 @@ def foreseen_trial(model, member_state, segment, t, low, high, ends, trials, tri
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
-      ends (6, n): of the quintic (`quintic_ends`).
+      ends_q (2, n_q), ends (2, 2, n): of the quintic (`quintic_ends`).
       trials (2, 2): length of the step (s) and smallest margin of the last trial and of the one before.
       tries: how many trials there have been.
       rounding: what rounding leaves of a margin.
     Out:
-      room (2, n), rel (n_pair, POSE): overwritten.
+      room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
 
     Returns a length of the step (s).
     """
     if tries == 0:
-        return foreseen_root(model, member_state, segment, t, low, high, ends, room, rel)
+        return foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room_q, room_v, rel)
     if tries >= FORESEEN:
         return -1.0
     last = trials[0, 0]
     over = trials[0, 1] + AIM * rounding
     if tries == 1:
         c = min(max((last - low) / (high - low), BESIDE), 1.0 - BESIDE)
-        ahead = foreseen_margin(model, member_state, segment, t, low, high, ends, c + BESIDE, room, rel)
-        behind = foreseen_margin(model, member_state, segment, t, low, high, ends, c - BESIDE, room, rel)
+        ahead = foreseen_margin(
+            model, member_state, segment, t, low, high, ends_q, ends, c + BESIDE, room_q, room_v, rel
+        )
+        behind = foreseen_margin(
+            model, member_state, segment, t, low, high, ends_q, ends, c - BESIDE, room_q, room_v, rel
+        )
         rate = (ahead - behind) / (2.0 * BESIDE * (high - low))
     else:
         apart = last - trials[1, 0]
@@ -234,9 +238,9 @@ def matters(model, member_state, rel, i):
     lost they come back to the very place at which the set was made, which is no touch to warn of.
     """
     if i >= model.member.shape[1]:
-        return contact_grazes(model.contact[i - model.member.shape[1]], int(member_state[1, i])) == 2
-    if i < 0 or member_state[0, i] == 0.0 or member_state[2, i] != 0.0:
+        return contact_grazes(model.contact[i - model.member.shape[1]], int(member_state[MODE, i])) == 2
+    if i < 0 or member_state[SCALE, i] == 0.0 or member_state[SET, i] != 0.0:
         return False
     k = block_of(model, i)
-    x, _ = stretch_of(model.member, i, rel[model.block[k, 0]])
-    return law_grazes(model.block[k, 3], model.law[k], x, int(member_state[1, i])) == 2
+    x, _ = stretch_of(model, i, rel[model.block[k, PAIR]])
+    return law_grazes(model.block[k, CODE], model.law[k], x, int(member_state[MODE, i])) == 2

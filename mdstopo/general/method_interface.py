@@ -39,7 +39,7 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
       member_state (3, columns): state of the members; where forces are summed, modes and sets are put to those of the
         step.
     Out:
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
       workspace: workspace of a balance, overwritten.
       work (WORK,): counts of work, added to.
 
@@ -91,16 +91,17 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
     raise NotImplementedError
 
 
-def beside(tag, history, k, c, e, q, v, a, q_out, v_out):
+def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
     """The motion a little later than at fraction c of step k.
 
     Constant:
       tag: the integrator.
+      model: the compiled scene.
       history, k, c: the history of steps, the step, and a fraction of it.
       e: how much later (s); below 0: earlier.
-      q, v, a (n,): coordinates, velocities, accelerations at c (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations at c.
     Out:
-      q_out, v_out (n,): coordinates and velocities then.
+      q_out (n_q,), v_out (n,): coordinates and velocities then.
     """
     raise NotImplementedError
 

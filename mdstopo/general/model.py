@@ -1,9 +1,9 @@
 """A general scene as arrays, and the same arrays packed for the way into compiled code.
 
-Bodies are those of the case as declared, ground after them; n = 3 bodies coordinates q, what (x, y, psi) of each
-has changed by since home. A coordinate is free, or driven: known as a cubic of time within each segment; ground is
-driven and stands still. Rows of joints are solved together with the accelerations (`solve_accelerations`); rows that
-others imply are left out there.
+Bodies are those of the case as declared, ground after them. How many numbers each has, its kinematics says
+(`mechanics.kinematics`): n freedoms of all bodies, and n_q coordinates q, what has changed since home. A freedom is
+free, or driven: known as a cubic of time within each segment; ground is driven and stands still. Rows of joints are
+solved together with the accelerations (`solve_accelerations`); rows that others imply are left out there.
 """
 
 from typing import Annotated, Any, NamedTuple
@@ -11,10 +11,11 @@ from typing import Annotated, Any, NamedTuple
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.structures import bundle
+from mdstopo.mechanics.kinematics.kinematics_interface import move_by
+from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.scene.model import (
     FloatArray,
     Force,
-    Home,
     IndexArray,
     LoadArm,
     LoadBody,
@@ -22,7 +23,6 @@ from mdstopo.scene.model import (
     LoadForce,
     Power,
     Reach,
-    StartCoordinates,
     StartVelocities,
 )
 
@@ -33,6 +33,8 @@ PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET = range(8)
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
 #: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
 KIND, BODY, REFERENCE, COMPONENT, ORDER, SUBJECT = range(6)
+#: rows of `GeneralModel.member` behind the ends in body frames (counted from the last)
+MEMBER_FREE_LENGTH, MEMBER_EXCESS = -2, -1
 #: the law code of an inerter, which is no function of elongation and rate
 INERTER = -1
 
@@ -40,11 +42,14 @@ INERTER = -1
 class GeneralModel(NamedTuple):
     """What is constant during every evaluation of one load case."""
 
-    free: Annotated[IndexArray, Field("n", "1 where a coordinate is an unknown, 0 where it is driven")]
-    mass: Annotated[FloatArray, Field("n", "m, m, J of each body (kg, kg m²); 1 of ground")]
-    q0: StartCoordinates
+    free: Annotated[IndexArray, Field("n", "1 where a freedom is an unknown, 0 where it is driven")]
+    mass: Annotated[FloatArray, Field("n", "mass (kg) or inertia (kg m²) of each freedom; 1 of ground")]
+    q0: Annotated[FloatArray, Field("n_q", "coordinates at the start: moved since home")]
     v0: StartVelocities
-    home: Home
+    home: Annotated[
+        FloatArray,
+        Field("n_body, n_home", "where each body is at q = 0 (m, rad), and what is known of its attitude there"),
+    ]
     pair: Annotated[IndexArray, Field("n_pair, 2", "the two bodies that members, joints or bushings connect")]
     reach: Reach
     block: Annotated[
@@ -78,24 +83,24 @@ class GeneralModel(NamedTuple):
     ]
     joint: Annotated[IndexArray, Field("n_joint, 5", "code, first and second body, pair, rows")]
     joint_par: Annotated[FloatArray, Field("n_joint, 12", "the joint's parameters (`mechanics.joints.table`)")]
-    row: Annotated[IndexArray, Field("n_joint, 3", "the place of each of its rows among the solved ones, or -1")]
+    row: Annotated[IndexArray, Field("n_joint, rows", "the place of each of its rows among the solved ones, or -1")]
     place: Annotated[
         IndexArray, Field("n_place", "where each coordinate, then each solved row, stands in the banded matrix")
     ]
     size: Annotated[
         IndexArray,
         Field(
-            "4",
+            "6",
             "solved rows; half width of the band; whether anything depends on velocity; entries of the joints' own "
-            "matrix",
+            "matrix; components of a turn; numbers of an attitude",
         ),
     ]
     line: Annotated[
         IndexArray,
         Field(
             "n_place - n, 4",
-            "of each solved row: where its slopes (6,) begin among those of all joints (n_joint, 3, 6), the first "
-            "coordinate of each of its bodies, and where it stands in the joints' own matrix (`joint_matrix`)",
+            "of each solved row: where its slopes begin among those of all joints (`joint_matrix`), the first "
+            "freedom of each of its bodies, and where it stands in the joints' own matrix (`joint_matrix`)",
         ),
     ]
     envelope: Annotated[
@@ -139,6 +144,7 @@ class ModelView:
 
 FIELDS = Fields(GeneralModel)
 bundle(ModelView, FIELDS.names)
+move_by(ModelView, PLANAR)
 
 
 def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:

@@ -24,12 +24,13 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.events import block_of, member_rows
-from mdstopo.general.forces import inerter_row
-from mdstopo.general.members import rate_of_row
-from mdstopo.general.model import INERTER
+from mdstopo.general.events import block_of
+from mdstopo.general.members import MODE, SCALE, SET, level_of, rate_of_row
+from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, INERTER, OFFSET, PAIR, START
 from mdstopo.general.responses import value_at
-from mdstopo.general.step_history import restore_modes
+from mdstopo.general.step_history import EVENTS, MEMBER, OLD, SEGMENT, STATE, restore_modes
+from mdstopo.general.strides import pair_freedoms, place_in_pair
+from mdstopo.mechanics.kinematics.kinematics_interface import inerter_row, member_rows
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
@@ -55,24 +56,25 @@ def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row,
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
     Out:
-      row (6,): slopes dDelta/dq by the coordinates of the two bodies (m/m, m/rad).
-      row_rate (6,): their rates in time; of inerters untouched.
+      row (2 D,): slopes dDelta/dq by the coordinates of the two bodies (m/m, m/rad).
+      row_rate (2 D,): their rates in time; of inerters untouched.
 
     Returns df/dp and dV/dp (N and J per unit of the parameter).
     """
-    if model.block[k, 3] == INERTER:
-        first = 3 * model.pair[model.block[k, 0], 0]
-        second = 3 * model.pair[model.block[k, 0], 1]
+    if model.block[k, CODE] == INERTER:
+        p = model.block[k, PAIR]
         bias = np.empty(1)
-        inerter_row(model, q, v, i, first, second, row, bias)
+        inerter_row(model, q, v, i, p, row, bias)
         value = bias[0]
-        for r in range(6):
-            value += row[r] * a[first + r if r < 3 else second + r - 3]
+        for r in range(pair_freedoms(model)):
+            value += row[r] * a[place_in_pair(model, p, r)]
         return value, 0.0
-    x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-    x -= member_state[2, i]
-    level = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-    return law_slopes(model.block[k, 3], model.law[k], place, x, rate, int(member_state[1, i]), t, level, model.curves)
+    x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
+    x -= member_state[SET, i]
+    level = level_of(model, segment, k, t)
+    return law_slopes(
+        model.block[k, CODE], model.law[k], place, x, rate, int(member_state[MODE, i]), t, level, model.curves
+    )
 
 
 @kernel
@@ -91,20 +93,20 @@ def add_parameters(model, segment, t, member_state, q, v, a, z, weight, out):
     Out:
       out (M_padded + P,): added to behind the members.
     """
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
         k = model.varied[e, 0]
         place = model.varied[e, 1]
         if place > FREE_LENGTH or model.active[segment, k] == 0:
             continue
-        own = weight if model.block[k, 4] >= 0 else 0.0
+        own = weight if model.block[k, DESIGN] >= 0 else 0.0
         total = 0.0
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
             by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
-            pulled = rate_of_row(model, model.block[k, 0], row, z)
-            total += member_state[0, i] * (own * by_energy - by_force * pulled)
+            pulled = rate_of_row(model, model.block[k, PAIR], row, z)
+            total += member_state[SCALE, i] * (own * by_energy - by_force * pulled)
         out[members + model.varied[e, 2]] += total
 
 
@@ -124,19 +126,19 @@ def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, s
     Out:
       out (M_padded + P,): added to behind the members.
     """
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
         k = model.varied[e, 0]
         place = model.varied[e, 1]
-        own = who - model.block[k, 7]
-        if place > FREE_LENGTH or model.active[segment, k] == 0 or model.block[k, 6] != group:
+        own = who - model.block[k, OFFSET]
+        if place > FREE_LENGTH or model.active[segment, k] == 0 or model.block[k, GROUP] != group:
             continue
-        if own >= 0 and own < model.block[k, 5]:
-            i = model.block[k, 1] + own
+        if own >= 0 and own < model.block[k, COUNT]:
+            i = model.block[k, START] + own
             slope, _ = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
-            out[members + model.varied[e, 2]] += scale * member_state[0, i] * slope
+            out[members + model.varied[e, 2]] += scale * member_state[SCALE, i] * slope
 
 
 @kernel
@@ -148,8 +150,8 @@ def event_slope(model, history, member_state, event, e):
     """
     k = model.varied[e, 0]
     place = model.varied[e, 1]
-    state = history.event[event, 0]
-    who = history.event[event, 1]
+    state = history.event[event, STATE]
+    who = history.event[event, MEMBER]
     if place > FREE_LENGTH or state == 0 or block_of(model, who) != k:
         return 0.0
     given = True
@@ -158,15 +160,15 @@ def event_slope(model, history, member_state, event, e):
             given = given and history.saltation[event, part, d] == 0.0
     if given:
         return 0.0
-    segment = history.index[state - 1, 2]
-    q = history.state[state, 0]
-    v = history.state[state, 1]
-    row = np.empty(6)
-    row_rate = np.empty(6)
-    x, rate = member_rows(model, model.block[k, 0], who, q, v, row, row_rate)
+    segment = history.index[state - 1, SEGMENT]
+    q = history.q[state]
+    v = history.v[state]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
+    x, rate = member_rows(model, model.block[k, PAIR], who, q, v, row, row_rate)
     x -= history.kept[event, 0]
-    code = model.block[k, 3]
-    mode = int(history.event[event, 2])
+    code = model.block[k, CODE]
+    mode = int(history.event[event, OLD])
     by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, model.curves)
     if by_p == 0.0:
         return 0.0
@@ -180,8 +182,8 @@ def event_slope(model, history, member_state, event, e):
         solve_accelerations(
             model, member_state, segment, history.t[state], q.copy(), v.copy(), np.bool_(False), workspace, a, lam
         )
-        for r in range(6):
-            d = 3 * model.pair[model.block[k, 0], r // 3] + r % 3
+        for r in range(pair_freedoms(model)):
+            d = place_in_pair(model, model.block[k, PAIR], r)
             speed += by_rate * (row[r] * a[d] + row_rate[r] * v[d])
     return -by_p / speed
 
@@ -222,9 +224,9 @@ def begins_or_ends(model, history, count, state, e):
     before = edge and state == count
     after = edge and state == 0
     if state > 0:
-        before = model.active[history.index[state - 1, 2], k] != 0 and (before or state < count)
+        before = model.active[history.index[state - 1, SEGMENT], k] != 0 and (before or state < count)
     if state < count:
-        after = model.active[history.index[state, 2], k] != 0 and (after or state > 0)
+        after = model.active[history.index[state, SEGMENT], k] != 0 and (after or state > 0)
     if place == ACTIVE_FROM and after and not before:
         return 1
     if place == ACTIVE_UNTIL and before and not after:
@@ -269,8 +271,8 @@ def time_jump(model, history, member_state, count, state, e, j, square, dv):
     if way == 0:
         return False, 0.0
     step = state if way > 0 else state - 1
-    segment = history.index[step, 2]
-    restore_modes(history, history.index[step, 3], member_state)
+    segment = history.index[step, SEGMENT]
+    restore_modes(history, history.index[step, EVENTS], member_state)
     workspace = make_workspace(model)
     a = np.empty(dv.shape[0])
     lam = np.empty(model.size[0])
@@ -281,14 +283,16 @@ def time_jump(model, history, member_state, count, state, e, j, square, dv):
             if shifted[other] != 0:
                 model.active[segment, model.varied[other, 0]] = 1 - side
         solve_accelerations(
-            model, member_state, segment, history.t[state], history.state[state, 0].copy(),
-            history.state[state, 1].copy(), np.bool_(False), workspace, a, lam,
+            model, member_state, segment, history.t[state], history.q[state].copy(),
+            history.v[state].copy(), np.bool_(False), workspace, a, lam,
         )  # fmt: skip
         for d in range(dv.shape[0]):
             if model.free[d] != 0:
                 dv[d] += sign * a[d]
         if j >= 0:
-            value = value_at(model, member_state, segment, history.t[state], history.state[state], j, workspace)
+            value = value_at(
+                model, member_state, segment, history.t[state], history.q[state], history.v[state], j, workspace
+            )
             drop += sign * (value * value if square else value)
     for other in range(e, model.varied.shape[0]):
         if shifted[other] != 0:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.dense_output import go_to, quintic, time_at
+from mdstopo.general.dense_output import go_to, time_at
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
@@ -28,12 +28,12 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
 )
-from mdstopo.general.forces import drive_state
 from mdstopo.general.method_interface import derivatives
-from mdstopo.general.model import unpack_general
+from mdstopo.general.model import KIND, ORDER, SUBJECT, unpack_general
 from mdstopo.general.responses import MEMBER_FORCE, kinked, largest_force, rate_is_by_state, rated
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.structures import bundle
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
 
 #: columns of a sample: value, rate, member
 G, DG, MEMBER = range(3)
@@ -57,7 +57,7 @@ MARGIN, ALIKE, EVEN = 4.0, 0.5, 0.1
 #: how many there are; one state with its multipliers, slopes of the response there, states beside it
 FIELDS = (
     "model", "tables", "member_state", "history", "count", "work", "workspace", "q", "v", "a", "lam", "bars", "row_bar",
-    "near", "ends",
+    "near_q", "near", "ends_q", "ends",
 )  # fmt: skip
 
 
@@ -81,11 +81,13 @@ def finished(model, tables, member_state, history, count, work):
     count: number of steps.
     work (WORK,): counts of work, added to.
     """
+    n_q = model.q0.shape[0]
     n = model.mass.shape[0]
     n_row = model.size[0]
     return Motion(
-        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n_row), np.empty((3, n)), np.empty(n_row), np.empty((4, n)), np.empty((6, n)),
+        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n_q), np.empty(n),
+        np.empty(n), np.empty(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
+        np.empty((2, n_q)), np.empty((2, 2, n)),
     )  # fmt: skip
 
 
@@ -103,13 +105,13 @@ def evaluate_here(tag, motion, j, k, c, who):
     t = time_at(motion.history, k, c)
     q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
     model = motion.model
-    if model.response[j, 0] == MEMBER_FORCE and who < 0:
+    if model.response[j, KIND] == MEMBER_FORCE and who < 0:
         segment = motion.history.index[k, SEGMENT]
         solve_accelerations(model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, lam)
-        who = largest_force(model, motion.member_state, segment, t, model.response[j, 5], q, v, a)
+        who = largest_force(model, motion.member_state, segment, t, model.response[j, SUBJECT], q, v, a)
     value, rate = rated(
         tag, model, motion.member_state, motion.history, k, c, j, who, np.bool_(True), t, q, v, motion.workspace, a,
-        lam, motion.bars, motion.row_bar, motion.near,
+        lam, motion.bars, motion.row_bar, motion.near_q, motion.near,
     )  # fmt: skip
     return value, rate, who
 
@@ -125,7 +127,7 @@ def evaluate_exactly(tag, motion, j, k, c, who):
     """
     go_to(
         tag, motion.model, motion.tables, motion.member_state, motion.history, motion.count, k, c, np.bool_(True), -1,
-        motion.workspace, motion.ends, motion.lam, motion.q, motion.v, motion.work,
+        motion.workspace, motion.ends_q, motion.ends, motion.lam, motion.q, motion.v, motion.work,
     )  # fmt: skip
     return evaluate_here(tag, motion, j, k, c, who)
 
@@ -141,7 +143,7 @@ def sample_ends(tag, motion, j, seen, accelerations):
     What is behind a boundary is what is in front of it where no law, load or mode changes there.
     """
     history = motion.history
-    shared = rate_is_by_state(motion.model, j) and motion.model.response[j, 4] < derivatives(tag)
+    shared = rate_is_by_state(motion.model, j) and motion.model.response[j, ORDER] < derivatives(tag)
     for k in range(motion.count):
         restore_modes(history, history.index[k, EVENTS], motion.member_state)
         for e in range(2):
@@ -152,12 +154,11 @@ def sample_ends(tag, motion, j, seen, accelerations):
                 and history.index[k, SEGMENT] == history.index[k - 1, SEGMENT]
                 and history.index[k, EVENTS] == history.index[k - 1, EVENTS]
             ):
-                for i in range(3):
-                    seen[k, 0, i] = seen[k - 1, LAST, i]
+                copy_vector(seen[k - 1, LAST], seen[k, 0])
                 copy_vector(accelerations[k - 1, 1], accelerations[k, 0])
                 continue
-            copy_vector(history.state[k + e, 0], motion.q)
-            copy_vector(history.state[k + e, 1], motion.v)
+            copy_vector(history.q[k + e], motion.q)
+            copy_vector(history.v[k + e], motion.v)
             t = time_at(history, k, float(e))
             drive_state(motion.model, history.index[k, SEGMENT], t, motion.q, motion.v)
             value, rate, who = evaluate_here(tag, motion, j, k, float(e), -1)
@@ -177,16 +178,16 @@ def sample_inside(tag, motion, j, k, seen, accelerations):
     """
     history = motion.history
     h = history.t[k + 1] - history.t[k]
+    model, ends_q, ends = motion.model, motion.ends_q, motion.ends
     restore_modes(history, history.index[k, EVENTS], motion.member_state)
     for e in range(2):
-        copy_vector(history.state[k + e, 0], motion.ends[3 * e])
-        copy_vector(history.state[k + e, 1], motion.ends[3 * e + 1])
-        copy_vector(accelerations[e], motion.ends[3 * e + 2])
-        segment = history.index[k, SEGMENT]
-        drive_state(motion.model, segment, history.t[k + e], motion.ends[3 * e], motion.ends[3 * e + 1])
+        copy_vector(history.q[k + e], ends_q[e])
+        copy_vector(history.v[k + e], ends[e, 0])
+        copy_vector(accelerations[e], ends[e, 1])
+        drive_state(model, history.index[k, SEGMENT], history.t[k + e], ends_q[e], ends[e, 0])
     for i in range(1, LAST):
         c = i / LAST
-        quintic(c, h, motion.ends, motion.q, motion.v)
+        quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], motion.q, motion.v)
         drive_state(motion.model, history.index[k, SEGMENT], time_at(history, k, c), motion.q, motion.v)
         value, rate, who = evaluate_here(tag, motion, j, k, c, -1)
         seen[i, G] = value
@@ -225,7 +226,7 @@ def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
       seen (count, SAMPLES, 3): values, rates, members; NaN inside steps that are plain.
       plain (count,): 1 where the samples inside a step are left out.
     """
-    accelerations = np.empty((motion.count, 2, motion.q.shape[0]))
+    accelerations = np.empty((motion.count, 2, motion.v.shape[0]))
     sample_ends(tag, motion, j, seen, accelerations)
     top = -np.inf
     low = np.inf

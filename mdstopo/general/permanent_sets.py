@@ -18,10 +18,19 @@ Sets are counted through the blocks of the law, in their order: slots.
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.events import member_rows
-from mdstopo.general.members import direction, stretched
+from mdstopo.general.members import MODE, SCALE, SET
+from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, KIND, OFFSET, PAIR, START, STOP, SUBJECT
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
-from mdstopo.mechanics.kinematics.planar_poses import POSE, pair_displacement, relative_pose
+from mdstopo.general.step_history import EVENTS, FIRST, MEMBER, NEW, OLD, SEGMENT, STATE
+from mdstopo.general.strides import pair_freedoms, place_in_pair
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    freedoms,
+    member_rows,
+    member_work,
+    pair_displacement,
+    pose_size,
+    relative_pose,
+)
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     FREE_LENGTH,
@@ -38,8 +47,8 @@ def count_sets(model):
     """How many members have a set; where there are none, nothing here is asked again."""
     total = 0
     for k in range(model.block.shape[0]):
-        if law_remembers(model.block[k, 3]):
-            total += model.block[k, 5]
+        if law_remembers(model.block[k, CODE]):
+            total += model.block[k, COUNT]
     return total
 
 
@@ -48,11 +57,11 @@ def slot_of(model, i):
     """The slot of padded member i and its block; -1, -1 where its law does not remember."""
     slot = 0
     for k in range(model.block.shape[0]):
-        if not law_remembers(model.block[k, 3]):
+        if not law_remembers(model.block[k, CODE]):
             continue
-        if model.block[k, 1] <= i and i < model.block[k, 2]:
-            return slot + i - model.block[k, 1], k
-        slot += model.block[k, 5]
+        if model.block[k, START] <= i and i < model.block[k, STOP]:
+            return slot + i - model.block[k, START], k
+        slot += model.block[k, COUNT]
     return -1, -1
 
 
@@ -67,8 +76,10 @@ def set_slopes(model, k, i, member_state, x, rate):
     x: elongation less the permanent set (m).
     rate: rate of the elongation (m/s).
     """
-    _, by_x, _, _, pull = law(model.block[k, 3], model.law[k], x, rate, int(member_state[1, i]), 0.0, 0.0, model.curves)
-    return -member_state[0, i] * by_x, -member_state[0, i] * pull
+    _, by_x, _, _, pull = law(
+        model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), 0.0, 0.0, model.curves
+    )
+    return -member_state[SCALE, i] * by_x, -member_state[SCALE, i] * pull
 
 
 @kernel
@@ -86,26 +97,24 @@ def add_sets(model, segment, member_state, q, v, z, weight, out):
     Out:
       out (slots,): derivatives by the sets, added to.
     """
-    rel = np.empty((model.pair.shape[0], POSE))
-    u = np.empty(3)
-    relative_pose(model.pair, model.home, q, v, rel)
+    rel = np.empty((model.pair.shape[0], pose_size(model)))
+    u = np.empty(freedoms(model))
+    relative_pose(model, q, v, rel)
     slot = 0
     for k in range(model.block.shape[0]):
-        if not law_remembers(model.block[k, 3]):
+        if not law_remembers(model.block[k, CODE]):
             continue
-        lo = model.block[k, 1]
-        p = model.block[k, 0]
+        lo = model.block[k, START]
+        p = model.block[k, PAIR]
         r = rel[p]
-        pair_displacement(model.pair, rel, p, z, u)
-        energy = weight if model.block[k, 4] >= 0 else 0.0
-        for i in range(lo, lo + model.block[k, 5]):
+        pair_displacement(model, rel, p, z, u)
+        energy = weight if model.block[k, DESIGN] >= 0 else 0.0
+        for i in range(lo, lo + model.block[k, COUNT]):
             if model.active[segment, k] != 0:
-                length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
+                length, x, along = member_work(model, i, r, u)
                 if length > 0.0:
-                    force, stored = set_slopes(
-                        model, k, i, member_state, stretched(model.member, i, r, length) - member_state[2, i], 0.0
-                    )
-                    out[slot] += energy * stored - force * (bx * u[0] + by * u[1] + bt * u[2])
+                    force, stored = set_slopes(model, k, i, member_state, x - member_state[SET, i], 0.0)
+                    out[slot] += energy * stored - force * along
             slot += 1
 
 
@@ -127,29 +136,34 @@ def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, sc
     Out:
       out (slots,): derivatives by the sets, added to.
     """
-    if model.response[j, 0] != MEMBER_FORCE:
+    if model.response[j, KIND] != MEMBER_FORCE:
         return
-    row = np.empty(6)
-    row_rate = np.empty(6)
-    slopes = np.empty((3, 6))
-    own = np.empty((2, 6))
-    group = model.response[j, 5]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
+    slopes = np.empty((3, pair_freedoms(model)))
+    own = np.empty((2, pair_freedoms(model)))
+    group = model.response[j, SUBJECT]
     _, pair = member_force(model, member_state, segment, t, group, who, q, v, a, slopes, own)
     along = 0.0  # the force may be zero here; then its slopes tell its sign
-    for c in range(6):
-        along += slopes[0, c] * bars[0, 3 * model.pair[pair, c // 3] + c % 3]
+    for c in range(pair_freedoms(model)):
+        along += slopes[0, c] * bars[0, place_in_pair(model, pair, c)]
     sign = 1.0 if along >= 0.0 else -1.0
     slot = 0
     for k in range(model.block.shape[0]):
-        if not law_remembers(model.block[k, 3]):
+        if not law_remembers(model.block[k, CODE]):
             continue
-        own_i = who - model.block[k, 7]
-        if model.block[k, 6] == group and model.active[segment, k] != 0 and own_i >= 0 and own_i < model.block[k, 5]:
-            i = model.block[k, 1] + own_i
-            x, _ = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-            force, _ = set_slopes(model, k, i, member_state, x - member_state[2, i], 0.0)
+        own_i = who - model.block[k, OFFSET]
+        if (
+            model.block[k, GROUP] == group
+            and model.active[segment, k] != 0
+            and own_i >= 0
+            and own_i < model.block[k, COUNT]
+        ):
+            i = model.block[k, START] + own_i
+            x, _ = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
+            force, _ = set_slopes(model, k, i, member_state, x - member_state[SET, i], 0.0)
             out[slot + own_i] += scale * sign * force
-        slot += model.block[k, 5]
+        slot += model.block[k, COUNT]
 
 
 @kernel
@@ -170,8 +184,8 @@ def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, scal
     Out:
       out (slots,): derivatives by the sets, added to.
     """
-    if model.response[j, 0] == ENERGY:
-        add_sets(model, segment, member_state, q, v, np.zeros(q.shape[0]), scale, out)
+    if model.response[j, KIND] == ENERGY:
+        add_sets(model, segment, member_state, q, v, np.zeros(v.shape[0]), scale, out)
     else:
         add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, scale, out)
 
@@ -179,10 +193,10 @@ def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, scal
 @kernel
 def made_set(model, history, e):
     """Slot and block of the member whose set event e has made, or -1, -1."""
-    slot, k = slot_of(model, history.event[e, 1])
+    slot, k = slot_of(model, history.event[e, MEMBER])
     if slot < 0:
         return -1, -1
-    made = law_makes_set(model.block[k, 3], history.event[e, 2], history.event[e, 3])
+    made = law_makes_set(model.block[k, CODE], history.event[e, OLD], history.event[e, NEW])
     if made or history.kept[e, 0] != history.kept[e, 1]:
         return slot, k
     return -1, -1
@@ -194,7 +208,7 @@ def time_back(model, history, e, pulled, bar):
 
     pulled: derivative of the value that is differentiated by the time of the event (per s).
     """
-    slot, _ = slot_of(model, history.event[e, 1])
+    slot, _ = slot_of(model, history.event[e, MEMBER])
     if slot >= 0:
         bar[slot] -= pulled * history.kept[e, 2]
 
@@ -205,7 +219,7 @@ def time_forward(model, history, e, sets, i):
 
     sets (slots, M_padded + P): derivatives of the sets (m) by each alpha^mu, then by each value; i: one of these.
     """
-    slot, _ = slot_of(model, history.event[e, 1])
+    slot, _ = slot_of(model, history.event[e, MEMBER])
     return -history.kept[e, 2] * sets[slot, i] if slot >= 0 else 0.0
 
 
@@ -215,11 +229,11 @@ def own_slope(model, history, e, entry, rate):
     place = model.varied[entry, 1]
     k = model.varied[entry, 0]
     if place <= FREE_LENGTH:
-        return law_set_slope(model.block[k, 3], model.law[k], place)
+        return law_set_slope(model.block[k, CODE], model.law[k], place)
     if place != ACTIVE_FROM:
         return 0.0
-    state = history.event[e, 0]
-    begins = model.active[history.index[state - 1, 2], k] == 0 if state > 0 else model.varied[entry, 3] != 0
+    state = history.event[e, STATE]
+    begins = model.active[history.index[state - 1, SEGMENT], k] == 0 if state > 0 else model.varied[entry, 3] != 0
     return rate if begins else 0.0
 
 
@@ -229,18 +243,18 @@ def begins_divided(model, member_state, q, v, near):
 
     Its derivative differs on both sides; near: how near to such a place counts (m); q, v (n,): the start.
     """
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     for e in range(model.varied.shape[0]):
         k = model.varied[e, 0]
-        if not law_remembers(model.block[k, 3]) or model.varied[e, 1] > FREE_LENGTH or model.active[0, k] == 0:
+        if not law_remembers(model.block[k, CODE]) or model.varied[e, 1] > FREE_LENGTH or model.active[0, k] == 0:
             continue
         p = model.law[k]
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            if member_state[0, i] == 0.0:
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+            if member_state[SCALE, i] == 0.0:
                 continue
-            x, rate = member_rows(model, model.block[k, 0], i, q, v, row, row_rate)
-            if law_divides(model.block[k, 3], p, x, rate, int(member_state[1, i]), near):
+            x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
+            if law_divides(model.block[k, CODE], p, x, rate, int(member_state[MODE, i]), near):
                 return i
     return -1
 
@@ -265,16 +279,17 @@ def sets_back(model, history, e, bar, lam_q, out):
     slot, k = made_set(model, history, e)
     if slot < 0:
         return
-    row = np.empty(6)
-    row_rate = np.empty(6)
-    state = history.state[history.event[e, 0]]
-    _, rate = member_rows(model, model.block[k, 0], history.event[e, 1], state[0], state[1], row, row_rate)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
+    s = history.event[e, STATE]
+    p = model.block[k, PAIR]
+    _, rate = member_rows(model, p, history.event[e, MEMBER], history.q[s], history.v[s], row, row_rate)
     for entry in range(model.varied.shape[0]):
         if model.varied[entry, 0] == k:
             own = own_slope(model, history, e, entry, rate)
             out[model.member.shape[1] + model.varied[entry, 2]] += bar[slot] * own
-    for r in range(6):
-        lam_q[3 * model.pair[model.block[k, 0], r // 3] + r % 3] += bar[slot] * row[r]
+    for r in range(pair_freedoms(model)):
+        lam_q[place_in_pair(model, model.block[k, PAIR], r)] += bar[slot] * row[r]
     bar[slot] = 0.0
 
 
@@ -295,7 +310,7 @@ def keep_start(model, history, lam_q, bar, start, out):
     if start.shape[0] == 0 and model.varied.shape[0] == 0:
         return
     if bar.shape[0] > 0:
-        for e in range(history.index[0, 3]):
+        for e in range(history.index[0, EVENTS]):
             sets_back(model, history, e, bar, lam_q, out)
     for d in range(start.shape[0]):
         start[d] = lam_q[d]
@@ -312,14 +327,15 @@ def sets_forward(model, history, e, column, sets):
     slot, k = made_set(model, history, e)
     if slot < 0:
         return
-    row = np.empty(6)
-    row_rate = np.empty(6)
-    state = history.state[history.event[e, 0]]
-    _, rate = member_rows(model, model.block[k, 0], history.event[e, 1], state[0], state[1], row, row_rate)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
+    s = history.event[e, STATE]
+    p = model.block[k, PAIR]
+    _, rate = member_rows(model, p, history.event[e, MEMBER], history.q[s], history.v[s], row, row_rate)
     for i in range(column.shape[0]):
         sets[slot, i] = 0.0
-        for r in range(6):
-            sets[slot, i] += row[r] * column[i, 3 * model.pair[model.block[k, 0], r // 3] + r % 3]
+        for r in range(pair_freedoms(model)):
+            sets[slot, i] += row[r] * column[i, place_in_pair(model, model.block[k, PAIR], r)]
     for entry in range(model.varied.shape[0]):
         if model.varied[entry, 0] == k:
             sets[slot, model.member.shape[1] + model.varied[entry, 2]] += own_slope(model, history, e, entry, rate)
@@ -340,27 +356,26 @@ def through_sets(model, member_state, history, w, matrix, out):
       out (slots, 4 n + 1): changes of q, v, the carried rows and the integral, per m of set.
     """
     n = model.mass.shape[0]
-    segment = history.index[w, 2]
-    o = history.index[w, 0]
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    segment = history.index[w, SEGMENT]
+    o = history.index[w, FIRST]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     slot = 0
     for k in range(model.block.shape[0]):
-        if not law_remembers(model.block[k, 3]):
+        if not law_remembers(model.block[k, CODE]):
             continue
-        p = model.block[k, 0]
-        lo = model.block[k, 1]
-        for i in range(lo, lo + model.block[k, 5]):
+        p = model.block[k, PAIR]
+        lo = model.block[k, START]
+        for i in range(lo, lo + model.block[k, COUNT]):
             out[slot] = 0.0
             if model.active[segment, k] != 0:
-                for j in range(history.index[w + 1, 0] - o):
-                    stage = history.stage[o + j]
-                    x, rate = member_rows(model, p, i, stage[0], stage[1], row, row_rate)
-                    force, _ = set_slopes(model, k, i, member_state, x - member_state[2, i], rate)
+                for j in range(history.index[w + 1, FIRST] - o):
+                    x, rate = member_rows(model, p, i, history.stage_q[o + j], history.stage_v[o + j], row, row_rate)
+                    force, _ = set_slopes(model, k, i, member_state, x - member_state[SET, i], rate)
                     if force == 0.0:
                         continue
-                    for r in range(6):
-                        b = (4 + j) * n + 3 * model.pair[p, r // 3] + r % 3
+                    for r in range(pair_freedoms(model)):
+                        b = (4 + j) * n + place_in_pair(model, p, r)
                         for d in range(out.shape[1]):
                             out[slot, d] -= force * row[r] * matrix[b, d]
             slot += 1

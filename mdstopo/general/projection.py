@@ -13,15 +13,24 @@ from mdstopo.general.accelerations import (
     factor_matrix,
     gather,
     gather_multipliers,
-    gather_turned,
     joint_state,
     matrices_vjp,
     solve_unknowns,
 )
-from mdstopo.general.forces import turn_bodies
+from mdstopo.general.model import JOINT_CODE, JOINT_PAIR, JOINT_ROWS
+from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.switches import DIAGONAL
-from mdstopo.mechanics.joints.revolute import PLACES
 from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    difference,
+    joint_places,
+    most_rows,
+    moved_most,
+    place_joint,
+    retract,
+    rotations,
+    turn_bodies,
+)
 
 #: misfit, relative to the scene, with which a joint counts as torn: its rows were taken for a repetition of others
 MISFIT = 1e-7
@@ -36,7 +45,7 @@ def misfit(model, phi, rows):
     """Largest |Phi| of the joints (m or rad), and its place in `rows` of joint numbers."""
     worst = 0.0
     for j in range(model.joint.shape[0]):
-        for r in range(model.joint[j, 4]):
+        for r in range(model.joint[j, JOINT_ROWS]):
             if abs(phi[j, r]) > worst or np.isnan(phi[j, r]):
                 worst = abs(phi[j, r])
                 rows[0] = j
@@ -60,59 +69,55 @@ def project(model, scale, q, v, workspace, mu, nu):
     Returns the place of the unknown at which the joints are singular, or -1; or, behind all places, the number of a
     joint that the others do not let fit.
     """
-    n = q.shape[0]
+    n = v.shape[0]
     n_row = mu.shape[0]
     mu[:] = 0.0
     nu[:] = 0.0
     if n_row == 0:
         return -1
-    start = np.empty(n)
+    start = q.copy()
     shift = np.empty(n)
     which = np.zeros(1, np.int64)
-    for d in range(n):
-        start[d] = q[d]
     none = workspace.mass
     if workspace.switches[DIAGONAL] == 0:
         none[:] = 0.0
     last = np.inf
     worst = np.inf
-    moved = 0.0  # since home (m): misfits are only known relative to it
-    for b in range(0, n, 3):
-        moved = max(moved, abs(q[b]), abs(q[b + 1]), min(abs(q[b + 2]), 1.0) * scale)
+    moved = moved_most(model, q, scale)  # misfits are only known relative to it
     for _ in range(MOST):
-        turn_bodies(q, workspace.turned)
+        turn_bodies(model, q, workspace.turned)
         joint_state(model, q, v, workspace)
         worst = misfit(model, workspace.phi, which)
         if worst <= 1e-15 * min(moved, scale) or not worst < last:
             break
         last = worst
-        singular = factor_matrix(model, workspace, none, none, q, none, 0.0, 0.0, np.bool_(False))
+        singular = factor_matrix(model, workspace, none, none, workspace.turn, none, 0.0, 0.0, np.bool_(False))
         if singular >= 0:
             return singular
+        difference(model, start, q, shift)
         for d in range(n):
-            shift[d] = model.mass[d] * (start[d] - q[d])
+            shift[d] = model.mass[d] * shift[d]
         for j in range(model.joint.shape[0]):
-            for r in range(3):
+            for r in range(most_rows(model)):
                 if model.row[j, r] >= 0:
                     mu[model.row[j, r]] = -workspace.phi[j, r]
         solve_unknowns(model, workspace, shift, mu)
-        for d in range(n):
-            q[d] += shift[d]
+        retract(model, q, shift, q)
     else:
-        turn_bodies(q, workspace.turned)
+        turn_bodies(model, q, workspace.turned)
         joint_state(model, q, v, workspace)
-    singular = factor_matrix(model, workspace, none, none, q, none, 0.0, 0.0, np.bool_(False))
+    singular = factor_matrix(model, workspace, none, none, workspace.turn, none, 0.0, 0.0, np.bool_(False))
     if singular >= 0:
         return singular
     for d in range(n):
         shift[d] = 0.0
     for j in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             own = model.row[j, r]
             if own >= 0:
                 value = 0.0
-                for i in range(6):
-                    value -= workspace.jac[j, r, i] * v[3 * model.joint[j, 1 + i // 3] + i % 3]
+                for i in range(pair_freedoms(model)):
+                    value -= workspace.jac[j, r, i] * v[place_in_joint(model, j, i)]
                 nu[own] = value
     solve_unknowns(model, workspace, shift, nu)
     for d in range(n):
@@ -131,23 +136,23 @@ def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope):
       mu, nu (n_row,): multipliers that moved it there.
       workspace: workspace of a balance, with the bodies turned (`forces.turn_bodies`).
     Out:
-      h_mu, h_nu (n_pair, 6, 6): d(Phi_q^T mu)/dq and d(Phi_q^T nu)/dq of the joints of each pair.
-      slope (n_joint, 3, 6): d(Phi_q v)/dq.
+      h_mu, h_nu (n_pair, 2 D, 2 D): d(Phi_q^T mu)/dq and d(Phi_q^T nu)/dq of the joints of each pair.
+      slope (n_joint, rows, 2 D): d(Phi_q v)/dq.
     """
-    w = np.empty(PLACES)
-    wd = np.empty(6)
-    mine = np.empty(3)
+    w = np.empty(joint_places(model))
+    wd = np.empty(pair_freedoms(model))
+    mine = np.empty(most_rows(model))
     h_mu[:] = 0.0
     h_nu[:] = 0.0
     for j in range(model.joint.shape[0]):
-        code = model.joint[j, 0]
+        code = model.joint[j, JOINT_CODE]
         par = model.joint_par[j]
-        gather_turned(model, j, q, workspace.turned, w)
+        place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather_multipliers(model, j, mu, mine)
-        joint_stiffness(code, par, w, mine, h_mu[model.joint[j, 3]])
+        joint_stiffness(code, par, w, mine, h_mu[model.joint[j, JOINT_PAIR]])
         gather_multipliers(model, j, nu, mine)
-        joint_stiffness(code, par, w, mine, h_nu[model.joint[j, 3]])
+        joint_stiffness(code, par, w, mine, h_nu[model.joint[j, JOINT_PAIR]])
         joint_velocity_slope(code, par, w, wd, slope[j])
 
 
@@ -157,7 +162,7 @@ def swept(model, workspace, h, x, y):
 
     H is as small as what a step has drifted, so few sweeps do. Returns whether they have settled.
 
-    h (n_pair, 6, 6): H by pairs of bodies.
+    h (n_pair, 2 D, 2 D): H by pairs of bodies.
     x (n,): right side, then the solution; as it was where the sweeps have not settled.
     y (n_row,): right side of the rows, of the first sweep; zero afterwards.
     """
@@ -182,7 +187,7 @@ def swept(model, workspace, h, x, y):
             for d in range(n):
                 x[d] = last[d]
             return True
-        matrices_vjp(model.pair, h, last, x)
+        matrices_vjp(model, h, last, x)
     for d in range(n):
         x[d] = right[d]
     return False
@@ -202,34 +207,34 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
-    n = q.shape[0]
+    n = v.shape[0]
     count = bar_q.shape[0]
     if mu.shape[0] == 0:
         return
     n_pair = model.pair.shape[0]
-    h_mu = np.empty((n_pair, 6, 6))
-    h_nu = np.empty((n_pair, 6, 6))
-    slope = np.zeros((model.joint.shape[0], 3, 6))
+    h_mu = np.empty((n_pair, pair_freedoms(model), pair_freedoms(model)))
+    h_nu = np.empty((n_pair, pair_freedoms(model), pair_freedoms(model)))
+    slope = np.zeros((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
     y = np.zeros(mu.shape[0])
     none = workspace.mass
     if workspace.switches[DIAGONAL] == 0:
         none[:] = 0.0
-    turn_bodies(q, workspace.turned)
+    turn_bodies(model, q, workspace.turned)
     joint_state(model, q, v, workspace)
     _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)
-    factor_matrix(model, workspace, none, none, bar_q[0], none, 0.0, 0.0, np.bool_(True))
+    factor_matrix(model, workspace, none, none, workspace.turn, none, 0.0, 0.0, np.bool_(True))
     left = 0
     unsettled = np.empty(count, np.int64)
     for m in range(count):
         y[:] = 0.0
         solve_unknowns(model, workspace, bar_v[m], y)
-        matrices_vjp(model.pair, h_nu, bar_v[m], bar_q[m])
+        matrices_vjp(model, h_nu, bar_v[m], bar_q[m])
         for j in range(model.joint.shape[0]):
-            for r in range(3):
+            for r in range(most_rows(model)):
                 own = model.row[j, r]
                 if own >= 0:
-                    for i in range(6):
-                        bar_q[m, 3 * model.joint[j, 1 + i // 3] + i % 3] -= slope[j, r, i] * y[own]
+                    for i in range(pair_freedoms(model)):
+                        bar_q[m, place_in_joint(model, j, i)] -= slope[j, r, i] * y[own]
         y[:] = 0.0
         if not swept(model, workspace, h_mu, bar_q[m], y):
             unsettled[left] = m
@@ -237,7 +242,7 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
     if left > 0:
         workspace.by_q[:] = 0.0
         workspace.by_v[:] = 0.0
-        factor_matrix(model, workspace, h_mu, none, np.zeros(n), none, 1.0, 0.0, np.bool_(True))
+        factor_matrix(model, workspace, h_mu, none, np.zeros((n, rotations(model))), none, 1.0, 0.0, np.bool_(True))
         for i in range(left):
             y[:] = 0.0
             solve_unknowns(model, workspace, bar_q[unsettled[i]], y)
@@ -261,17 +266,17 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
-    n = q.shape[0]
+    n = v.shape[0]
     if mu.shape[0] == 0:
         return
     n_pair = model.pair.shape[0]
-    h_mu = np.empty((n_pair, 6, 6))
-    h_nu = np.empty((n_pair, 6, 6))
-    slope = np.zeros((model.joint.shape[0], 3, 6))
+    h_mu = np.empty((n_pair, pair_freedoms(model), pair_freedoms(model)))
+    h_nu = np.empty((n_pair, pair_freedoms(model), pair_freedoms(model)))
+    slope = np.zeros((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
     y = np.zeros(mu.shape[0])
-    none = np.zeros((n_pair, 6, 6))
-    turn = np.zeros(n)
-    turn_bodies(q, workspace.turned)
+    none = np.zeros((n_pair, pair_freedoms(model), pair_freedoms(model)))
+    turn = np.zeros((n, rotations(model)))
+    turn_bodies(model, q, workspace.turned)
     joint_state(model, q, v, workspace)
     _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)
     workspace.by_q[:] = 0.0
@@ -282,18 +287,18 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
         dv[d] *= model.mass[d]
     solve_unknowns(model, workspace, dq, y)
     for p in range(n_pair):
-        for i in range(6):
+        for i in range(pair_freedoms(model)):
             value = 0.0
-            for j in range(6):
-                value += h_nu[p, i, j] * dq[3 * model.pair[p, j // 3] + j % 3]
-            dv[3 * model.pair[p, i // 3] + i % 3] -= value
+            for j in range(pair_freedoms(model)):
+                value += h_nu[p, i, j] * dq[place_in_pair(model, p, j)]
+            dv[place_in_pair(model, p, i)] -= value
     for j in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             own = model.row[j, r]
             if own >= 0:
                 value = 0.0
-                for i in range(6):
-                    value -= slope[j, r, i] * dq[3 * model.joint[j, 1 + i // 3] + i % 3]
+                for i in range(pair_freedoms(model)):
+                    value -= slope[j, r, i] * dq[place_in_joint(model, j, i)]
                 y[own] = value
     factor_matrix(model, workspace, none, none, turn, none, 0.0, 0.0, np.bool_(False))
     solve_unknowns(model, workspace, dv, y)

@@ -14,17 +14,45 @@ from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.accelerations import gather_multipliers, solve_accelerations
-from mdstopo.general.events import member_between, member_rows
 from mdstopo.general.forces import inerter_force
+from mdstopo.general.members import MODE, SCALE, SET, level_of
 from mdstopo.general.method_interface import beside, derivatives
-from mdstopo.general.model import INERTER, GeneralModel
+from mdstopo.general.model import (
+    BODY,
+    CODE,
+    COMPONENT,
+    COUNT,
+    GROUP,
+    INERTER,
+    JOINT_CODE,
+    KIND,
+    OFFSET,
+    ORDER,
+    PAIR,
+    REFERENCE,
+    START,
+    SUBJECT,
+    GeneralModel,
+)
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
-from mdstopo.mechanics.joints.revolute import PLACES, place_joint
+from mdstopo.general.step_history import SEGMENT
+from mdstopo.general.strides import energy_column, is_turning, pair_freedoms, place_in_joint, place_in_pair, pull_column
 from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
 from mdstopo.mechanics.joints.table import FORCE, MOMENT, joint_transmitted
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    add_pair_force,
+    angle_motion,
+    joint_places,
+    member_rows,
+    most_rows,
+    place_joint_alone,
+    point_motion,
+    retract,
+    stretch_between,
+    turn_of,
+)
 from mdstopo.mechanics.kinematics.planar_points import ACROSS as ACROSS_MOTION
-from mdstopo.mechanics.kinematics.planar_points import NORM, X, Y, angle_response, point_response
-from mdstopo.mechanics.kinematics.planar_poses import add_pair_force, turned_body
+from mdstopo.mechanics.kinematics.planar_points import NORM, X, Y
 from mdstopo.mechanics.laws.table import law
 
 #: the kernels of responses by their code, column KIND of `GeneralModel.response`; `code_of` fills it
@@ -71,7 +99,7 @@ def rate_is_by_state(model, j):
 @kernel
 def kinked(model, j):
     """Whether response j is a norm, an absolute value, or a largest one, which may have kinks in time."""
-    return _is_absolute(model.response[j, 0]) or is_norm(model, j)
+    return _is_absolute(model.response[j, KIND]) or is_norm(model, j)
 
 
 @kernel
@@ -85,10 +113,10 @@ def member_force(model, member_state, segment, t, group, i, q, v, a, slopes, own
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group, i: the group, and the number of the member in it.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
-      slopes (3, 6): of f* by q, v and a of the two bodies; an inerter's are those by a alone (`_inerter_slopes`).
-      own (2, 6): scratch.
+      slopes (3, 2 D): of f* by q, v and a of the two bodies; an inerter's are those by a alone (`_inerter_slopes`).
+      own (2, 2 D): scratch.
 
     Returns f* (N), positive in tension, and the pair of bodies.
     """
@@ -96,26 +124,30 @@ def member_force(model, member_state, segment, t, group, i, q, v, a, slopes, own
     pair = 0
     slopes[:] = 0.0
     for k in range(model.block.shape[0]):
-        own_i = i - model.block[k, 7]
-        if model.block[k, 6] != group or model.active[segment, k] == 0 or own_i < 0 or own_i >= model.block[k, 5]:
+        own_i = i - model.block[k, OFFSET]
+        if (
+            model.block[k, GROUP] != group
+            or model.active[segment, k] == 0
+            or own_i < 0
+            or own_i >= model.block[k, COUNT]
+        ):
             continue
-        pair = model.block[k, 0]
-        m = model.block[k, 1] + own_i
-        scale = member_state[0, m]
+        pair = model.block[k, PAIR]
+        m = model.block[k, START] + own_i
+        scale = member_state[SCALE, m]
         x, rate = member_rows(model, pair, m, q, v, own[0], own[1])
-        x -= member_state[2, m]
-        if model.block[k, 3] == INERTER:
+        x -= member_state[SET, m]
+        if model.block[k, CODE] == INERTER:
             total += scale * inerter_force(model, k, m, q, v, a, own[0])
-            for r in range(6):
+            for r in range(pair_freedoms(model)):
                 slopes[2, r] += scale * model.law[k, 0] * own[0, r]
             continue
-        tau = t - model.times[segment]
-        value = model.level[segment, k, 0] + tau * model.level[segment, k, 1]
+        value = level_of(model, segment, k, t)
         f, by_x, by_rate, _, _ = law(
-            model.block[k, 3], model.law[k], x, rate, int(member_state[1, m]), t, value, model.curves
+            model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, m]), t, value, model.curves
         )
         total += scale * f
-        for r in range(6):
+        for r in range(pair_freedoms(model)):
             slopes[0, r] += scale * (by_x * own[0, r] + by_rate * own[1, r])
             slopes[1, r] += scale * by_rate * own[0, r]
     return total, pair
@@ -132,38 +164,29 @@ def group_forces(model, member_state, segment, t, group, q, v, a, out):
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group: the group.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       out (M,): f* of each member of the group (N).
     """
-    row = np.empty(6)
+    row = np.empty(pair_freedoms(model))
     out[:] = 0.0
     for k in range(model.block.shape[0]):
-        if model.block[k, 6] != group or model.active[segment, k] == 0:
+        if model.block[k, GROUP] != group or model.active[segment, k] == 0:
             continue
-        one = model.pair[model.block[k, 0], 0]
-        two = model.pair[model.block[k, 0], 1]
-        a_body = 3 * one
-        b_body = 3 * two
-        turn_one = turned_body(model.home, one, q[a_body + 2])
-        turn_two = turned_body(model.home, two, q[b_body + 2])
-        wa = v[a_body + 2]
-        wb = v[b_body + 2]
-        value = model.level[segment, k, 0] + (t - model.times[segment]) * model.level[segment, k, 1]
-        first = model.block[k, 7] - model.block[k, 1]
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
-            scale = member_state[0, i]
-            if model.block[k, 3] == INERTER:
+        p = model.block[k, PAIR]
+        turn_one = turn_of(model, model.pair[p, 0], q)
+        turn_two = turn_of(model, model.pair[p, 1], q)
+        value = level_of(model, segment, k, t)
+        first = model.block[k, OFFSET] - model.block[k, START]
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+            scale = member_state[SCALE, i]
+            if model.block[k, CODE] == INERTER:
                 out[first + i] += scale * inerter_force(model, k, i, q, v, a, row)
                 continue
-            px, py, qx, qy, ux, uy, length, stretch = member_between(model, i, one, two, q, turn_one, turn_two)
-            y = 1.0 / length if length > 1e-15 else 0.0
-            dx = v[b_body] - wb * qy - v[a_body] + wa * py
-            dy = v[b_body + 1] + wb * qx - v[a_body + 1] - wa * px
-            rate = ux * y * dx + uy * y * dy
-            x = stretch - member_state[2, i]
+            x, rate = stretch_between(model, p, i, turn_one, turn_two, q, v)
+            x -= member_state[SET, i]
             f, _, _, _, _ = law(
-                model.block[k, 3], model.law[k], x, rate, int(member_state[1, i]), t, value, model.curves
+                model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves
             )
             out[first + i] += scale * f
 
@@ -179,10 +202,10 @@ def largest_force(model, member_state, segment, t, group, q, v, a):
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group: the group.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     """
-    slopes = np.empty((3, 6))
-    own = np.empty((2, 6))
+    slopes = np.empty((3, pair_freedoms(model)))
+    own = np.empty((2, pair_freedoms(model)))
     best = -1.0
     who = 0
     for i in range(members_of(model, group)):
@@ -198,13 +221,13 @@ def members_of(model, group):
     """How many members a group has."""
     count = 0
     for k in range(model.block.shape[0]):
-        if model.block[k, 6] == group:
-            count = max(count, model.block[k, 7] + model.block[k, 5])
+        if model.block[k, GROUP] == group:
+            count = max(count, model.block[k, OFFSET] + model.block[k, COUNT])
     return count
 
 
 @kernel
-def equal_forces(model, member_state, segment, t, group, stage, largest, tied):
+def equal_forces(model, member_state, segment, t, group, q, v, a, largest, tied):
     """Find the members of a group that share the largest |f*|, to TIE.
 
     Constant:
@@ -214,18 +237,18 @@ def equal_forces(model, member_state, segment, t, group, stage, largest, tied):
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       group: the group.
-      stage (3, n): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       largest: the largest |f*| there (N).
     Out:
       tied (M,): numbers of these members, first of all; M is the size of the group.
 
     Returns how many they are; 1 where all forces are zero, of which none is written.
     """
-    slopes = np.empty((3, 6))
-    own = np.empty((2, 6))
+    slopes = np.empty((3, pair_freedoms(model)))
+    own = np.empty((2, pair_freedoms(model)))
     found = 0
     for i in range(members_of(model, group)):
-        f, _ = member_force(model, member_state, segment, t, group, i, stage[0], stage[1], stage[2], slopes, own)
+        f, _ = member_force(model, member_state, segment, t, group, i, q, v, a, slopes, own)
         if abs(f) >= (1.0 - TIE) * largest and largest > 0.0:
             tied[found] = i
             found += 1
@@ -243,7 +266,7 @@ def _value(kind, model, member_state, segment, j, who, t, q, v, a, lam, workspac
     j: the response.
     who: of a member force the number of the member in its group.
     t: time (s).
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     lam (n_row,): multipliers of the joints.
     workspace: workspace as the balance of this state has left it.
     bars (3, n), row_bar (n_row,): slopes by q, v, a and by lam, zero before.
@@ -263,7 +286,7 @@ def response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, b
       j: the response.
       who: of a member force the number of the member in its group.
       t: time (s).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       lam (n_row,): multipliers of the joints.
       workspace: workspace as the balance of this state has left it.
     Out:
@@ -272,7 +295,9 @@ def response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, b
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
-    return _value(model.response[j, 0], model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
+    return _value(
+        model.response[j, KIND], model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar
+    )
 
 
 @kernel
@@ -281,8 +306,8 @@ def energy_value(model, workspace, bars):
     value = 0.0
     for p in range(model.pair.shape[0]):
         o = workspace.sums[p]
-        value += o[3]
-        add_pair_force(model.pair, workspace.rel, p, o[4], o[5], o[6], bars[0])
+        value += o[energy_column(model)]
+        add_pair_force(model, workspace.rel, p, o, pull_column(model), bars[0])
     return value
 
 
@@ -298,18 +323,18 @@ def members_value(model, member_state, segment, j, who, t, q, v, a, bars):
       j: the response, which says which group.
       who: number of the member in the group.
       t: time (s).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       bars (3, n): slopes by q, v and a, added to.
     """
-    slopes = np.empty((3, 6))
-    own = np.empty((2, 6))
-    f, pair = member_force(model, member_state, segment, t, model.response[j, 5], who, q, v, a, slopes, own)
+    slopes = np.empty((3, pair_freedoms(model)))
+    own = np.empty((2, pair_freedoms(model)))
+    f, pair = member_force(model, member_state, segment, t, model.response[j, SUBJECT], who, q, v, a, slopes, own)
     sign = 1.0 if f >= 0.0 else -1.0
     inertial = False
     for i in range(3):
-        for c in range(6):
-            bars[i, 3 * model.pair[pair, c // 3] + c % 3] += sign * slopes[i, c]
+        for c in range(pair_freedoms(model)):
+            bars[i, place_in_pair(model, pair, c)] += sign * slopes[i, c]
             inertial = inertial or (i == 2 and slopes[i, c] != 0.0)
     if inertial:
         _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars)
@@ -322,10 +347,10 @@ def motion_value(model, j, q, v, a, bars):
 
     model: the compiled scene.
     j: the response.
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    return _motion(model, j, model.response[j, 3], q, v, a, bars)
+    return _motion(model, j, model.response[j, COMPONENT], q, v, a, bars)
 
 
 @kernel
@@ -362,37 +387,16 @@ def _motion(model, j, component, q, v, a, bars):
 
     model: the compiled scene.
     j: the response.
-    component: X, Y, NORM or ACROSS (`responses.kinematics`); angles have none.
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    component: X, Y, NORM or ACROSS (`planar_points`); angles have none.
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    slope = np.empty((6, 3))
-    b = 3 * model.response[j, 1]
-    r = 3 * model.response[j, 2]
-    order = model.response[j, 4]
-    if _is_vector(model.response[j, 0]):
-        value = point_response(
-            order, component, model.response_par[j], model.home[b // 3], model.home[r // 3], q[b : b + 3], v[b : b + 3],
-            a[b : b + 3], q[r : r + 3], v[r : r + 3], a[r : r + 3], slope,
-        )  # fmt: skip
-    else:
-        value = angle_response(
-            order,
-            model.home[b // 3],
-            model.home[r // 3],
-            q[b : b + 3],
-            v[b : b + 3],
-            a[b : b + 3],
-            q[r : r + 3],
-            v[r : r + 3],
-            a[r : r + 3],
-            slope,
-        )
-    for i in range(3):
-        for c in range(3):
-            bars[i, b + c] += slope[i, c]
-            bars[i, r + c] += slope[3 + i, c]
-    return value
+    body = model.response[j, BODY]
+    reference = model.response[j, REFERENCE]
+    order = model.response[j, ORDER]
+    if _is_vector(model.response[j, KIND]):
+        return point_motion(model, order, component, model.response_par[j], body, reference, q, v, a, bars)
+    return angle_motion(model, order, body, reference, q, v, a, bars)
 
 
 @kernel
@@ -407,36 +411,36 @@ def _transmitted(model, j, which, q, lam, bars, row_bar):
     bars (3, n): slopes by q are added to its first row.
     row_bar (n_row,): slopes by lam are written into it.
     """
-    joint = model.response[j, 5]
-    w = np.empty(PLACES)
-    mine = np.empty(3)
-    by_lam = np.empty(3)
-    by_q = np.empty(6)
-    place_joint(model.home, model.joint[joint, 1], model.joint[joint, 2], q, w)
+    joint = model.response[j, SUBJECT]
+    w = np.empty(joint_places(model))
+    mine = np.empty(most_rows(model))
+    by_lam = np.empty(most_rows(model))
+    by_q = np.empty(pair_freedoms(model))
+    place_joint_alone(model, joint, q, w)
     gather_multipliers(model, joint, lam, mine)
-    value = joint_transmitted(model.joint[joint, 0], model.joint_par[joint], w, mine, which, by_lam, by_q)
-    for r in range(3):
+    value = joint_transmitted(model.joint[joint, JOINT_CODE], model.joint_par[joint], w, mine, which, by_lam, by_q)
+    for r in range(most_rows(model)):
         if model.row[joint, r] >= 0:
             row_bar[model.row[joint, r]] = by_lam[r]
-    for c in range(6):
-        bars[0, 3 * model.joint[joint, 1 + c // 3] + c % 3] += by_q[c]
+    for c in range(pair_freedoms(model)):
+        bars[0, place_in_joint(model, joint, c)] += by_q[c]
     return value
 
 
 @kernel
 def is_norm(model, j):
     """Whether response j is the Euclidean norm of a plane vector."""
-    return _is_vector(model.response[j, 0]) and model.response[j, 3] == NORM
+    return _is_vector(model.response[j, KIND]) and model.response[j, COMPONENT] == NORM
 
 
 def has_norm(model: GeneralModel, j: int) -> bool:
     """`is_norm` in Python."""
-    return LISTED[int(model.response[j, 0])].vector is not None and int(model.response[j, 3]) == NORM
+    return LISTED[int(model.response[j, KIND])].vector is not None and int(model.response[j, COMPONENT]) == NORM
 
 
 def has_kinks(model: GeneralModel, j: int) -> bool:
     """`kinked` in Python."""
-    return LISTED[int(model.response[j, 0])].absolute or has_norm(model, j)
+    return LISTED[int(model.response[j, KIND])].absolute or has_norm(model, j)
 
 
 @chosen(LISTED, lambda each: each.vector and each.vector.across, part)
@@ -446,7 +450,7 @@ def _across(kind, model, j, q, v, a, lam, bars, row_bar):
     kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
     model: the compiled scene.
     j: the response.
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     lam (n_row,): multipliers of the joints.
     bars (3, n), row_bar (n_row,): slopes by q, v, a and by lam, zero before.
     """
@@ -461,7 +465,7 @@ def across_slopes(model, j, q, v, a, lam, bars, row_bar):
       model: the compiled scene.
     In:
       j: the response, a norm (`is_norm`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       lam (n_row,): multipliers of the joints.
     Out:
       bars (3, n): slopes by q, v and a; zero where the vector is.
@@ -469,7 +473,7 @@ def across_slopes(model, j, q, v, a, lam, bars, row_bar):
     """
     bars[:] = 0.0
     row_bar[:] = 0.0
-    _across(model.response[j, 0], model, j, q, v, a, lam, bars, row_bar)
+    _across(model.response[j, KIND], model, j, q, v, a, lam, bars, row_bar)
 
 
 @kernel
@@ -478,7 +482,7 @@ def motion_across(model, j, q, v, a, bars):
 
     model: the compiled scene.
     j: the response.
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
     return _motion(model, j, ACROSS_MOTION, q, v, a, bars)
@@ -505,7 +509,7 @@ def _components(kind, model, j, q, v, a, lam, out):
     kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
     model: the compiled scene.
     j: the response.
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     lam (n_row,): multipliers of the joints.
     out (2,): the vector.
     """
@@ -517,10 +521,10 @@ def motion_components(model, j, q, v, a, out):
 
     model: the compiled scene.
     j: the response.
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     out (2,): the components along x and y.
     """
-    spare = np.zeros((3, q.shape[0]))
+    spare = np.zeros((3, v.shape[0]))
     out[0] = _motion(model, j, X, q, v, a, spare)
     out[1] = _motion(model, j, Y, q, v, a, spare)
 
@@ -528,8 +532,8 @@ def motion_components(model, j, q, v, a, out):
 @kernel
 def joint_force_components(model, j, lam, out):
     """Both components of the force that a joint transmits."""
-    mine = np.empty(3)
-    gather_multipliers(model, model.response[j, 5], lam, mine)
+    mine = np.empty(most_rows(model))
+    gather_multipliers(model, model.response[j, SUBJECT], lam, mine)
     out[0] = mine[0]
     out[1] = mine[1]
 
@@ -547,19 +551,20 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
       k, c: number of the step, and the fraction of it at which the state is.
       j: the response, a norm (`is_norm`).
       t: time (s).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
     Out:
       a (n,), lam (n_row,): scratch.
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
-    n = q.shape[0]
-    segment = history.index[k, 2]
+    n = v.shape[0]
+    segment = history.index[k, SEGMENT]
     no = np.bool_(False)
-    near = np.empty((3, n))
+    near_q = np.empty(q.shape[0])
+    near = np.empty((2, n))
     vector = np.empty(2)
     aside = np.empty((2, 2))
     solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
-    _components(model.response[j, 0], model, j, q, v, a, lam, vector)
+    _components(model.response[j, KIND], model, j, q, v, a, lam, vector)
     size = np.hypot(vector[0], vector[1])
     if size == 0.0:
         return 0.0
@@ -567,9 +572,9 @@ def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, 
     apart = APART * (history.t[k + 1] - history.t[k])
     for side in range(2):
         e = apart if side == 1 else -apart
-        beside(tag, history, k, c, e, q, v, here, near[0], near[1])
-        solve_accelerations(model, member_state, segment, t + e, near[0], near[1], no, workspace, near[2], lam)
-        _components(model.response[j, 0], model, j, near[0], near[1], near[2], lam, aside[side])
+        beside(tag, model, history, k, c, e, q, v, here, near_q, near[0])
+        solve_accelerations(model, member_state, segment, t + e, near_q, near[0], no, workspace, near[1], lam)
+        _components(model.response[j, KIND], model, j, near_q, near[0], near[1], lam, aside[side])
     x = aside[1, 0] - aside[0, 0]
     y = aside[1, 1] - aside[0, 1]
     return (vector[0] * y - vector[1] * x) / (2.0 * apart * size)
@@ -587,66 +592,81 @@ def _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars):
       who: number of the member in the group.
       j: the response, which says which group.
       sign: sign of f*, whose absolute value is differentiated.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
-        The first two are changed on the way and then as before.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       bars (3, n): slopes by q and v are added to its first two rows.
     """
-    own = np.empty(6)
+    own = np.empty(pair_freedoms(model))
     for k in range(model.block.shape[0]):
-        if model.block[k, 6] != model.response[j, 5] or model.block[k, 3] != INERTER or model.active[segment, k] == 0:
+        if (
+            model.block[k, GROUP] != model.response[j, SUBJECT]
+            or model.block[k, CODE] != INERTER
+            or model.active[segment, k] == 0
+        ):
             continue
-        if who < model.block[k, 7] or who >= model.block[k, 7] + model.block[k, 5]:
+        if who < model.block[k, OFFSET] or who >= model.block[k, OFFSET] + model.block[k, COUNT]:
             continue
-        pair = model.block[k, 0]
-        m = model.block[k, 1] + who - model.block[k, 7]
+        pair = model.block[k, PAIR]
+        i = model.block[k, START] + who - model.block[k, OFFSET]
         for which in range(2):
-            x = q if which == 0 else v
-            for c in range(6):
-                d = 3 * model.pair[pair, c // 3] + c % 3
-                kept = x[d]
-                size = 1e-2 * (0.1 + abs(kept)) if which == 1 else 2e-3 * max(model.reach[pair], 1e-3)
-                if c % 3 == 2 and which == 0:
+            for c in range(pair_freedoms(model)):
+                d = place_in_pair(model, pair, c)
+                size = 2e-3 * max(model.reach[pair], 1e-3) if which == 0 else 1e-2 * (0.1 + abs(v[d]))
+                if which == 0 and is_turning(model, c):
                     size = 2e-3
                 slope = 0.0
-                for n in range(3):
-                    weight = 0.75 if n == 0 else (-0.15 if n == 1 else 1.0 / 60.0)
-                    x[d] = kept + (n + 1) * size
-                    plus = inerter_force(model, k, m, q, v, a, own)
-                    x[d] = kept - (n + 1) * size
-                    slope += weight * (plus - inerter_force(model, k, m, q, v, a, own))
-                x[d] = kept
-                bars[which, d] += sign * member_state[0, m] * slope / size
+                for m in range(3):
+                    weight = 0.75 if m == 0 else (-0.15 if m == 1 else 1.0 / 60.0)
+                    plus = _shifted_force(model, k, i, which, d, (m + 1) * size, q, v, a, own)
+                    slope += weight * (plus - _shifted_force(model, k, i, which, d, -(m + 1) * size, q, v, a, own))
+                bars[which, d] += sign * member_state[SCALE, i] * slope / size
 
 
 @kernel
-def value_at(model, member_state, segment, t, state, j, workspace):
+def _shifted_force(model, k, i, which, d, size, q, v, a, row):
+    """`inerter_force` with freedom d of the coordinates (which = 0) or the velocities (1) shifted by a size."""
+    shift = np.zeros(v.shape[0])
+    if which == 0:
+        shift[d] = size
+        moved = np.empty(q.shape[0])
+        retract(model, q, shift, moved)
+        return inerter_force(model, k, i, moved, v, a, row)
+    for each in range(v.shape[0]):
+        shift[each] = v[each]
+    shift[d] = v[d] + size
+    return inerter_force(model, k, i, q, shift, a, row)
+
+
+@kernel
+def value_at(model, member_state, segment, t, q, v, j, workspace):
     """Value of response j at a state, in the modes that members are in; of member forces the largest.
 
     model: the compiled scene.
     member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
     segment: number of the stretch of time between two breakpoints.
     t: time (s).
-    state (2, n): coordinates and velocities (m, rad; m/s, rad/s).
+    q (n_q,), v (n,): coordinates and velocities.
     j: the response.
     workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = model.mass.shape[0]
-    q = state[0].copy()
-    v = state[1].copy()
+    q = q.copy()
+    v = v.copy()
     a = np.empty(n)
     lam = np.empty(model.size[0])
     bars = np.empty((3, n))
     row_bar = np.empty(model.size[0])
     solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
     who = -1
-    if model.response[j, 0] == MEMBER_FORCE:
-        who = largest_force(model, member_state, segment, t, model.response[j, 5], q, v, a)
+    if model.response[j, KIND] == MEMBER_FORCE:
+        who = largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a)
     return response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
 
 
 @kernel
-def rated(tag, model, member_state, history, k, c, j, who, rates, t, q, v, workspace, a, lam, bars, row_bar, near):
+def rated(
+    tag, model, member_state, history, k, c, j, who, rates, t, q, v, workspace, a, lam, bars, row_bar, near_q, near
+):
     """Value of response j and its rate in time at a state within a step.
 
     Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, the rate is
@@ -664,39 +684,37 @@ def rated(tag, model, member_state, history, k, c, j, who, rates, t, q, v, works
       rates: whether the rate is wanted; else it may be meaningless, and where g is one of positions or velocities alone
         there is no balance: a, lam and the workspace stay those of another state.
       t: time (s).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
     Out:
       a (n,), lam (n_row,): accelerations and multipliers of the state.
       workspace: workspace as the balance of the state leaves it.
       bars (3, n), row_bar (n_row,): slopes of the response by q, v, a and by lam.
-      near (4, n): scratch.
+      near_q (n_q,), near (3, n): scratch.
     """
-    n = q.shape[0]
-    segment = history.index[k, 2]
+    n = v.shape[0]
+    segment = history.index[k, SEGMENT]
     h = history.t[k + 1] - history.t[k]
     no = np.bool_(False)
     rate = 0.0
     if j < 0:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         return np.nan, np.nan
-    kind = model.response[j, 0]
-    if not rates and not needs_accelerations(kind) and model.response[j, 4] < 2:
+    kind = model.response[j, KIND]
+    if not rates and not needs_accelerations(kind) and model.response[j, ORDER] < 2:
         return response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar), rate
-    simple = not rates or (_is_by_state(kind) and model.response[j, 4] < derivatives(tag))
+    simple = not rates or (_is_by_state(kind) and model.response[j, ORDER] < derivatives(tag))
     if not simple:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         for d in range(n):
             near[0, d] = a[d]
-            near[1, d] = q[d]
-            near[2, d] = v[d]
         apart = APART * h
         sides = np.zeros(2)
         for side in range(2):
             e = apart if side == 1 else -apart
-            beside(tag, history, k, c, e, q, v, near[0], near[1], near[2])
-            solve_accelerations(model, member_state, segment, t + e, near[1], near[2], no, workspace, near[3], lam)
+            beside(tag, model, history, k, c, e, q, v, near[0], near_q, near[1])
+            solve_accelerations(model, member_state, segment, t + e, near_q, near[1], no, workspace, near[2], lam)
             sides[side] = response(
-                model, member_state, segment, j, who, t + e, near[1], near[2], near[3], lam, workspace, bars, row_bar
+                model, member_state, segment, j, who, t + e, near_q, near[1], near[2], lam, workspace, bars, row_bar
             )
         rate = (sides[1] - sides[0]) / (2.0 * apart)
     solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)

@@ -17,7 +17,7 @@ from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
 from mdstopo.general.permanent_sets import add_sets, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
-from mdstopo.general.step_history import carve_history, restore_modes
+from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, restore_modes
 
 
 @kernel
@@ -53,22 +53,30 @@ def step_of_rows(
     none = np.empty((0, 3, lam_q.shape[1]))
     no_rows = np.empty((0, model.size[0]))
     no_drops = np.empty(0)
-    o = history.index[w, 0]
-    stages = history.index[w + 1, 0] - o
-    segment = history.index[w, 2]
+    o = history.index[w, FIRST]
+    stages = history.index[w + 1, FIRST] - o
+    segment = history.index[w, SEGMENT]
     step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, none, no_rows, z, y, workspace, work)
-    restore_modes(history, history.index[w, 3], member_state)
+    restore_modes(history, history.index[w, EVENTS], member_state)
     if z.shape[0] == 1:
         add_designs(model, segment, history, o, member_state, z[0, :stages], out[0], work)
     else:
         add_designs_of_rows(model, segment, history, o, stages, member_state, z, out, work)
-    before = history.index[w, 1]
+    before = history.index[w, PARENT]
     for m in range(lam_q.shape[0]):
         if bar_set.shape[1] > 0:
-            restore_modes(history, history.index[w, 3], member_state)
+            restore_modes(history, history.index[w, EVENTS], member_state)
             for j in range(stages):
-                stage = history.stage[o + j]
-                add_sets(model, segment, member_state, stage[0], stage[1], z[m, j], 0.0, bar_set[m])
+                add_sets(
+                    model,
+                    segment,
+                    member_state,
+                    history.stage_q[o + j],
+                    history.stage_v[o + j],
+                    z[m, j],
+                    0.0,
+                    bar_set[m],
+                )
         if model.varied.shape[0] > 0:
             add_times(
                 model, history, member_state, count, before + 1, np.int64(-1), np.bool_(False), lam_v[m], 0.0, out[m]

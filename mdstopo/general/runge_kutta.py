@@ -12,7 +12,6 @@ from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
 from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
-from mdstopo.general.forces import drive_state, pose_acceleration
 from mdstopo.general.locate import (
     CUTS,
     TRIALS,
@@ -24,7 +23,7 @@ from mdstopo.general.locate import (
     note_trial,
     quintic_ends,
 )
-from mdstopo.general.members import meeting, scale_general, set_modes
+from mdstopo.general.members import MODE, SET, meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
 from mdstopo.general.projection import project
@@ -37,7 +36,23 @@ from mdstopo.general.singular_poses import (
     step_beside,
     way_to_pose,
 )
-from mdstopo.general.step_history import carve_history, copy_vector, has_factors, keep_stage, keep_state
+from mdstopo.general.step_history import (
+    EVENTS,
+    FIRST,
+    GRAZES,
+    MEMBER,
+    NEW,
+    OLD,
+    PARENT,
+    SEGMENT,
+    STATE,
+    carve_history,
+    copy_vector,
+    has_factors,
+    keep_stage,
+    keep_state,
+)
+from mdstopo.general.strides import energy_column
 from mdstopo.general.switches import APART, THOROUGH
 from mdstopo.integrators.runge_kutta import MOST, _error
 from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
@@ -55,8 +70,20 @@ from mdstopo.integrators.steps import (
     TANGENTS,
     TURN,
 )
-from mdstopo.mechanics.kinematics.planar_poses import POSE, copy_rows, relative_pose
-from mdstopo.mechanics.kinematics.planar_scales import deflection, largest_turn, motion_weights
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    deflection,
+    drive_state,
+    end_state,
+    freedoms,
+    home_extent,
+    largest_turn,
+    motion_weights,
+    pair_stiffness,
+    pose_acceleration,
+    pose_size,
+    relative_pose,
+    stage_state,
+)
 
 TAG = (0,)
 #: error of a step relative to the tolerance of the motion: errors of many steps add up, and projection adds its own.
@@ -92,7 +119,8 @@ def advance(
     v,
     a,
     history,
-    ends,
+    end_q,
+    end_v,
     push,
     size,
     work,
@@ -108,37 +136,25 @@ def advance(
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
       segment: number of the stretch of time between two breakpoints.
       t, h: time at the start, and length of the step (s).
-      q0, v0 (n,): coordinates and velocities at the start (m, rad; m/s, rad/s).
+      q0 (n_q,), v0 (n,): coordinates and velocities at the start.
       tangent: whether the tangents of the stages are wanted.
       o: number of the first stage as which they are kept in `history`; -1: they are not kept.
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
       lam (n_row,): multipliers of the joints at the last stage.
-      q, v, a (s or more, n): coordinates, velocities, accelerations of the stages.
+      q (s or more, n_q), v, a (s or more, n): coordinates, velocities, accelerations of the stages.
       history: the history of steps (`StepHistory`), where stages are kept.
-      ends (2, n): coordinates and velocities at the end.
+      end_q (n_q,), end_v (n,): coordinates and velocities at the end.
       push (2, n_row): the multipliers of the projection there.
       work (WORK,): counts of work, added to.
 
     Returns -1, or what `projection.project` returns of joints that are singular or do not fit.
     """
-    n = q0.shape[0]
     vectors = table[2]
     workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
     workspace.switches[APART] = 1 if has_factors(history) else 0
     for i in range(s):
-        for d in range(n):
-            q[i, d] = q0[d] + h * vectors[0, i] * v0[d]
-            v[i, d] = v0[d]
-        for j in range(i):
-            w = h * h * table[0, i, j]
-            u = h * table[1, i, j]
-            if w != 0.0:
-                for d in range(n):
-                    q[i, d] += w * a[j, d]
-            if u != 0.0:
-                for d in range(n):
-                    v[i, d] += u * a[j, d]
+        stage_state(model, table, h, i, q0, v0, q, v, a)
         time = t + h * vectors[0, i]
         singular = solve_accelerations(model, member_state, segment, time, q[i], v[i], tangent, workspace, a[i], lam)
         work[FORCES] += 1
@@ -152,16 +168,9 @@ def advance(
     workspace.switches[APART] = 0
     if tangent:
         work[TANGENTS] += s
-    for d in range(n):
-        position = q0[d] + h * v0[d]
-        speed = v0[d]
-        for j in range(s):
-            position += h * h * vectors[1, j] * a[j, d]
-            speed += h * vectors[2, j] * a[j, d]
-        ends[0, d] = position
-        ends[1, d] = speed
-    drive_state(model, segment, t + h, ends[0], ends[1])
-    return project(model, size, ends[0], ends[1], workspace, push[0], push[1])
+    end_state(model, table, s, h, q0, v0, q, v, a, end_q, end_v)
+    drive_state(model, segment, t + h, end_q, end_v)
+    return project(model, size, end_q, end_v, workspace, push[0], push[1])
 
 
 @kernel
@@ -170,8 +179,7 @@ def scene_size(model):
     size = 0.0
     for p in range(model.reach.shape[0]):
         size = max(size, model.reach[p])
-    for b in range(model.home.shape[0]):
-        size = max(size, abs(model.home[b, 0]), abs(model.home[b, 1]))
+    size = max(size, home_extent(model))
     return size if size > 0.0 else 1.0
 
 
@@ -186,7 +194,7 @@ def start_modes(model, member_state, workspace, q, v, a, lam, knots):
       knots: whether each piece of a curve is a mode (`members.set_modes`).
     In place:
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      q, v (n,): the start (m, rad; m/s, rad/s); driven parts are put in place.
+      q (n_q,), v (n,): the start; driven parts are put in place.
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
       a (n,), lam (n_row,): accelerations and multipliers of that balance.
@@ -194,9 +202,9 @@ def start_modes(model, member_state, workspace, q, v, a, lam, knots):
     Returns the place of an unknown at which the joints are singular, or -1.
     """
     n_pair = model.pair.shape[0]
-    rel = np.empty((n_pair, POSE))
-    second = np.zeros((n_pair, 3))
-    relative_pose(model.pair, model.home, q, v, rel)
+    rel = np.empty((n_pair, pose_size(model)))
+    second = np.zeros((n_pair, freedoms(model)))
+    relative_pose(model, q, v, rel)
     for attempt in range(2):
         set_modes(model, member_state, rel, second, knots)
         if attempt == 0:
@@ -206,7 +214,7 @@ def start_modes(model, member_state, workspace, q, v, a, lam, knots):
             if singular >= 0:
                 return singular
             for p in range(n_pair):
-                pose_acceleration(model.pair, rel, p, a, second[p])
+                pose_acceleration(model, rel, p, a, second[p])
     return -1
 
 
@@ -223,7 +231,7 @@ def log_switches(
     In:
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
       state: number of the state at which this happens.
       events: how many events there have been.
       graze: a member whose margin would fall below zero by less than this only grazes (m).
@@ -240,10 +248,10 @@ def log_switches(
 
     Returns how many events there are now; -1: there is no room for them.
     """
-    n = q.shape[0]
+    n = v.shape[0]
     n_pair = model.pair.shape[0]
-    rel = np.empty((n_pair, POSE))
-    relative_pose(model.pair, model.home, q, v, rel)
+    rel = np.empty((n_pair, pose_size(model)))
+    relative_pose(model, q, v, rel)
     done = 0
     while True:
         margin, who = smallest_margin(model, segment, member_state, rel)
@@ -253,21 +261,21 @@ def log_switches(
             return -1
         saltation = history.saltation[events]
         new, beyond, kind, by_set, grown = switch_any(model, segment, member_state, rel, q, v, a, who, saltation)
-        old = int(member_state[1, who])
+        old = int(member_state[MODE, who])
         if beyond < graze and kind == 2:
             where[2] = who
-        history.event[events, 0] = state
-        history.event[events, 1] = who
-        history.event[events, 2] = old
-        history.event[events, 3] = new
-        history.event[events, 4] = 1 if beyond < graze and kind > 0 else 0
-        history.kept[events, 0] = member_state[2, who]
-        member_state[2, who] += grown
-        history.kept[events, 1] = member_state[2, who]
+        history.event[events, STATE] = state
+        history.event[events, MEMBER] = who
+        history.event[events, OLD] = old
+        history.event[events, NEW] = new
+        history.event[events, GRAZES] = 1 if beyond < graze and kind > 0 else 0
+        history.kept[events, 0] = member_state[SET, who]
+        member_state[SET, who] += grown
+        history.kept[events, 1] = member_state[SET, who]
         history.kept[events, 2] = by_set
-        member_state[1, who] = new
+        member_state[MODE, who] = new
         events += 1
-        member_state[1, member_state.shape[1] - 1] = events
+        member_state[MODE, member_state.shape[1] - 1] = events
         done += 1
         for d in range(n):
             saltation[2, d] = a[d]
@@ -304,49 +312,50 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     model = unpack_general(ints, floats)
     tolerance = MARGIN * settings[0] * max(settings[0] / LOOSE, 1.0) ** SLACK
     fixed_step = settings[2]
-    n = model.q0.shape[0]
+    n_q = model.q0.shape[0]
+    n = model.v0.shape[0]
     n_pair = model.pair.shape[0]
     n_row = model.size[0]
     history = carve_history(model, limits, room, room_ints)
     history.mass[0] = 0.0
     scale_general(model.block, model.power, alpha, member_state)
-    member_state[1] = 0.0
-    member_state[2] = 0.0
+    member_state[MODE] = 0.0
+    member_state[SET] = 0.0
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     order = ORDERS[method]
     table = tables[method]
-    pair = model.pair
     times = model.times
-    reach = model.reach
     workspace = make_workspace(model)
     no = np.bool_(False)
     nowhere = np.int64(-1)
     keep = np.bool_(tangent)
     size = scene_size(model)
     rounding = ROUNDING * size  # margins below this count as zero: a member that has just switched has such a one
-    rel = np.empty((n_pair, POSE))
-    rel0 = np.empty((n_pair, POSE))
-    before = np.empty((n_pair, POSE))
-    q = np.empty((MOST, n))
+    rel = np.empty((n_pair, pose_size(model)))
+    rel0 = np.empty((n_pair, pose_size(model)))
+    before = np.empty((n_pair, pose_size(model)))
+    q = np.empty((MOST, n_q))
     v = np.empty((MOST, n))
     a = np.empty((MOST, n))
     lam = np.zeros(n_row)
     push = np.zeros((2, n_row))
-    ends = np.empty((2, n))
-    trial = np.empty((2, n))
+    end_q = np.empty(n_q)
+    end_v = np.empty(n)
+    trial_q = np.empty(n_q)
+    trial_v = np.empty(n)
     trials = np.zeros((2, 2))
-    curve = np.empty((6, n))
+    curve_q = np.empty((2, n_q))
+    curve = np.empty((2, 2, n))
     cut = np.empty(CUTS + 1)
-    beyond = np.empty((CUTS + 1, 2, n))
-    left = np.empty((2, n))
+    beyond_q = np.empty((CUTS + 1, n_q))
+    beyond_v = np.empty((CUTS + 1, n))
+    left_q = np.empty(n_q)
+    left_v = np.empty(n)
     weight = np.empty(n)
     a0 = np.zeros(n)
-    q0 = np.empty(n)
-    v0 = np.empty(n)
-    for d in range(n):
-        q0[d] = model.q0[d]
-        v0[d] = model.v0[d]
+    q0 = model.q0.copy()
+    v0 = model.v0.copy()
     for i in range(where.shape[0]):
         where[i] = -1
     graze = settings[0] * size
@@ -373,15 +382,16 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     largest = sigma
     way = np.inf  # time until the next pose at which joints repeat each other
     must = True
-    relative_pose(pair, model.home, q0, v0, rel0)
+    relative_pose(model, q0, v0, rel0)
     motion = np.zeros(n_pair)
     noise = np.empty(n_pair)
     scale = np.empty(n_pair)
     shaken = 0.0
     for p in range(n_pair):
-        scale[p] = workspace.sums[p, 7] + workspace.sums[p, 11]
-        if workspace.sums[p, 3] > 0.0 and scale[p] > 0.0:
-            motion[p] = np.sqrt(2.0 * workspace.sums[p, 3] / scale[p])  # members of the pair store energy at the start
+        scale[p] = pair_stiffness(model, workspace.sums, p)
+        energy = workspace.sums[p, energy_column(model)]
+        if energy > 0.0 and scale[p] > 0.0:
+            motion[p] = np.sqrt(2.0 * energy / scale[p])  # members of the pair store energy at the start
     rounding_at_start(model, member_state, rel0, v0, scale, motion, noise)
     for p in range(n_pair):
         shaken += abs(scale[p]) * noise[p]
@@ -389,20 +399,20 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     events = np.int64(0)
     if switching:
         for i in range(member_state.shape[1] - 1):
-            if member_state[1, i] != 0.0:
+            if member_state[MODE, i] != 0.0:
                 if events >= history.event.shape[0]:
                     return NEEDS_ROOM, 0, 0, t
-                history.event[events, 0] = 0
-                history.event[events, 1] = i
-                history.event[events, 2] = 0
-                history.event[events, 3] = int(member_state[1, i])
-                history.event[events, 4] = 0
+                history.event[events, STATE] = 0
+                history.event[events, MEMBER] = i
+                history.event[events, OLD] = 0
+                history.event[events, NEW] = int(member_state[MODE, i])
+                history.event[events, GRAZES] = 0
                 history.kept[events, 0] = 0.0
-                history.kept[events, 1] = member_state[2, i]
+                history.kept[events, 1] = member_state[SET, i]
                 history.kept[events, 2] = 0.0
                 history.saltation[events] = 0.0
                 events += 1
-        member_state[1, member_state.shape[1] - 1] = events
+        member_state[MODE, member_state.shape[1] - 1] = events
     last_time = times[times.shape[0] - 1]
     span = last_time - t
     wanted = fixed_step
@@ -414,7 +424,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     if rubbing and not fixed_step > 0.0:
         brake, braking = brake_rate(model, member_state, q0, v0, BRAKED / wanted, workspace)
     keep_state(history, 0, t, q0, v0, push[0], push[1])
-    history.index[0, 0] = 0
+    history.index[0, FIRST] = 0
     count = np.int64(0)
     stages = np.int64(0)
     longest = 0.0
@@ -462,7 +472,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 return NEEDS_ROOM, count, events, t
             singular = advance(
                 model, table, s, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q, v, a, history,
-                ends, push, size, work,
+                end_q, end_v, push, size, work,
             )  # fmt: skip
             if singular >= 0:
                 # a long step may have gone beyond a singular pose, a shorter one need not; a very short one is at it
@@ -474,9 +484,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 work[REJECTED] += 1
                 continue
             sigma_end = least_singular_value(model, workspace)
-            relative_pose(pair, model.home, ends[0], ends[1], rel)
-            motion_scale(pair, ends[0], rel, rel0, reach, motion, noise, tolerance, scale)
-            motion_weights(pair, rel, reach, scale, weight)
+            relative_pose(model, end_q, end_v, rel)
+            motion_scale(model, end_q, rel, rel0, motion, noise, tolerance, scale)
+            motion_weights(model, rel, scale, weight)
             # near a singular pose errors of velocities do not count as if they lasted: joints determine velocities
             # there, and the step has to reach across the pose
             lasting = longest if sigma >= CLOSE * largest else 0.0
@@ -484,14 +494,16 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if crosses(h, way):
                 error = error_along(model, workspace, table[2], s, h, a, weight, error, sigma_end)
             if rubbing:
-                copy_vector(q0, left[0])
-                copy_vector(v0, left[1])
-                grip = friction_error(model, member_state, table[2], s, h, left, ends, a, noise, shaken, tolerance)
+                grip = friction_error(
+                    model, member_state, table[2], s, h, q0, v0, end_q, end_v, a, noise, shaken, tolerance
+                )
                 if grip > error or not np.isfinite(grip):
                     error = grip
             finite = True
+            for d in range(n_q):
+                finite = finite and np.isfinite(end_q[d])
             for d in range(n):
-                finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
+                finite = finite and np.isfinite(end_v[d])
             if fixed_step > 0.0:
                 if not finite:
                     return NON_FINITE, count, events, t
@@ -504,7 +516,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
                 if change > 1.0:
                     change **= GROWTH
-                turned = largest_turn(pair, q0, ends[0])
+                turned = largest_turn(model, q0, end_q)
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
                 if error > tolerance or turned > 1.1 * TURN:
                     must = False
@@ -523,14 +535,15 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 top = 0
                 cuts = 0
                 cut[0] = h
-                copy_rows(ends, beyond[0])
-                copy_vector(q0, left[0])
-                copy_vector(v0, left[1])
+                copy_vector(end_q, beyond_q[0])
+                copy_vector(end_v, beyond_v[0])
+                copy_vector(q0, left_q)
+                copy_vector(v0, left_v)
                 while top >= 0:
-                    relative_pose(pair, model.home, left[0], left[1], before)
-                    relative_pose(pair, model.home, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model, left_q, left_v, before)
+                    relative_pose(model, beyond_q[top], beyond_v[top], rel)
                     dip, near = first_sign(
-                        model, segment, member_state, left[0], left[1], beyond[top, 0], beyond[top, 1], before, rel,
+                        model, segment, member_state, left_q, left_v, beyond_q[top], beyond_v[top], before, rel,
                         cut[top] - low, rounding,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
@@ -538,7 +551,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         if top == 0 and margin < -rounding:
                             break
                         low = cut[top]
-                        copy_rows(beyond[top], left)
+                        copy_vector(beyond_q[top], left_q)
+                        copy_vector(beyond_v[top], left_v)
                         top -= 1
                         continue
                     cuts += 1
@@ -546,9 +560,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     cut[top] = middle
                     advance(
                         model, table, s, member_state, segment, t, middle, q0, v0, no, nowhere, workspace, lam, q, v, a,
-                        history, beyond[top], push, size, work,
+                        history, beyond_q[top], beyond_v[top], push, size, work,
                     )  # fmt: skip
-                    relative_pose(pair, model.home, beyond[top, 0], beyond[top, 1], rel)
+                    relative_pose(model, beyond_q[top], beyond_v[top], rel)
                     value, near_who = smallest_margin(model, segment, member_state, rel)
                     if value < -rounding:
                         high = middle
@@ -557,7 +571,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         break
                     if value < graze and matters(model, member_state, rel, near_who):
                         where[2] = near_who
-                relative_pose(pair, model.home, left[0], left[1], before)
+                relative_pose(model, left_q, left_v, before)
                 happens = margin < -rounding
                 if happens:
                     at_low, _ = smallest_margin(model, segment, member_state, before)
@@ -566,20 +580,24 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     side = 0
                     begin = low
                     stop = high
-                    quintic_ends(model, member_state, segment, t, begin, stop, left, beyond[top], workspace, lam, curve)
+                    quintic_ends(
+                        model, member_state, segment, t, begin, stop, left_q, left_v, beyond_q[top], beyond_v[top],
+                        workspace, lam, curve_q, curve,
+                    )  # fmt: skip
                     work[FORCES] += 2
                     for tries in range(TRIALS):
                         foreseen = foreseen_trial(
-                            model, member_state, segment, t, begin, stop, curve, trials, tries, rounding, trial, rel
-                        )
+                            model, member_state, segment, t, begin, stop, curve_q, curve, trials, tries, rounding,
+                            trial_q, trial_v, rel,
+                        )  # fmt: skip
                         middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
                         if middle < 0.0:
                             break
                         advance(
                             model, table, s, member_state, segment, t, middle, q0, v0, no, nowhere, workspace, lam, q,
-                            v, a, history, trial, push, size, work,
+                            v, a, history, trial_q, trial_v, push, size, work,
                         )  # fmt: skip
-                        relative_pose(pair, model.home, trial[0], trial[1], rel)
+                        relative_pose(model, trial_q, trial_v, rel)
                         value, who = smallest_margin(model, segment, member_state, rel)
                         note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
@@ -589,31 +607,30 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     lands = lands and h >= end - t
                     singular = advance(
                         model, table, s, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q, v, a,
-                        history, ends, push, size, work,
+                        history, end_q, end_v, push, size, work,
                     )  # fmt: skip
                     sigma_end = least_singular_value(model, workspace)
-                relative_pose(pair, model.home, ends[0], ends[1], rel)
+                relative_pose(model, end_q, end_v, rel)
             largest = max(largest, sigma_end)
             way = way_to_pose(h, sigma, sigma_end, largest)
             sigma = sigma_end
             must = True
             for p in range(n_pair):
-                motion[p] = max(motion[p], deflection(rel, rel0, reach, p))
+                motion[p] = max(motion[p], deflection(model, rel, rel0, p))
             if where[1] < 0:
-                relative_pose(pair, model.home, q0, v0, before)
+                relative_pose(model, q0, v0, before)
                 where[1] = meeting(model, segment, t, member_state, before, rel)
             happened = events
             t = end if lands else t + h
             longest = max(longest, h)
-            for d in range(n):
-                q0[d] = ends[0, d]
-                v0[d] = ends[1, d]
-            history.index[count, 1] = count - 1
-            history.index[count, 2] = segment
-            history.index[count, 3] = happened
+            copy_vector(end_q, q0)
+            copy_vector(end_v, v0)
+            history.index[count, PARENT] = count - 1
+            history.index[count, SEGMENT] = segment
+            history.index[count, EVENTS] = happened
             stages += s
             count += 1
-            history.index[count, 0] = stages
+            history.index[count, FIRST] = stages
             keep_state(history, count, t, q0, v0, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
@@ -632,5 +649,5 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     return CHATTERING, count, events, t
             if rubbing and not fixed_step > 0.0:
                 brake, braking = brake_rate(model, member_state, q0, v0, BRAKED / wanted, workspace)
-            history.index[count, 3] = events
+            history.index[count, EVENTS] = events
     return OK, count, events, t

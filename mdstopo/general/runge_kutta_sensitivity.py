@@ -5,10 +5,11 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.method_interface import implement
 from mdstopo.general.runge_kutta import TAG, advance, scene_size
-from mdstopo.general.step_history import keep_state, restore_modes
+from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
 from mdstopo.general.step_linear import explicit_back, explicit_forward
 from mdstopo.integrators.runge_kutta import MOST
 from mdstopo.integrators.runge_kutta_tables import STAGES
+from mdstopo.mechanics.kinematics.kinematics_interface import advance_coordinates
 
 
 @kernel
@@ -29,37 +30,34 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
       history: the history of steps (`StepHistory`).
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
-      q, v (n,): the state (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): the state.
       work (WORK,): counts of work, added to.
 
     Returns the number of the step that ends there: count + 1 where it is kept; else k.
     """
-    n = q.shape[0]
+    n = v.shape[0]
+    n_q = q.shape[0]
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     h = c * (history.t[k + 1] - history.t[k])
-    o = history.index[count, 0]
-    ends = np.empty((2, n))
+    o = history.index[count, FIRST]
     push = np.empty((2, model.size[0]))
-    restore_modes(history, history.index[k, 3], member_state)
+    restore_modes(history, history.index[k, EVENTS], member_state)
     advance(
-        model, tables[method], s, member_state, history.index[k, 2], history.t[k], h, history.state[k, 0],
-        history.state[k, 1], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]), np.empty((MOST, n)),
-        np.empty((MOST, n)), np.empty((MOST, n)), history, ends, push, scene_size(model), work,
+        model, tables[method], s, member_state, history.index[k, SEGMENT], history.t[k], h, history.q[k],
+        history.v[k], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]), np.empty((MOST, n_q)),
+        np.empty((MOST, n)), np.empty((MOST, n)), history, q, v, push, scene_size(model), work,
     )  # fmt: skip
-    for d in range(n):
-        q[d] = ends[0, d]
-        v[d] = ends[1, d]
     if not keep:
         return k
     w = count + 1
     history.t[w] = history.t[k]
-    history.index[w, 0] = o
-    history.index[w, 1] = k - 1
-    history.index[w, 2] = history.index[k, 2]
-    history.index[w, 3] = history.index[k, 3]
+    history.index[w, FIRST] = o
+    history.index[w, PARENT] = k - 1
+    history.index[w, SEGMENT] = history.index[k, SEGMENT]
+    history.index[w, EVENTS] = history.index[k, EVENTS]
     keep_state(history, w + 1, history.t[k] + h, q, v, push[0], push[1])
-    history.index[w + 1, 0] = o + s
+    history.index[w + 1, FIRST] = o + s
     return w
 
 
@@ -114,16 +112,17 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
 
 
 @kernel
-def beside(tag, history, k, c, e, q, v, a, q_out, v_out):
+def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
     """The motion a little later, on a parabola: it has the accelerations of its balance everywhere.
 
+    model: the compiled scene.
     tag, history, k, c: method, history, step and fraction; not used.
     e: how much later (s); below 0: earlier.
-    q, v, a (n,): the motion here (m, rad; m/s, rad/s; m/s^2, rad/s^2).
-    q_out, v_out (n,): coordinates and velocities there.
+    q (n_q,), v, a (n,): the motion here.
+    q_out (n_q,), v_out (n,): coordinates and velocities there.
     """
-    for d in range(q.shape[0]):
-        q_out[d] = q[d] + e * (v[d] + 0.5 * e * a[d])
+    advance_coordinates(model, q, v, a, e, q_out)
+    for d in range(v.shape[0]):
         v_out[d] = v[d] + e * a[d]
 
 

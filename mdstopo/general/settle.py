@@ -42,7 +42,7 @@ FREE = 1e-9
 class Settled:
     """An equilibrium.
 
-    q (n,): what the bodies have moved since home.
+    q (n_q,): what the bodies have moved since home.
     inverse (n, n): dq = inverse dF. moved: how far the centre of a body has gone at most, m, and whose it is;
     turned: the same of angles, rad.
     """
@@ -62,10 +62,11 @@ class Settled:
 
 
 def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: float) -> Settled | str:
-    """The equilibrium of alpha (N,) from q0 (n,), with the laws as the driver has packed them; or why there is none.
+    """The equilibrium of alpha (N,) from q0 (n_q,), with the laws as the driver has packed them; or why there is none.
 
     size: of the scene, m.
     """
+    bodies = driver.scene.kinematics
     scene = _AtRest(driver, alpha, size)
     q = scene.land(q0.copy())
     rate, left = scene.rate(), scene.left()
@@ -82,8 +83,9 @@ def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: flo
             pace *= GROWTH
         elif off > ahead:
             pace *= 0.5
-        if scene.lost(q - q0):
-            return _nowhere(driver, q - q0, scene.arms)
+        gone = bodies.difference(q, q0)
+        if scene.lost(gone):
+            return _nowhere(driver, gone, scene.arms)
         if share * far <= NEAR * size and pace * scene.rate() > 1.0:
             break
     far = np.inf
@@ -93,29 +95,29 @@ def settle(driver: "GeneralDriver", alpha: FloatArray, q0: FloatArray, size: flo
         before, far = far, scene.extent(step)
         if not far < 1e-3 * size:
             break
-        q = q + step
+        q = bodies.retract(q, step)
         scene.at(q)
         if far <= ARRIVED * size or far >= 0.5 * before:
             break
     inverse = scene.inverse()
     if not far <= 1e-9 * size or scene.pushed():
-        return _nowhere(driver, q - q0, scene.arms)
+        return _nowhere(driver, bodies.difference(q, q0), scene.arms)
     turning = scene.turns_freely()
     if turning >= 0:
         return f"body {driver.scene.bodies[turning]} is free to turn, so that its equilibrium is not determined"
-    shift = np.abs(q - q0).reshape(-1, 3)
-    distance = np.hypot(shift[:, 0], shift[:, 1])
+    shift, turn = bodies.shifts_and_turns(bodies.difference(q, q0))
+    distance, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
     names = driver.scene.bodies
-    far_body, turned_body = int(distance.argmax()), int(shift[:, 2].argmax())
+    far_body, turned_body = int(distance.argmax()), int(angle.argmax())
     return Settled(
-        q, inverse, float(distance[far_body]), names[far_body], float(shift[turned_body, 2]), names[turned_body]
+        q, inverse, float(distance[far_body]), names[far_body], float(angle[turned_body]), names[turned_body]
     )
 
 
 def _stepped(
     scene: "_AtRest", q: FloatArray, step: FloatArray, ahead: float, foreseen: float
 ) -> tuple[FloatArray, FloatArray, float, float]:
-    """Go along a step (n,) from q (n,), as far as the force along it does not point back: ahead at its start.
+    """Go along a step (n,) from q (n_q,), as far as the force along it does not point back: ahead at its start.
 
     Returns where it ends, what is left of the force there, the share of the step taken, and by how much the force along
     it at the end of all of it differs from what was foreseen.
@@ -124,7 +126,7 @@ def _stepped(
     low, high, share, off = 0.0, 1.0, 1.0, 0.0
     forward, backward = ahead, 0.0
     for look in range(TRIALS):
-        there = scene.land(q + share * step)
+        there = scene.land(scene.bodies.retract(q, share * step))
         left = scene.left()
         along = float(own @ left)
         if look == 0:
@@ -142,7 +144,8 @@ def _stepped(
 
 def _nowhere(driver: "GeneralDriver", shift: FloatArray, arms: FloatArray) -> str:
     """Why there is no equilibrium: the body that has moved most by a shift (n,), with angles times arms (n,)."""
-    body = driver.scene.bodies[int(np.abs(shift * arms).reshape(-1, 3).max(axis=1).argmax())]
+    far = np.abs(shift * arms).reshape(-1, driver.scene.kinematics.freedoms).max(axis=1)
+    body = driver.scene.bodies[int(far.argmax())]
     return f"body {body} finds no static equilibrium near its stated place"
 
 
@@ -154,14 +157,16 @@ class _AtRest:
         n, n_row = len(model.mass), int(model.size[0])
         self._driver, self._alpha, self._size = driver, alpha, size
         self.free = np.flatnonzero(model.free)
-        self.arms = np.tile([1.0, 1.0, size], n // 3)
+        self.bodies = driver.scene.kinematics
+        self.arms = np.ones(n)
+        self.bodies.shifts_and_turns(self.arms)[1][:] = size
         self._root = np.sqrt(model.mass[self.free])
         self._lam = np.zeros(n_row)
         self.force, self._dense = np.zeros(n), np.zeros((n, n))
         self._rows, self._phi = np.zeros((n_row, n)), np.zeros(n_row)
 
     def at(self, q: FloatArray) -> None:
-        """Look at q (n,), whose driven part is put in place."""
+        """Look at q (n_q,), whose driven part is put in place."""
         from mdstopo.general.settle_entry import statics
 
         d = self._driver
@@ -178,12 +183,12 @@ class _AtRest:
         return float(np.linalg.norm(self.stiffness, 2)) if len(self.free) else 0.0
 
     def land(self, q: FloatArray) -> FloatArray:
-        """Look at the nearest place on the joints to q (n,), which is returned."""
+        """Look at the nearest place on the joints to q (n_q,), which is returned."""
         self.at(q)
         for _ in range(3):
             if np.abs(self._phi).max(initial=0.0) <= ARRIVED * self._size:
                 break
-            q = q + self.onto()
+            q = self.bodies.retract(q, self.onto())
             self.at(q)
         return q
 
@@ -238,10 +243,11 @@ class _AtRest:
     def turns_freely(self) -> int:
         """A body that turns in a direction that nothing holds, or -1."""
         modes = np.abs(self._null() / self._root[:, None]) * self.arms[self.free][:, None]
-        angle = self.free % 3 == 2
+        each = self.bodies.freedoms
+        angle = self.free % each >= each - self.bodies.rotations
         if not modes.size or modes[angle].max(initial=0.0) <= 1e-6 * modes.max():
             return -1
-        return int(self.free[angle][int(modes[angle].max(axis=1).argmax())]) // 3
+        return int(self.free[angle][int(modes[angle].max(axis=1).argmax())]) // each
 
     def extent(self, step: FloatArray) -> float:
         """How far a step (n,) goes: the largest shift of a centre, or angle times the scene's size, m."""
@@ -249,8 +255,8 @@ class _AtRest:
 
     def lost(self, shift: FloatArray) -> bool:
         """Whether a shift (n,) from the stated place is too large for an equilibrium near it."""
-        far = np.abs(shift).reshape(-1, 3).max(axis=0, initial=0.0)
-        return bool(max(far[0], far[1]) > SIZES * self._size or far[2] > TURN)
+        far, turned = (np.abs(part).max(initial=0.0) for part in self.bodies.shifts_and_turns(shift))
+        return bool(far > SIZES * self._size or turned > TURN)
 
     def _basis(self) -> FloatArray:
         """Directions that the joints allow (columns), of length 1 by mass."""

@@ -5,11 +5,19 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import joint_slopes, joint_state, make_workspace
 from mdstopo.general.direct import own_force
-from mdstopo.general.forces import drive_state, general_forces
-from mdstopo.general.members import scale_general, set_modes
-from mdstopo.general.model import INERTER, unpack_general
+from mdstopo.general.forces import general_forces
+from mdstopo.general.members import SCALE, scale_general, set_modes
+from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START, unpack_general
 from mdstopo.general.parameters import parameter_slopes
-from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
+from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    drive_state,
+    freedoms,
+    most_rows,
+    pose_size,
+    relative_pose,
+    rotations,
+)
 from mdstopo.mechanics.laws.table import FREE_LENGTH
 
 
@@ -20,9 +28,9 @@ def rest(model, alpha, member_state, q, v):
     drive_state(model, np.int64(0), model.times[0], q, v)
     v[:] = 0.0
     n_pair = model.pair.shape[0]
-    rel = np.empty((n_pair, POSE))
-    relative_pose(model.pair, model.home, q, v, rel)
-    set_modes(model, member_state, rel, np.zeros((n_pair, 3)), np.bool_(True))
+    rel = np.empty((n_pair, pose_size(model)))
+    relative_pose(model, q, v, rel)
+    set_modes(model, member_state, rel, np.zeros((n_pair, freedoms(model))), np.bool_(True))
 
 
 @entry
@@ -56,20 +64,21 @@ def statics(ints, floats, alpha, member_state, q, lam, force, stiffness, rows, p
         for c in range(n):
             stiffness[d, c] = 0.0
     for d in range(n):
-        stiffness[d, d - d % 3 + 2] -= workspace.turn[d]
+        for r in range(rotations(model)):
+            stiffness[d, place_of_turn(model, d, r)] -= workspace.turn[d, r]
     for p in range(model.pair.shape[0]):
-        for i in range(6):
-            for j in range(6):
-                row = 3 * model.pair[p, i // 3] + i % 3
-                stiffness[row, 3 * model.pair[p, j // 3] + j % 3] += workspace.k[p, i, j]
+        for i in range(pair_freedoms(model)):
+            for j in range(pair_freedoms(model)):
+                row = place_in_pair(model, p, i)
+                stiffness[row, place_in_pair(model, p, j)] += workspace.k[p, i, j]
     rows[:] = 0.0
     for j in range(model.joint.shape[0]):
-        for r in range(3):
+        for r in range(most_rows(model)):
             own = model.row[j, r]
             if own >= 0:
                 phi[own] = workspace.phi[j, r]
-                for i in range(6):
-                    rows[own, 3 * model.joint[j, 1 + i // 3] + i % 3] += workspace.jac[j, r, i]
+                for i in range(pair_freedoms(model)):
+                    rows[own, place_in_joint(model, j, i)] += workspace.jac[j, r, i]
 
 
 @entry
@@ -88,20 +97,20 @@ def unit_forces(ints, floats, alpha, member_state, q, out):
     model = unpack_general(ints, floats)
     n = model.mass.shape[0]
     v = np.zeros(n)
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     rest(model, alpha, member_state, q, v)
     for i in range(out.shape[0]):
         for d in range(n):
             out[i, d] = 0.0
     for k in range(model.block.shape[0]):
-        if model.block[k, 4] < 0 or model.active[0, k] == 0 or model.block[k, 3] == INERTER:
+        if model.block[k, DESIGN] < 0 or model.active[0, k] == 0 or model.block[k, CODE] == INERTER:
             continue
-        p = model.block[k, 0]
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+        p = model.block[k, PAIR]
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
             f = own_force(model, k, i, np.int64(0), model.times[0], member_state, q, v, v, row, row_rate)
-            for r in range(6):
-                out[i, 3 * model.pair[p, r // 3] + r % 3] -= f * row[r]
+            for r in range(pair_freedoms(model)):
+                out[i, place_in_pair(model, p, r)] -= f * row[r]
 
 
 @entry
@@ -123,18 +132,18 @@ def value_forces(ints, floats, alpha, member_state, q, out):
     n = model.mass.shape[0]
     start = np.int64(0)
     v = np.zeros(n)
-    row = np.empty(6)
-    row_rate = np.empty(6)
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
     rest(model, alpha, member_state, q, v)
     out[:] = 0.0
     for e in range(model.varied.shape[0]):
         k = model.varied[e, 0]
         place = model.varied[e, 1]
-        if place > FREE_LENGTH or model.active[0, k] == 0 or model.block[k, 3] == INERTER:
+        if place > FREE_LENGTH or model.active[0, k] == 0 or model.block[k, CODE] == INERTER:
             continue
-        p = model.block[k, 0]
-        for i in range(model.block[k, 1], model.block[k, 1] + model.block[k, 5]):
+        p = model.block[k, PAIR]
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
             slope, _ = parameter_slopes(model, k, i, place, start, model.times[0], member_state, q, v, v, row, row_rate)
-            slope *= member_state[0, i]
-            for r in range(6):
-                out[model.varied[e, 2], 3 * model.pair[p, r // 3] + r % 3] -= slope * row[r]
+            slope *= member_state[SCALE, i]
+            for r in range(pair_freedoms(model)):
+                out[model.varied[e, 2], place_in_pair(model, p, r)] -= slope * row[r]

@@ -19,6 +19,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.model import COUNT, DESIGN, START
 from mdstopo.mechanics.joints.table import describe
+from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
@@ -33,9 +34,8 @@ class SettledStart:
     """The start of one driver at rest; `settled` is that of the last design."""
 
     def __init__(self, driver: "GeneralDriver") -> None:
-        n = len(driver.scene.model.mass)
         self._driver = driver
-        self._stated: FloatArray = driver.floats[n : 2 * n].copy()
+        self._stated: FloatArray = driver.packed_start()[0]
         self._design: bytes | None = None
         self.settled: Settled | None = None
         self.message = ""
@@ -87,7 +87,7 @@ class SettledStart:
         """(M_padded, n): what each design member's alpha^mu adds to the forces at rest."""
         from mdstopo.general.settle_entry import unit_forces
 
-        out = np.zeros((self._driver.scene.model.member.shape[1], len(self._stated)))
+        out = np.zeros((self._driver.scene.model.member.shape[1], len(self._driver.scene.model.mass)))
         ints, floats, alpha, member_state, q = self._at_rest()
         unit_forces(ints, floats, alpha, member_state, q, out)
         return out
@@ -96,7 +96,7 @@ class SettledStart:
         """(P, n): what each value of a law's variable adds to the forces at rest."""
         from mdstopo.general.settle_entry import value_forces
 
-        out = np.zeros((len(self._driver.values), len(self._stated)))
+        out = np.zeros((len(self._driver.values), len(self._driver.scene.model.mass)))
         ints, floats, alpha, member_state, q = self._at_rest()
         value_forces(ints, floats, alpha, member_state, q, out)
         return out
@@ -117,10 +117,9 @@ class SettledStart:
         elif len(scene.model.joint):
             from mdstopo.general.start_entry import assemble
 
-            n, count = len(self._stated), len(scene.model.joint)
-            rates = np.zeros((count, 3))
-            q, v = driver.floats[n : 2 * n].copy(), driver.floats[2 * n : 3 * n].copy()
-            assemble(driver.ints, driver.floats, q, v, False, np.zeros((count, 3)), rates)
+            phi, rates = np.zeros((2, *scene.model.row.shape))
+            q, v = driver.packed_start()
+            assemble(driver.ints, driver.floats, q, v, False, phi, rates)
             torn = np.abs(rates).max(axis=1)
             span = scene.load_case.end - scene.load_case.start
             if torn.max() > FITS * max(speed_of(case, v), size_of(case) / span):
@@ -148,5 +147,5 @@ def size_of(case: Case) -> float:
 
 def speed_of(case: Case, v: FloatArray) -> float:
     """The largest speed of a body's centre or of a point a scene's size away from it, m/s."""
-    bodies = v.reshape(-1, 3)
+    bodies = v.reshape(-1, PLANAR.freedoms)
     return float((np.hypot(bodies[:, 0], bodies[:, 1]) + size_of(case) * np.abs(bodies[:, 2])).max())

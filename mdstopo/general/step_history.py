@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from mdstopo.compiler.fields import Field, Fields, views_of
 from mdstopo.compiler.jit import kernel
+from mdstopo.general.members import MODE, SET
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import DAMPED
@@ -20,6 +21,12 @@ STATE, MEMBER, OLD, NEW, GRAZES = range(5)
 #: what the lengths of arrays are, in terms of what `carve_history` is given
 SIZES = {
     "n": "model.mass.shape[0]",
+    "n_q": "model.q0.shape[0]",
+    "n_body": "model.home.shape[0]",
+    "both": "2 * (n // n_body)",
+    "rotations": "model.size[4]",
+    "attitude": "model.size[5]",
+    "rows": "model.row.shape[1]",
     "n_pair": "model.pair.shape[0]",
     "n_joint": "model.joint.shape[0]",
     "n_row": "model.size[0]",
@@ -36,7 +43,8 @@ class StepHistory:
     """The history of steps inside kernels, made by `carve_history`."""
 
     t: Annotated[FloatArray, Field("steps + 1", "times of the states (s)")]
-    state: Annotated[FloatArray, Field("steps + 1, 2, n", "q, v, on the joints")]
+    q: Annotated[FloatArray, Field("steps + 1, n_q", "coordinates of the states, on the joints")]
+    v: Annotated[FloatArray, Field("steps + 1, n", "their velocities, on the joints")]
     push: Annotated[
         FloatArray, Field("steps + 1, 2, n_row", "the multipliers mu, nu that put the state there (`projection`)")
     ]
@@ -44,22 +52,24 @@ class StepHistory:
         IndexArray, Field("steps + 1, 4", "first stage; step before; segment; how many events had happened")
     ]
     when: Annotated[FloatArray, Field("stages", "times of the stages (s)")]
-    stage: Annotated[FloatArray, Field("stages, 3, n", "q, v, a")]
+    stage_q: Annotated[FloatArray, Field("stages, n_q", "coordinates of the stages")]
+    stage_v: Annotated[FloatArray, Field("stages, n", "their velocities")]
+    stage_a: Annotated[FloatArray, Field("stages, n", "their accelerations")]
     lam: Annotated[FloatArray, Field("stages, n_row", "multipliers of the joints (N, N m)")]
     K: Annotated[
         FloatArray,
         Field(
-            "stages, n_pair, 6, 6",
+            "stages, n_pair, both, both",
             "-dF/dq of each pair; where factors are kept that of pairs which carry more than joints, without "
             "the joints' part",
         ),
     ]
-    C: Annotated[FloatArray, Field("stages, n_pair, 6, 6", "-dF/dv, likewise")]
-    turn: Annotated[FloatArray, Field("stages, n", "slope of the turning loads")]
-    turned: Annotated[FloatArray, Field("factored, n // 3, 2", "cos and sin of the bodies' angles")]
+    C: Annotated[FloatArray, Field("stages, n_pair, both, both", "-dF/dv, likewise")]
+    turn: Annotated[FloatArray, Field("stages, n, rotations", "slopes of the turning loads")]
+    turned: Annotated[FloatArray, Field("factored, n_body, attitude", "attitudes of the bodies")]
     pull: Annotated[
         FloatArray,
-        Field("factored, n_joint, 3, 6", "of the joints' matrix (`joint_matrix`): Phi_q M⁻¹, by joint"),
+        Field("factored, n_joint, rows, both", "of the joints' matrix (`joint_matrix`): Phi_q M⁻¹, by joint"),
     ]
     gram: Annotated[FloatArray, Field("factored, entries", "its entries, factorised")]
     diagonal: Annotated[FloatArray, Field("factored, 2, n_row", "its diagonal; one row where factors are not kept")]
@@ -70,7 +80,9 @@ class StepHistory:
         FloatArray,
         Field("events, 3", "the permanent set of its member before and after an event; slope of its time by it"),
     ]
-    mass: Annotated[FloatArray, Field("inertial, n_pair, 6, 6", "mass of the inerters; without inerters one of zeros")]
+    mass: Annotated[
+        FloatArray, Field("inertial, n_pair, both, both", "mass of the inerters; without inerters one of zeros")
+    ]
     event: Annotated[
         IndexArray,
         Field(
@@ -108,17 +120,15 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     history: the history of steps (`StepHistory`).
     o: number of the stage.
     t: time (s).
-    q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     lam (n_row,): multipliers of the joints.
     workspace: workspace as the balance of the stage has left it.
     tangent: whether its tangents are stored, and the factors of the joints' matrix where these are kept.
     """
     history.when[o] = t
-    stage = history.stage[o]
-    for d in range(q.shape[0]):
-        stage[0, d] = q[d]
-        stage[1, d] = v[d]
-        stage[2, d] = a[d]
+    copy_vector(q, history.stage_q[o])
+    copy_vector(v, history.stage_v[o])
+    copy_vector(a, history.stage_a[o])
     copy_vector(lam, history.lam[o])
     if not tangent:
         return
@@ -164,13 +174,12 @@ def keep_state(history, k, t, q, v, mu, nu):
     history: the history of steps (`StepHistory`).
     k: number of the state.
     t: time (s).
-    q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+    q (n_q,), v (n,): coordinates and velocities.
     mu, nu (n_row,): multipliers that put them on the joints (`projection`).
     """
     history.t[k] = t
-    for d in range(q.shape[0]):
-        history.state[k, 0, d] = q[d]
-        history.state[k, 1, d] = v[d]
+    copy_vector(q, history.q[k])
+    copy_vector(v, history.v[k])
     for r in range(mu.shape[0]):
         history.push[k, 0, r] = mu[r]
         history.push[k, 1, r] = nu[r]
@@ -182,21 +191,21 @@ def restore_modes(history, happened, member_state):
     e = events_included(member_state)
     while e > happened:
         e -= 1
-        if history.event[e, 1] >= 0:
-            member_state[1, history.event[e, 1]] = history.event[e, 2]
-            member_state[2, history.event[e, 1]] = history.kept[e, 0]
+        if history.event[e, MEMBER] >= 0:
+            member_state[MODE, history.event[e, MEMBER]] = history.event[e, OLD]
+            member_state[SET, history.event[e, MEMBER]] = history.kept[e, 0]
     while e < happened:
-        if history.event[e, 1] >= 0:
-            member_state[1, history.event[e, 1]] = history.event[e, 3]
-            member_state[2, history.event[e, 1]] = history.kept[e, 1]
+        if history.event[e, MEMBER] >= 0:
+            member_state[MODE, history.event[e, MEMBER]] = history.event[e, NEW]
+            member_state[SET, history.event[e, MEMBER]] = history.kept[e, 1]
         e += 1
-    member_state[1, member_state.shape[1] - 1] = e
+    member_state[MODE, member_state.shape[1] - 1] = e
 
 
 @kernel
 def events_included(member_state):
     """How many events the modes in `member_state` include: kept in its last column, which belongs to no member."""
-    return int(member_state[1, member_state.shape[1] - 1])
+    return int(member_state[MODE, member_state.shape[1] - 1])
 
 
 @kernel

@@ -13,13 +13,13 @@ from mdstopo.general.accelerations import (
     joints_vjp,
     solve_unknowns,
 )
-from mdstopo.general.forces import turn_bodies
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.projection import project_back, project_forward
-from mdstopo.general.step_history import has_factors, mass_of
+from mdstopo.general.step_history import FIRST, has_factors, mass_of
 from mdstopo.general.switches import DAMPED
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
+from mdstopo.mechanics.kinematics.kinematics_interface import end_jvp, stage_jvp, stage_vjp, start_vjp, turn_bodies
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 #: change of a sweep of the iterative method, relative, at which it has settled
@@ -29,8 +29,8 @@ SETTLED = 1e-12
 @kernel
 def lay_out(model, history, o, workspace):
     """Put the joints of stage o in the workspace, with their slopes. Returns K and C of the stage."""
-    q = history.stage[o, 0]
-    v = history.stage[o, 1]
+    q = history.stage_q[o]
+    v = history.stage_v[o]
     k = history.K[o]
     c = history.C[o]
     if has_factors(history):
@@ -44,9 +44,9 @@ def lay_out(model, history, o, workspace):
         k = workspace.k
         c = workspace.c
     else:
-        turn_bodies(q, workspace.turned)
+        turn_bodies(model, q, workspace.turned)
         joint_state(model, q, v, workspace)
-    joint_slopes(model, q, v, history.stage[o, 2], history.lam[o], workspace)
+    joint_slopes(model, q, v, history.stage_a[o], history.lam[o], workspace)
     return k, c
 
 
@@ -112,10 +112,11 @@ def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
     """
     if has_factors(history):
-        stage = history.stage[o]
+        q = history.stage_q[o]
+        v = history.stage_v[o]
         solve_joints(model, workspace.inverse, history.pull[o], history.gram[o], history.diagonal[o], workspace.x, z, y)
         carried_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, bar_q, bar_v)
-        joints_vjp(model, workspace, stage[0], stage[1], stage[2], history.lam[o], z, y, bar_q, bar_v)
+        joints_vjp(model, workspace, q, v, history.stage_a[o], history.lam[o], z, y, bar_q, bar_v)
         return
     solve_unknowns(model, workspace, z, y)
     accelerations_vjp(model, workspace, history.K[o], history.C[o], history.turn[o], z, y, bar_q, bar_v)
@@ -145,12 +146,13 @@ def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y,
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     table = tables[method]
-    o = history.index[w, 0]
+    o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
     work[REVERSE] += count
-    state = history.state[w + 1]
     push = history.push[w + 1]
-    project_back(model, state[0], state[1], push[0], push[1], workspace, lam_q, lam_v)
+    project_back(model, history.q[w + 1], history.v[w + 1], push[0], push[1], workspace, lam_q, lam_v)
+    q = history.stage_q[o : o + s]
+    v = history.stage_v[o : o + s]
     u = np.zeros((count, s, n))
     g = np.zeros((count, s, n))
     for back in range(s):
@@ -158,14 +160,17 @@ def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y,
         prepare_stage_back(model, history, o + j, 0.0, 0.0, workspace)
         for m in range(count):
             _explicit_stage_back(
-                model, table, history, o, j, h, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m], workspace
+                model, table, history, o, j, h, q, v, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m], workspace
             )
     for m in range(count):
-        _gather_start(model, table, s, h, u[m], g[m], lam_q[m], lam_v[m])
+        start_vjp(model, table, s, h, q, v, u[m], g[m], lam_q[m], lam_v[m])
+        for i in range(model.driven.shape[0]):
+            lam_q[m, model.driven[i]] = 0.0
+            lam_v[m, model.driven[i]] = 0.0
 
 
 @part
-def _explicit_stage_back(model, table, history, o, j, h, bars, rows_bar, lam_q, lam_v, z, y, u, g, workspace):
+def _explicit_stage_back(model, table, history, o, j, h, q, v, bars, rows_bar, lam_q, lam_v, z, y, u, g, workspace):
     """One stage of `explicit_back`, for one row of cotangents.
 
     Constant:
@@ -175,6 +180,7 @@ def _explicit_stage_back(model, table, history, o, j, h, bars, rows_bar, lam_q, 
     In:
       o, j: number of the step's first stage, and of this one counted from it; it has been prepared.
       h: length of the step (s).
+      q (s, n_q), v (s, n): coordinates and velocities of its stages.
       bars (s, 3, n), rows_bar (s, n_row): explicit cotangents of the stages' q, v, a and multipliers; no rows: none.
       lam_q, lam_v (n,): cotangents of the end's coordinates and velocities.
       workspace: workspace of a balance, with what was prepared.
@@ -183,18 +189,9 @@ def _explicit_stage_back(model, table, history, o, j, h, bars, rows_bar, lam_q, 
       y (n_row,): scratch.
       u, g (s, n): u[j] and g[j], cotangents of the stage's coordinates and velocities; those of later stages are read.
     """
-    s, n = u.shape
+    n = u.shape[1]
     y[:] = 0.0
-    by_end = h * h * table[2, 1, j]
-    by_end_rate = h * table[2, 2, j]
-    for d in range(n):
-        z[j, d] = by_end * lam_q[d] + by_end_rate * lam_v[d]
-    for i in range(j + 1, s):
-        by_stage = h * h * table[0, i, j]
-        by_rate = h * table[1, i, j]
-        if by_stage != 0.0 or by_rate != 0.0:
-            for d in range(n):
-                z[j, d] += by_stage * u[i, d] + by_rate * g[i, d]
+    stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z[j])
     if bars.shape[0] > 0:
         for d in range(n):
             z[j, d] += bars[j, 2, d]
@@ -206,30 +203,6 @@ def _explicit_stage_back(model, table, history, o, j, h, bars, rows_bar, lam_q, 
     for i in range(model.driven.shape[0]):
         u[j, model.driven[i]] = 0.0
         g[j, model.driven[i]] = 0.0
-
-
-@part
-def _gather_start(model, table, s, h, u, g, lam_q, lam_v):
-    """Cotangents of the start of an explicit step from those of its end and its stages, for one row.
-
-    model: the compiled scene.
-    table (3, 17, 17): coefficients of the method.
-    s: number of stages.
-    h: length of the step (s).
-    u, g (s, n): cotangents of the stages' coordinates and velocities.
-    lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, which become those of the start's.
-    """
-    n = lam_q.shape[0]
-    for d in range(n):
-        lam_v[d] += h * lam_q[d]
-    for i in range(s):
-        ahead = h * table[2, 0, i]
-        for d in range(n):
-            lam_q[d] += u[i, d]
-            lam_v[d] += ahead * u[i, d] + g[i, d]
-    for i in range(model.driven.shape[0]):
-        lam_q[model.driven[i]] = 0.0
-        lam_v[model.driven[i]] = 0.0
 
 
 @kernel
@@ -254,32 +227,27 @@ def explicit_forward(model, tables, history, w, dq, dv, force, stage_changes, ro
     method = 1 if model.size[2] != 0 else 0
     s = STAGES[method]
     table = tables[method]
-    o = history.index[w, 0]
+    o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
+    q = history.stage_q[o : o + s]
+    v = history.stage_v[o : o + s]
     for i in range(s):
         x = stage_changes[i]
+        stage_jvp(model, table, h, i, q, v, dq, dv, stage_changes)
         for d in range(n):
-            position = dq[d] + h * table[2, 0, i] * dv[d]
-            speed = dv[d]
-            for j in range(i):
-                position += h * h * table[0, i, j] * stage_changes[j, 2, d]
-                speed += h * table[1, i, j] * stage_changes[j, 2, d]
-            x[0, d] = position if model.free[d] != 0 else 0.0
-            x[1, d] = speed if model.free[d] != 0 else 0.0
+            if model.free[d] == 0:
+                x[0, d] = 0.0
+                x[1, d] = 0.0
             x[2, d] = force[i, d]
         row_changes[i] = 0.0
         stage_forward(model, history, o + i, 0.0, 0.0, 0, workspace, x[0], x[1], x[2], row_changes[i])
+    end_jvp(model, table, s, h, q, v, stage_changes, dq, dv)
     for d in range(n):
-        dq[d] += h * dv[d]
-        for j in range(s):
-            dq[d] += h * h * table[2, 1, j] * stage_changes[j, 2, d]
-            dv[d] += h * table[2, 2, j] * stage_changes[j, 2, d]
         if model.free[d] == 0:
             dq[d] = 0.0
             dv[d] = 0.0
-    state = history.state[w + 1]
     push = history.push[w + 1]
-    project_forward(model, state[0], state[1], push[0], push[1], workspace, dq, dv)
+    project_forward(model, history.q[w + 1], history.v[w + 1], push[0], push[1], workspace, dq, dv)
 
 
 @kernel

@@ -3,7 +3,8 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.model import INERTER
+from mdstopo.general.model import CODE, INERTER, PAIR
+from mdstopo.mechanics.kinematics.kinematics_interface import freedoms
 from mdstopo.mechanics.laws.table import SPRING
 
 #: places of a workspace's `switches`: whether the mass is diagonal; whether the factors in the workspace are those of
@@ -27,7 +28,7 @@ def is_diagonal(model):
     """Whether the mass matrix is diagonal: only inerters couple accelerations."""
     inertial = 0
     for k in range(model.block.shape[0]):
-        inertial += model.block[k, 3] == INERTER
+        inertial += model.block[k, CODE] == INERTER
     return inertial == 0
 
 
@@ -36,9 +37,10 @@ def is_damped(model):
     """Whether forces may depend on rates: all but springs and bushings without damping are taken to do so."""
     damped = model.contact_pair.shape[0]
     for k in range(model.block.shape[0]):
-        damped += model.block[k, 3] != SPRING or model.law[k, 1] != 0.0
+        damped += model.block[k, CODE] != SPRING or model.law[k, 1] != 0.0
     for j in range(model.bushing.shape[0]):
-        for i in range(8, 11):
+        last = model.bushing.shape[1]
+        for i in range(last - freedoms(model), last):
             damped += model.bushing[j, i] != 0.0
     return damped != 0
 
@@ -48,7 +50,7 @@ def carriers(model):
     """(n_pair,): 1 where members, bushings or contacts act between two bodies, 0 where only joints do."""
     found = np.zeros(model.pair.shape[0], np.int64)
     for k in range(model.block.shape[0]):
-        found[model.block[k, 0]] = 1
+        found[model.block[k, PAIR]] = 1
     for j in range(model.bushing_pair.shape[0]):
         found[model.bushing_pair[j]] = 1
     for j in range(model.contact_pair.shape[0]):

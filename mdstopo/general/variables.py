@@ -11,7 +11,7 @@ import numpy as np
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case, Law, LoadCase, MemberGroup, Variable
 from mdstopo.general.kinks import landed
-from mdstopo.general.model import COUNT, GROUP, START, GeneralModel
+from mdstopo.general.model import COUNT, GROUP, MEMBER_EXCESS, MEMBER_FREE_LENGTH, START, GeneralModel
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -113,9 +113,9 @@ class Placing:
             if "free_length" in changed:
                 first = int(model.block[k, START])
                 part, free = slice(first, first + int(model.block[k, COUNT])), changed["free_length"]
-                was = member[4, part].copy()
-                member[4, part] = free
-                member[5, part] += (was - free) * (was + free)
+                was = member[MEMBER_FREE_LENGTH, part].copy()
+                member[MEMBER_FREE_LENGTH, part] = free
+                member[MEMBER_EXCESS, part] += (was - free) * (was + free)
             if changed.keys() & with_role(type(now), "is_time"):
                 times |= {t for t in laws.breakpoints(now, self._fine) if start < t < end}
                 begin = -np.inf if now.active_from is None else now.active_from

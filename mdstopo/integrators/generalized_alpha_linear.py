@@ -19,22 +19,7 @@ from mdstopo.mechanics.assembly import (
     subtract_products,
     subtract_transposed,
 )
-
-
-@kernel
-def hermite(c):
-    """Weights of q, h v at the start and q, h v at the end in the position at fraction c, and their derivatives."""
-    d = 1.0 - c
-    return (
-        d * d * (1.0 + 2.0 * c),
-        d * d * c,
-        c * c * (3.0 - 2.0 * c),
-        -c * c * d,
-        -6.0 * c * d,
-        d * (d - 2.0 * c),
-        6.0 * c * d,
-        c * (c - 2.0 * d),
-    )
+from mdstopo.mechanics.kinematics.planar_steps import hermite
 
 
 @part

@@ -11,11 +11,11 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, member_kernel
 from mdstopo.integrators.generalized_alpha import weights_of
-from mdstopo.integrators.generalized_alpha_linear import hermite
 from mdstopo.integrators.steps import FIRST, SWEEPS, carve
 from mdstopo.integrators.steps_interface import steps_of
 from mdstopo.mechanics.assembly import add_turning, subtract_products
 from mdstopo.mechanics.kinematics.planar_poses import POSE, add_pair_force, copy_rows, relative_pose
+from mdstopo.mechanics.kinematics.planar_steps import hermite
 from mdstopo.mechanics.laws.spring import elastic_design, viscous_design
 from mdstopo.mechanics.passes import SUMS
 from mdstopo.scene.model import DAMPING, DESIGN, EXCESS, KIND, L0, PAIR, PRELOAD, PX, PY, QX, QY, START, STIFFNESS, STOP

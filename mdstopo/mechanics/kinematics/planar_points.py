@@ -11,7 +11,9 @@ The slopes follow by c_psi = J c, A_psi = -A J, and for c' = w_b J c, c'' = w_b'
 
 import math
 
-from mdstopo.compiler.jit import kernel
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.angles import small_turn
 
 #: ACROSS: the component perpendicular to the vector as it is, whose own value is 0
@@ -174,3 +176,40 @@ def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
     if order == VELOCITY:
         return vb[2] - vr[2]
     return ab[2] - ar[2]
+
+
+@kernel
+def point_motion(model, order, component, at, b, r, q, v, a, bars):
+    """Motion of a point of body b as body r sees it; see `kinematics_interface.point_motion`."""
+    slope = np.empty((6, 3))
+    i = 3 * b
+    k = 3 * r
+    value = point_response(
+        order, component, at, model.home[b], model.home[r], q[i : i + 3], v[i : i + 3], a[i : i + 3], q[k : k + 3],
+        v[k : k + 3], a[k : k + 3], slope,
+    )  # fmt: skip
+    _add_slopes(i, k, slope, bars)
+    return value
+
+
+@kernel
+def angle_motion(model, order, b, r, q, v, a, bars):
+    """Angle of body b as body r sees it; see `kinematics_interface.angle_motion`."""
+    slope = np.empty((6, 3))
+    i = 3 * b
+    k = 3 * r
+    value = angle_response(
+        order, model.home[b], model.home[r], q[i : i + 3], v[i : i + 3], a[i : i + 3], q[k : k + 3], v[k : k + 3],
+        a[k : k + 3], slope,
+    )  # fmt: skip
+    _add_slopes(i, k, slope, bars)
+    return value
+
+
+@part
+def _add_slopes(b, r, slope, bars):
+    """Add the slopes (6, 3) by two bodies, whose first coordinates are b and r, to bars (3, n)."""
+    for i in range(3):
+        for c in range(3):
+            bars[i, b + c] += slope[i, c]
+            bars[i, r + c] += slope[3 + i, c]

@@ -1,0 +1,718 @@
+"""What kernels ask of the bodies' kinematics: how coordinates, velocities, poses and points belong together.
+
+The functions here have no contents. A kernel that calls one is compiled with that of the model's kinematics, which
+the model's type tells (`move_by`); `planar.PLANAR` has those of bodies in a plane. Sizes of a body are
+
+    N  coordinates q           3 in a plane: x, y, psi            in space 7: x, y, z, unit quaternion
+    D  velocities v            3: their derivatives               in space 6: velocity, angular velocity
+    T  components of a turn    1                                  in space 3
+    A  numbers of an attitude  2: cos - 1 and sin since home
+
+Velocities, accelerations, forces, cotangents, changes and virtual displacements have D numbers a body, n in all; only
+coordinates have N, n_q in all. Of the D numbers the last T are about turning. A pair of bodies has 2 D: those of its
+first body, then of its second. A relative pose xi has D components that change at rates xi'. Whoever adds to
+coordinates calls `retract` (or what stands beside it), and whoever subtracts some calls `difference`.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+
+from mdstopo.compiler.fields import FloatArray
+from mdstopo.compiler.jit import by_type
+from mdstopo.compiler.kernel import Kernel
+
+#: by the name of the model's type
+_MOVED_BY: dict[str, "Kinematics"] = {}
+#: what a structure's type is called beside its maker (`general.structures`)
+_ENDING = "Structure"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kinematics:
+    """How the bodies of one kind of model move.
+
+    coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. kernels: a
+    function for each of this module.
+    """
+
+    coordinates: int
+    freedoms: int
+    rotations: int
+    attitude: int
+    rows: int
+    kernels: Mapping[str, Kernel]
+
+    def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:
+        """`retract` in Python: coordinates (n_q,) from others and a shift (n,)."""
+        out = np.empty_like(q)
+        self.kernels["retract"].py_func(None, q, shift, out)
+        return out
+
+    def shifts_and_turns(self, change: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The parts of a change (n,) that move and that turn bodies: views (n_body, D - T) and (n_body, T)."""
+        by_body = change.reshape(-1, self.freedoms)
+        return by_body[:, : -self.rotations], by_body[:, -self.rotations :]
+
+    def difference(self, after: FloatArray, before: FloatArray) -> FloatArray:
+        """`difference` in Python: the shift (n,) between coordinates (n_q,)."""
+        out = np.empty(len(after) // self.coordinates * self.freedoms)
+        self.kernels["difference"].py_func(None, after, before, out)
+        return out
+
+
+# Sizes, which are constants where a kernel is compiled
+
+
+def coordinates(model):
+    """N: coordinates of a body."""
+    raise NotImplementedError
+
+
+def freedoms(model):
+    """D: velocities of a body, and components of a relative velocity."""
+    raise NotImplementedError
+
+
+def rotations(model):
+    """T: how many of them, the last ones, are about turning."""
+    raise NotImplementedError
+
+
+def attitude(model):
+    """A: numbers of a body in `turn_bodies`."""
+    raise NotImplementedError
+
+
+def most_rows(model):
+    """The most rows that a joint has."""
+    raise NotImplementedError
+
+
+def pose_size(model):
+    """POSE: numbers of a relative pose and its rates."""
+    raise NotImplementedError
+
+
+def joint_places(model):
+    """PLACES: numbers that tell a joint where its bodies are."""
+    raise NotImplementedError
+
+
+# Coordinates
+
+
+def retract(model, q, shift, out):
+    """Move bodies by a shift.
+
+    In:
+      q (n_q,): coordinates.
+      shift (n,): by how much each body moves and turns (m, rad).
+    Out:
+      out (n_q,): coordinates behind it; may be q.
+    """
+    raise NotImplementedError
+
+
+def difference(model, after, before, out):
+    """out (n,): the shift by which `retract` leads from coordinates `before` to `after` (n_q,)."""
+    raise NotImplementedError
+
+
+def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
+    """Pull a cotangent of what `retract` gives back to what it is given.
+
+    In:
+      q, moved (n_q,): coordinates before and behind the shift.
+      bar (n,): cotangent of those behind it.
+    Out:
+      bar_q, bar_shift (n,): cotangents of those before it and of the shift.
+    """
+    raise NotImplementedError
+
+
+def retract_jvp(model, q, moved, dq, dshift, out):
+    """Push changes through `retract`.
+
+    In:
+      q, moved (n_q,): coordinates before and behind the shift.
+      dq, dshift (n,): changes of those before it and of the shift.
+    Out:
+      out (n,): change of those behind it.
+    """
+    raise NotImplementedError
+
+
+def advance_coordinates(model, q, v, a, e, out):
+    """Where bodies are after some time at constant accelerations.
+
+    In:
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      e: the time (s); below 0 it leads back.
+    Out:
+      out (n_q,): coordinates then.
+    """
+    raise NotImplementedError
+
+
+def moved_most(model, q, size):
+    """How far bodies have moved since home at most (m), a turn as its angle, 1 rad at most, times `size` (m)."""
+    raise NotImplementedError
+
+
+# Steps
+
+
+def stage_state(model, table, h, i, q0, v0, q, v, a):
+    """Coordinates and velocities of a stage of an explicit Runge-Kutta step.
+
+    In:
+      table (3, 17, 17): coefficients of the method (`integrators.runge_kutta_tables`).
+      h: length of the step (s).
+      i: number of the stage.
+      q0 (n_q,), v0 (n,): coordinates and velocities at the start of the step.
+      a (s, n): accelerations of the stages before it.
+    In and out:
+      q (s, n_q), v (s, n): of all stages; those before i are read, those of i written.
+    """
+    raise NotImplementedError
+
+
+def end_state(model, table, s, h, q0, v0, q, v, a, q_end, v_end):
+    """Coordinates and velocities at the end of an explicit Runge-Kutta step.
+
+    In:
+      table (3, 17, 17), s: coefficients of the method, and number of its stages.
+      h: length of the step (s).
+      q0 (n_q,), v0 (n,): coordinates and velocities at its start.
+      q (s, n_q), v, a (s, n): those of its stages, and their accelerations.
+    Out:
+      q_end (n_q,), v_end (n,): coordinates and velocities at its end.
+    """
+    raise NotImplementedError
+
+
+def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
+    """The cotangent of a stage's accelerations, from those of what depends on them.
+
+    In:
+      table (3, 17, 17), h: coefficients of the method, and length of the step (s).
+      j: number of the stage.
+      q (s, n_q), v (s, n): coordinates and velocities of the stages.
+      lam_q, lam_v (n,): cotangents of the end's coordinates and velocities.
+      u, g (s, n): cotangents of the coordinates and velocities of later stages.
+    Out:
+      z (n,): the cotangent.
+    """
+    raise NotImplementedError
+
+
+def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
+    """Cotangents of a step's start, from those of its stages and its end.
+
+    In:
+      table (3, 17, 17), s, h: coefficients of the method, number of stages, length of the step (s).
+      q (s, n_q), v (s, n): coordinates and velocities of the stages.
+      u, g (s, n): cotangents of these.
+    In and out:
+      lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, then of the start's.
+    """
+    raise NotImplementedError
+
+
+def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
+    """Changes of a stage's coordinates and velocities.
+
+    In:
+      table (3, 17, 17), h: coefficients of the method, and length of the step (s).
+      i: number of the stage.
+      q (s, n_q), v (s, n): coordinates and velocities of the stages.
+      dq, dv (n,): changes of the start's.
+    In and out:
+      changes (s, 3, n): of the stages' coordinates, velocities, accelerations; the first two of i are written.
+    """
+    raise NotImplementedError
+
+
+def end_jvp(model, table, s, h, q, v, changes, dq, dv):
+    """Changes of the end of a step.
+
+    In:
+      table (3, 17, 17), s, h: coefficients of the method, number of stages, length of the step (s).
+      q (s, n_q), v (s, n): coordinates and velocities of the stages.
+      changes (s, 3, n): changes of the stages' coordinates, velocities, accelerations.
+    In and out:
+      dq, dv (n,): changes of the start's coordinates and velocities, then of the end's.
+    """
+    raise NotImplementedError
+
+
+def cubic(model, c, h, q0, v0, q1, v1, q, v):
+    """The cubic through both ends of a step, and its derivative.
+
+    In:
+      c, h: fraction of the step, and its length (s).
+      q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at its start and its end.
+    Out:
+      q (n_q,), v (n,): coordinates and velocities at c.
+    """
+    raise NotImplementedError
+
+
+def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q, end_v):
+    """Pull cotangents of a cubic back to both ends of the step.
+
+    In:
+      c, h, q0, v0, q1, v1: as of `cubic`.
+      bar_q, bar_v (n,): cotangents of the coordinates and velocities at c.
+    Out:
+      start_q, start_v, end_q, end_v (n,): those of the start's and the end's.
+    """
+    raise NotImplementedError
+
+
+def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
+    """Push changes of both ends of a step to its cubic.
+
+    In:
+      c, h, q0, v0, q1, v1: as of `cubic`.
+      end_dq, end_dv (n,): changes of the end's coordinates and velocities.
+    In and out:
+      dq, dv (n,): changes of the start's, then of those at c.
+    """
+    raise NotImplementedError
+
+
+def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
+    """The quintic through both ends of a step with their accelerations, and its derivative.
+
+    In:
+      c, h: fraction of the step, and its length (s).
+      q0, q1 (n_q,), v0, v1, a0, a1 (n,): coordinates, velocities, accelerations at its start and its end.
+    Out:
+      q (n_q,), v (n,): coordinates and velocities at c.
+    """
+    raise NotImplementedError
+
+
+# Prescribed motions
+
+
+def drive_state(model, segment, t, q, v):
+    """Put what is driven of coordinates q (n_q,) and velocities v (n,) where it has to be at time t of a segment."""
+    raise NotImplementedError
+
+
+def drive_acceleration(model, segment, t, a):
+    """Put the accelerations of what is driven at time t of a segment into a (n,)."""
+    raise NotImplementedError
+
+
+# Poses
+
+
+def turn_bodies(model, q, turned):
+    """turned (n_body, A): the attitudes of all bodies at coordinates q (n_q,), which pairs and joints share."""
+    raise NotImplementedError
+
+
+def turn_of(model, body, q):
+    """The attitude of one body at coordinates q (n_q,): numbers for `stretch_between`."""
+    raise NotImplementedError
+
+
+def relative_pose(model, q, v, rel):
+    """rel (n_pair, POSE): relative poses of all pairs and their rates at coordinates q (n_q,) and velocities v (n,)."""
+    raise NotImplementedError
+
+
+def turned_pose(model, p, turned, q, v, rel):
+    """`relative_pose` of one pair, of bodies whose attitudes are known.
+
+    In:
+      p: the pair.
+      turned (n_body, A): of `turn_bodies`.
+      q (n_q,), v (n,): coordinates and velocities.
+    Out:
+      rel (n_pair, POSE): relative poses, of which row p is set.
+    """
+    raise NotImplementedError
+
+
+def pose_acceleration(model, rel, p, a, out):
+    """out (D,): xi'' of pair p from its pose in rel (n_pair, POSE) and accelerations a (n,)."""
+    raise NotImplementedError
+
+
+def pair_displacement(model, rel, p, dq, out):
+    """out (D,): the change of the relative pose of pair p under a change dq (n,) of all bodies."""
+    raise NotImplementedError
+
+
+def add_pair_force(model, rel, p, force, first, out):
+    """Add a force on the relative pose of a pair to the forces on its bodies.
+
+    In:
+      rel (n_pair, POSE): relative poses.
+      p: the pair.
+      force, first: the force is force[first : first + D].
+    Out:
+      out (n,): forces and moments, added to.
+    """
+    raise NotImplementedError
+
+
+def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
+    """The tangents of a pair in the freedoms of its bodies.
+
+    In:
+      p: the pair.
+      rel (n_pair, POSE): relative poses.
+      sums (n_pair, SUMS): forces and tangents by relative poses (`strides.sums_size`).
+      damped: whether any force depends on velocity.
+    Out:
+      k_out, c_out (n_pair, 2 D, 2 D): of which [p] = -dF/dq and, if damped, -dF/dv are written.
+    """
+    raise NotImplementedError
+
+
+def pair_stiffness(model, sums, p):
+    """A measure of how stiff the members of a pair are against displacements (N/m), from its sums."""
+    raise NotImplementedError
+
+
+def turning_rate(model, rel, p):
+    """How fast the bodies of a pair turn against each other (rad/s), from rel (n_pair, POSE)."""
+    raise NotImplementedError
+
+
+# Loads
+
+
+def add_loads(model, segment, t, q, f):
+    """f (n,) += the applied loads of a segment at time t and coordinates q (n_q,)."""
+    raise NotImplementedError
+
+
+def load_tangent(model, segment, t, q, turn):
+    """turn (n, T): derivative of each body's applied loads by its own turn, at time t and coordinates q (n_q,)."""
+    raise NotImplementedError
+
+
+# Sizes of motions
+
+
+def home_extent(model):
+    """The largest distance of a body from the origin at home (m), along an axis."""
+    raise NotImplementedError
+
+
+def deflection(model, rel, rel0, p):
+    """How far the points of pair p have moved between two relative poses (n_pair, POSE), m, at most."""
+    raise NotImplementedError
+
+
+def largest_turn(model, before, after):
+    """How far the bodies of a pair turn against each other between two coordinates (n_q,), rad, at most."""
+    raise NotImplementedError
+
+
+def motion_weights(model, rel, scale, weight):
+    """weight (n,): what a change of each freedom has to be multiplied by to be a displacement relative to the scale.
+
+    rel (n_pair, POSE): relative poses; scale (n_pair,): of the motion of each pair (m).
+    """
+    raise NotImplementedError
+
+
+def noise_of(model, noise, rel, q, p):
+    """What rounding leaves uncertain of how far a pair has moved (m).
+
+    noise (n_pair,): of `rounding_of_pairs`; rel (n_pair, POSE): relative poses; q (n_q,): coordinates; p: the pair.
+    """
+    raise NotImplementedError
+
+
+def arm_of(model, rel, p):
+    """The distance of the bodies of pair p, plus its reach (m)."""
+    raise NotImplementedError
+
+
+def gross_loads(model, out):
+    """out (n,): the largest size of the applied loads on each freedom, without regard to their signs."""
+    raise NotImplementedError
+
+
+def add_gross_force(model, rel, p, force, out):
+    """Add a force of any direction between the bodies of pair p (N), and its moments, to out (n,), all positive."""
+    raise NotImplementedError
+
+
+def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
+    """Estimate what rounding leaves uncertain of how far each pair has moved.
+
+    In:
+      inverse (n,): inverse masses and inertias.
+      rel (n_pair, POSE), v (n,): relative poses and velocities at the start.
+      load (n,): of `gross_loads`.
+      stiffness, strain (n_pair,): of a pair's members (N/m), and how far it is strained at the start (m).
+    Out:
+      noise (n_pair,): what is uncertain (m).
+    """
+    raise NotImplementedError
+
+
+# Members between the bodies of a pair; r (POSE,) is its relative pose, i the member (padded)
+
+
+def stretch_of(model, i, r):
+    """Elongation (m) and its rate (m/s)."""
+    raise NotImplementedError
+
+
+def member_motion(model, i, r):
+    """Length (m), elongation (m) and its rate (m/s); strict floating point."""
+    raise NotImplementedError
+
+
+def motion_of_ends(model, i, r):
+    """Elongation (m) and its rate (m/s), from the member's vector without its direction; strict floating point."""
+    raise NotImplementedError
+
+
+def member_work(model, i, r, u):
+    """Length (m), elongation (m), and how fast it changes along a change u (D,) of the relative pose."""
+    raise NotImplementedError
+
+
+def second_rate(model, i, r, acc):
+    """Second derivative of the elongation by time (m/s^2); acc (D,): xi''."""
+    raise NotImplementedError
+
+
+def stretch_between(model, p, i, turn_one, turn_two, q, v):
+    """Elongation (m) and its rate (m/s), as `member_rows` has them, to the bit.
+
+    p: the pair.
+    turn_one, turn_two: `turn_of` its bodies.
+    q (n_q,), v (n,): coordinates and velocities.
+    """
+    raise NotImplementedError
+
+
+def member_rows(model, p, i, q, v, row, row_rate):
+    """Elongation (m) and its rate (m/s), and the member's row B of the compatibility matrix.
+
+    In:
+      p: the pair.
+      q (n_q,), v (n,): coordinates and velocities.
+    Out:
+      row, row_rate (2 D,): B and dB/dt over the freedoms of both bodies.
+    """
+    raise NotImplementedError
+
+
+def inerter_row(model, q, v, i, p, row, row_rate):
+    """B of a member of pair p, and what accelerations do not change of the elongation's second derivative.
+
+    In:
+      q (n_q,), v (n,): coordinates and velocities.
+    Out:
+      row (2 D,): B; zero where the member has no length.
+      row_rate (1,): d(row)/dt . v (m/s^2).
+
+    Returns the length (m).
+    """
+    raise NotImplementedError
+
+
+def add_inerter_tangents(model, pair, lo, count, inertance, member_state, q, v, a, k_out, c_out):
+    """Slopes by coordinates and velocities of what inerters take, sum s b B^T d2Delta/dt2, at fixed a.
+
+    Constant:
+      pair, lo, count, inertance: the pair, the first of its inerters and how many they are, b of each (kg).
+      member_state (3, columns): of which row 0 has s.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      k_out, c_out (n_pair, 2 D, 2 D): to which d/dq and d/dv are added.
+    """
+    raise NotImplementedError
+
+
+def keep_apart(model, lo, count, before, after):
+    """Whether no member's ends can meet on a straight way between two poses (POSE,): all are longer than they move."""
+    raise NotImplementedError
+
+
+def ends_meet(model, i, r, w):
+    """Whether the ends of a member meet on straight lines between the poses r and w (POSE,)."""
+    raise NotImplementedError
+
+
+def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, tangent, o):
+    """Add the forces, energy and tangents of members of one law to the sums of their pair.
+
+    In:
+      code, p (PARAMETERS,): the law and its parameters.
+      lo, count: the first member (padded), and how many there are.
+      counted: whether their energy is looked at.
+      t, value: time (s), and the tabulated force then (N).
+      member_state (3, columns): scale, mode and permanent set of every member.
+      r (POSE,): relative pose of the pair.
+      tangent: whether K and C are wanted.
+    Out:
+      o (SUMS,): Q, E, E_xi and on demand K, C (`strides.sums_size`), added to.
+    """
+    raise NotImplementedError
+
+
+def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
+    """`member_sums` of springs with parameters p (3 or more,)."""
+    raise NotImplementedError
+
+
+def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, r, u, weight, out):
+    """Add what members do to a derivative by alpha^mu at one state: f_i (b_i . u) + weight V_i, at unit strength.
+
+    In:
+      code, p, lo, count, t, value, member_state, r: as of `member_sums`.
+      modes_of (columns,): mode of every member.
+      u (D,): virtual change of the relative pose.
+      weight: factor of the stored energy.
+    Out:
+      out (M_padded or more,): added to.
+    """
+    raise NotImplementedError
+
+
+def spring_designs(model, p, lo, count, rel, u, pair, out):
+    """`member_designs` of springs without damping and preload, at S poses rel (S, n_pair, POSE) at once.
+
+    p (1 or more,): stiffness (N/m) and what else the law has. lo, count: the springs. pair: theirs.
+    u (S, n_pair, D): virtual changes of the poses. out (M_padded or more,): added to.
+    """
+    raise NotImplementedError
+
+
+def spring_designs_of_rows(model, p, lo, count, rel, u, pair, room, out):
+    """`spring_designs` of any springs, for R rows with u (R, S, n_pair, D) and out (R, M_padded or more).
+
+    room (4 S lanes,): scratch.
+    """
+    raise NotImplementedError
+
+
+def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r, u, j, pair, seen, out):
+    """`member_designs` without energy, at pose j, for R rows with u (R, S, n_pair, D) and out (R, M_padded or more).
+
+    seen (D + 1, count or more): scratch.
+    """
+    raise NotImplementedError
+
+
+# Joints, bushings, contacts
+
+
+def place_joint(model, j, q, turned, w):
+    """w (PLACES,): where the bodies of joint j are, at coordinates q (n_q,) and attitudes turned (n_body, A)."""
+    raise NotImplementedError
+
+
+def place_joint_alone(model, j, q, w):
+    """`place_joint` where no attitudes are known."""
+    raise NotImplementedError
+
+
+def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
+    """`accelerations.joints_vjp` of a joint whose first rows put two points together and whose others are linear.
+
+    In:
+      j: the joint.
+      w (PLACES,), wd, wdd (2 D,): where its bodies are, their velocities and accelerations.
+      lam (rows,): its multipliers.
+      z (n,), y (n_row,): adjoint variables of the equations of motion and of the joints' rows.
+    Out:
+      bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
+    """
+    raise NotImplementedError
+
+
+def add_bushings(model, rel, q, tangent, sums):
+    """sums (n_pair, SUMS) += forces of the bushings and on demand their tangents.
+
+    rel (n_pair, POSE), q (n_q,): relative poses, and coordinates. tangent: whether K and C are wanted.
+    """
+    raise NotImplementedError
+
+
+def contact_rows(model, j, q, v, rows, rates):
+    """Where the point of a contact is as seen from the edge, with slopes.
+
+    In:
+      j: the contact.
+      q (n_q,), v (n,): coordinates and velocities.
+    Out:
+      rows (2, 2 D): slopes of along and of height by the freedoms of both bodies.
+      rates (2, 2 D): their derivatives by time.
+
+    Returns along, height (m).
+    """
+    raise NotImplementedError
+
+
+def add_contact_curvature(model, j, q, rows, n, t, k):
+    """Add what the directions of a contact's forces change by with both bodies: N H_n + T H_t, H second derivatives.
+
+    In:
+      j: the contact.
+      q (n_q,): coordinates.
+      rows (2, 2 D): of `contact_rows`.
+      n, t: normal force and friction (N).
+    Out:
+      k (2 D, 2 D): the stiffness of its pair, added to.
+    """
+    raise NotImplementedError
+
+
+# Motion of points
+
+
+def point_motion(model, order, component, at, b, r, q, v, a, bars):
+    """Displacement, velocity or acceleration of a point of body b as seen from body r: a component or the norm.
+
+    In:
+      order, component: `planar_points.DISPLACEMENT`, ...; X, Y, NORM, ACROSS.
+      at (2 or more,): the point in the frame of b (m).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      bars (3, n): slopes by q, v, a, added to.
+    """
+    raise NotImplementedError
+
+
+def angle_motion(model, order, b, r, q, v, a, bars):
+    """The angle of body b as seen from body r, or its first or second derivative; arguments as of `point_motion`."""
+    raise NotImplementedError
+
+
+#: all of the functions above, by name
+INTERFACE: dict[str, Callable[..., Any]] = {
+    name: each for name, each in globals().items() if isinstance(each, FunctionType) and each.__module__ == __name__
+}
+
+
+def move_by(maker: type, kinematics: Kinematics) -> None:
+    """Have the bodies of a model, which `maker` makes in kernels (`general.structures`), move so."""
+    _MOVED_BY[maker.__name__] = kinematics
+
+
+def _of(name: str, model: Any) -> Any:
+    return _MOVED_BY[type(model).__name__.removesuffix(_ENDING)].kernels[name]
+
+
+for _name, _stub in INTERFACE.items():
+    by_type(_stub, "model", partial(_of, _name))

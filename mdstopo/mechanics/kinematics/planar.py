@@ -1,0 +1,338 @@
+"""Bodies in a plane: the first kinematics, and what the interface asks of it (`kinematics_interface`).
+
+Coordinates are x, y, psi of each body, by how much they have changed since home; velocities are their derivatives. So
+coordinates may be added as numbers. The parts stand beside: `planar_poses`, `planar_forces`, `planar_scales`,
+`planar_steps`, `planar_drives`, `planar_members`, `planar_inerters`, `planar_bushings`, `planar_contacts`,
+`planar_points`.
+"""
+
+from typing import cast
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.kernel import Kernel
+from mdstopo.mechanics.angles import small_turn
+from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
+from mdstopo.mechanics.joints.revolute import place_joint as place_joint_of_bodies
+from mdstopo.mechanics.kinematics import (
+    planar_bushings,
+    planar_contacts,
+    planar_drives,
+    planar_inerters,
+    planar_members,
+    planar_points,
+    planar_steps,
+)
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
+from mdstopo.mechanics.kinematics.planar_forces import add_loads
+from mdstopo.mechanics.kinematics.planar_forces import load_tangent as tangent_of_loads
+from mdstopo.mechanics.kinematics.planar_forces import pair_tangent as tangent_of_pair
+from mdstopo.mechanics.kinematics.planar_poses import (
+    COS_A,
+    DX,
+    DY,
+    OMEGA_A,
+    POSE,
+    SIN_A,
+    VT,
+    VX,
+    VY,
+    fill_pose,
+    turned_from,
+)
+from mdstopo.mechanics.kinematics.planar_poses import (
+    add_pair_force as add_force_of_pair,
+)
+from mdstopo.mechanics.kinematics.planar_poses import (
+    pair_displacement as displacement_of_pair,
+)
+from mdstopo.mechanics.kinematics.planar_poses import (
+    relative_pose as poses_of_pairs,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
+    add_gross_force as add_gross,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
+    deflection as deflection_of_pair,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
+    gross_loads,
+    rounding_of_pairs,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
+    largest_turn as turn_of_pairs,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
+    motion_weights as weights_of_motion,
+)
+from mdstopo.mechanics.kinematics.planar_scales import (
+    noise_of as noise_of_pair,
+)
+
+COORDINATES = FREEDOMS = ROWS = 3
+ROTATIONS = 1
+#: cos - 1 and sin of the angle by which a body has turned since home
+ATTITUDE = 2
+#: columns of sums over members: K by the shift along x, and along y (`passes.SUMS`)
+K_XX, K_YY = 7, 11
+
+
+@part
+def coordinates(model):
+    """x, y, psi."""
+    return COORDINATES
+
+
+@part
+def freedoms(model):
+    """The rates of x, y, psi."""
+    return FREEDOMS
+
+
+@part
+def rotations(model):
+    """One angle."""
+    return ROTATIONS
+
+
+@part
+def attitude(model):
+    """cos - 1 and sin of an angle."""
+    return ATTITUDE
+
+
+@part
+def most_rows(model):
+    """A fixed joint has three rows."""
+    return ROWS
+
+
+@part
+def pose_size(model):
+    """See `planar_poses`."""
+    return POSE
+
+
+@part
+def joint_places(model):
+    """See `joints.revolute`."""
+    return PLACES
+
+
+@part
+def retract(model, q, shift, out):
+    """Coordinates in a plane are added to as they are."""
+    for d in range(shift.shape[0]):
+        out[d] = q[d] + shift[d]
+
+
+@part
+def difference(model, after, before, out):
+    """They are subtracted as they are."""
+    for d in range(out.shape[0]):
+        out[d] = after[d] - before[d]
+
+
+@part
+def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
+    """The derivatives of a sum."""
+    for d in range(bar.shape[0]):
+        bar_q[d] = bar[d]
+        bar_shift[d] = bar[d]
+
+
+@part
+def retract_jvp(model, q, moved, dq, dshift, out):
+    """The derivatives of a sum."""
+    for d in range(dq.shape[0]):
+        out[d] = dq[d] + dshift[d]
+
+
+@part
+def moved_most(model, q, size):
+    """The largest of all |x|, |y| and |psi| size."""
+    moved = 0.0
+    for body in range(model.home.shape[0]):
+        b = COORDINATES * body
+        moved = max(moved, abs(q[b]), abs(q[b + 1]), min(abs(q[b + 2]), 1.0) * size)
+    return moved
+
+
+@part
+def turn_bodies(model, q, turned):
+    """cos - 1 and sin of the angle that every body has turned by."""
+    for b in range(turned.shape[0]):
+        turned[b, 0], turned[b, 1] = small_turn(q[COORDINATES * b + 2])
+
+
+@part
+def relative_pose(model, q, v, rel):
+    """See `planar_poses`."""
+    poses_of_pairs(model.pair, model.home, q, v, rel)
+
+
+@part
+def turned_pose(model, p, turned, q, v, rel):
+    """See `planar_poses.fill_pose`."""
+    one = model.pair[p, 0]
+    two = model.pair[p, 1]
+    fill_pose(model.pair, p, model.home, q, v, turned[one, 0], turned[one, 1], turned[two, 0], turned[two, 1], rel)
+
+
+@kernel
+def pose_acceleration(model, rel, p, a, out):
+    """d'' = R^T D'' + omega' (dy, -dx) + 2 omega (vy, -vx) + omega^2 d, theta'' = psi_B'' - psi_A''."""
+    i = FREEDOMS * model.pair[p, 0]
+    j = FREEDOMS * model.pair[p, 1]
+    r = rel[p]
+    ca = r[COS_A]
+    sa = r[SIN_A]
+    omega = r[OMEGA_A]
+    x = a[j] - a[i]
+    y = a[j + 1] - a[i + 1]
+    turn = a[i + 2]
+    out[0] = ca * x + sa * y + turn * r[DY] + 2.0 * omega * r[VY] + omega * omega * r[DX]
+    out[1] = ca * y - sa * x - turn * r[DX] - 2.0 * omega * r[VX] + omega * omega * r[DY]
+    out[2] = a[j + 2] - turn
+
+
+@part
+def pair_displacement(model, rel, p, dq, out):
+    """See `planar_poses`."""
+    displacement_of_pair(model.pair, rel, p, dq, out)
+
+
+@part
+def add_pair_force(model, rel, p, force, first, out):
+    """See `planar_poses`."""
+    add_force_of_pair(model.pair, rel, p, force[first], force[first + 1], force[first + 2], out)
+
+
+@part
+def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
+    """See `planar_forces`."""
+    tangent_of_pair(p, rel, sums, damped, k_out, c_out)
+
+
+@part
+def pair_stiffness(model, sums, p):
+    """The trace of the stiffness against displacements."""
+    return sums[p, K_XX] + sums[p, K_YY]
+
+
+@part
+def turning_rate(model, rel, p):
+    """The size of the rate of theta."""
+    return abs(rel[p, VT])
+
+
+@part
+def load_tangent(model, segment, t, q, turn):
+    """See `planar_forces`: each body has one angle."""
+    tangent_of_loads(model, segment, t, q, turn.reshape(turn.size))
+
+
+@part
+def home_extent(model):
+    """The largest of all |x| and |y|."""
+    extent = 0.0
+    for b in range(model.home.shape[0]):
+        extent = max(extent, abs(model.home[b, 0]), abs(model.home[b, 1]))
+    return extent
+
+
+@part
+def deflection(model, rel, rel0, p):
+    """See `planar_scales`."""
+    return deflection_of_pair(rel, rel0, model.reach, p)
+
+
+@part
+def largest_turn(model, before, after):
+    """See `planar_scales`."""
+    return turn_of_pairs(model.pair, before, after)
+
+
+@part
+def motion_weights(model, rel, scale, weight):
+    """See `planar_scales`."""
+    weights_of_motion(model.pair, rel, model.reach, scale, weight)
+
+
+@part
+def noise_of(model, noise, rel, q, p):
+    """See `planar_scales`."""
+    return noise_of_pair(model.pair, noise, rel, model.reach, q, p)
+
+
+@part
+def arm_of(model, rel, p):
+    """The distance of both bodies, and the reach of the points of the second."""
+    return np.sqrt(rel[p, DX] * rel[p, DX] + rel[p, DY] * rel[p, DY]) + model.reach[p]
+
+
+@part
+def add_gross_force(model, rel, p, force, out):
+    """See `planar_scales`."""
+    add_gross(model.pair, rel, model.reach, p, force, out)
+
+
+@part
+def place_joint(model, j, q, turned, w):
+    """See `joints.revolute.place_turned`."""
+    one = model.joint[j, 1]
+    two = model.joint[j, 2]
+    turns_one = turned_from(model.home, one, turned[one, 0], turned[one, 1])
+    place_turned(model.home, one, two, q, turns_one, turned_from(model.home, two, turned[two, 0], turned[two, 1]), w)
+
+
+@part
+def place_joint_alone(model, j, q, w):
+    """See `joints.revolute.place_joint`."""
+    place_joint_of_bodies(model.home, model.joint[j, 1], model.joint[j, 2], q, w)
+
+
+@part
+def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
+    """See `joints.revolute.revolute_vjp`; what rows behind the first two have is constant."""
+    row = model.row
+    one = FREEDOMS * model.joint[j, 1] + 2
+    two = FREEDOMS * model.joint[j, 2] + 2
+    y0 = y[row[j, 0]] if row[j, 0] >= 0 else 0.0
+    y1 = y[row[j, 1]] if row[j, 1] >= 0 else 0.0
+    first, second, rate_first, rate_second = revolute_vjp(model.joint_par[j], w, wd, wdd, lam, y0, y1, z[one], z[two])
+    bar_q[one] -= first
+    bar_q[two] -= second
+    bar_v[one] -= rate_first
+    bar_v[two] -= rate_second
+
+
+_KERNELS = (
+    coordinates, freedoms, rotations, attitude, most_rows, pose_size, joint_places,
+    retract, difference, retract_vjp, retract_jvp, planar_steps.advance_coordinates, moved_most,
+    planar_steps.stage_state, planar_steps.end_state, planar_steps.stage_vjp, planar_steps.start_vjp,
+    planar_steps.stage_jvp, planar_steps.end_jvp, planar_steps.cubic, planar_steps.cubic_vjp, planar_steps.cubic_jvp,
+    planar_steps.quintic, planar_drives.drive_state, planar_drives.drive_acceleration,
+    turn_bodies, planar_members.turn_of, relative_pose, turned_pose, pose_acceleration, pair_displacement,
+    add_pair_force, pair_tangent, pair_stiffness, turning_rate, add_loads, load_tangent,
+    home_extent, deflection, largest_turn, motion_weights, noise_of, arm_of, gross_loads, add_gross_force,
+    rounding_of_pairs,
+    planar_members.stretch_of, planar_members.member_motion, planar_members.motion_of_ends, planar_members.member_work,
+    planar_members.second_rate, planar_members.stretch_between, planar_members.member_rows,
+    planar_inerters.inerter_row, planar_inerters.add_inerter_tangents, planar_members.keep_apart,
+    planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums, planar_members.member_designs,
+    planar_members.spring_designs, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
+    place_joint, place_joint_alone, point_joint_vjp, planar_bushings.add_bushings, planar_contacts.contact_rows,
+    planar_contacts.add_contact_curvature, planar_points.point_motion, planar_points.angle_motion,
+)  # fmt: skip
+
+#: how bodies in a plane move
+PLANAR = Kinematics(
+    coordinates=COORDINATES,
+    freedoms=FREEDOMS,
+    rotations=ROTATIONS,
+    attitude=ATTITUDE,
+    rows=ROWS,
+    kernels={each.__name__: cast(Kernel, each) for each in _KERNELS},
+)
