@@ -46,6 +46,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     freedoms,
     joint_places,
     most_rows,
+    pair_matrix_vjp,
     place_joint,
     point_joint_vjp,
     pose_size,
@@ -149,7 +150,7 @@ def joint_slopes(model, q, v, a, lam, workspace):
 
     Constant:
       model: the compiled scene.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       lam (n_row,): multipliers (N, N m).
     In and out:
       workspace: the workspace, with the bodies turned (`forces.turn_bodies`); by_q, by_v are set, k is added to.
@@ -322,7 +323,7 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
       tangent: whether workspace.k, .c, .turn, .by_q, .by_v are to hold the tangents of the whole balance (with the
         switch APART those of members and loads alone).
     In and out:
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s); their driven part is put in place first.
+      q (n_q,), v (n,): coordinates and velocities; their driven part is put in place first.
       workspace: the workspace; forces, poses, the joints' rows and the factors stay on it.
     Out:
       a (n,): accelerations (m/s^2, rad/s^2).
@@ -417,23 +418,7 @@ def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
 def matrices_vjp(model, k, z, bar):
     """bar (n,) -= K^T z, K by pairs (n_pair, 2 D, 2 D)."""
     for p in range(model.pair.shape[0]):
-        _matrix_vjp(model, p, k[p], z, bar)
-
-
-@part
-def _matrix_vjp(model, p, m, z, bar):
-    """bar (n,) -= m^T z of pair p, m (2 D, 2 D)."""
-    each = freedoms(model)
-    one = each * model.pair[p, 0]
-    two = each * model.pair[p, 1]
-    for j in range(2 * each):
-        d = one + j if j < each else two + j - each
-        by_first = m[0, j] * z[one]
-        by_second = m[each, j] * z[two]
-        for i in range(1, each):
-            by_first += m[i, j] * z[one + i]
-            by_second += m[each + i, j] * z[two + i]
-        bar[d] -= by_first + by_second
+        pair_matrix_vjp(model, p, k[p], z, bar)
 
 
 @kernel
@@ -471,9 +456,9 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
     damped = workspace.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
         if workspace.carries[p] != 0:
-            _matrix_vjp(model, p, k[p], z, bar_q)
+            pair_matrix_vjp(model, p, k[p], z, bar_q)
             if damped:
-                _matrix_vjp(model, p, c[p], z, bar_v)
+                pair_matrix_vjp(model, p, c[p], z, bar_v)
     turns_vjp(model, turn, z, bar_q)
 
 
@@ -483,7 +468,7 @@ def joints_vjp(model, workspace, q, v, a, lam, z, y, bar_q, bar_v):
 
     Constant:
       model: the compiled scene.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       lam (n_row,): multipliers (N, N m).
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
@@ -512,7 +497,7 @@ def joints_vjp(model, workspace, q, v, a, lam, z, y, bar_q, bar_v):
         stiffness[:] = 0.0
         joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
         joint_stiffness(code, par, w, mine, stiffness)
-        _matrix_vjp(model, model.joint[j, JOINT_PAIR], stiffness, z, bar_q)
+        pair_matrix_vjp(model, model.joint[j, JOINT_PAIR], stiffness, z, bar_q)
         for r in range(most_rows(model)):
             if row[j, r] >= 0:
                 value = y[row[j, r]]

@@ -367,7 +367,14 @@ def at_stage(model, member_state, segment, history, at, j, who, workspace, own, 
 
 @kernel
 def sign_at_stage(model, segment, j, who, member_state, history, at):
-    """`gather.force_sign` at stage `at` of the history of steps."""
+    """`gather.force_sign` at a stage.
+
+    model: the compiled scene.
+    segment: segment of `model.times` in which the stage lies.
+    j, who: the response, and the number of the member in its group.
+    member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+    history, at: the history of steps, and the number of the stage.
+    """
     return force_sign(
         model, segment, j, who, history.when[at], member_state, history.stage_q[at], history.stage_v[at],
         history.stage_a[at],

@@ -102,7 +102,7 @@ def brake_rate(model, member_state, q, v, enough, workspace):
     Constant:
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
       enough: rate up to which the trace will do (1/s).
     In and out:
       workspace: the workspace, with the joints as factorised at the state.

@@ -30,7 +30,7 @@ def add_contacts(model, member_state, q, v, tangent, f, k_out, c_out):
     Constant:
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
       tangent: whether tangents are asked for.
     Out, all added to:
       f (n,): forces and moments on the coordinates (N, N m).
@@ -73,7 +73,7 @@ def contact_switch(model, member_state, q, v, a, j, slopes):
     Constant:
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       j: the contact.
     Out:
       slopes (2, n): s_q / s', s_v / s' of its margin s.

@@ -94,7 +94,7 @@ def own_force(model, k, i, segment, t, member_state, q, v, a, row, row_rate):
       k, i: the block, and the member (padded).
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       row (2 D,): B_i over the freedoms of both bodies.
       row_rate (2 D,): its derivative by time; not set for an inerter.

@@ -254,7 +254,7 @@ def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       rel (n_pair, POSE): relative poses.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       who: the member or contact, as a column of `member_state`.
     Out:
       slopes (2, n): s_q / s', s_v / s'; zero at a knot of a curve, whose time makes no difference.
@@ -290,7 +290,7 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       i, k: the member (padded), and its block.
     Out:
       slopes (2, n): s_q / s', s_v / s'.

@@ -34,7 +34,7 @@ def add_inerters(model, segment, member_state, q, v, mass, f):
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
     Out:
       mass (n_pair, 2 D, 2 D): the mass (kg, kg m, kg m^2), set.
       f (n,): forces and moments on the coordinates (N, N m), to which -sum s b B^T (B' v) is added.
@@ -63,7 +63,7 @@ def inerter_force(model, k, i, q, v, a, row):
     Constant:
       model: the compiled scene.
       k, i: the block, and the member (padded).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       row (2 D,): B over the coordinates of both bodies.
     """
@@ -105,7 +105,7 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       segment, t: segment of `model.times`, and time in it (s).
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
       tangent: whether workspace.k, .c and .turn are asked for.
     In and out:
       workspace: the workspace. Set are f (N, N m), turned, and, of the pairs that carry more than joints, rel and sums.

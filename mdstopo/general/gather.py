@@ -37,7 +37,7 @@ def add_design(model, segment, t, member_state, q, v, a, z, weight, out, work):
       model: the compiled scene.
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       z (n,): virtual displacements.
       weight: of the stored energy.
     Out:
@@ -153,7 +153,7 @@ def explicit_part(model, segment, j, who, t, member_state, q, v, a, scale, out):
       j, who: the response, and the number of the member in its group.
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       scale: factor of df*.
     Out:
       out (M_padded + P,): scale times the derivative of f* by alpha^mu and by parameters, added to.
@@ -177,7 +177,7 @@ def force_sign(model, segment, j, who, t, member_state, q, v, a):
       j, who: the response, and the number of the member in its group.
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     """
     if model.response[j, KIND] != MEMBER_FORCE:
         return 1.0
@@ -196,7 +196,7 @@ def _add_laws(model, segment, j, who, t, member_state, q, v, a, scale, out):
       j, who: the response, which names the group, and the number of the member in it.
       segment, t: segment of `model.times`, and time in it (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; per s; per s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       scale: factor of the forces.
     Out:
       out (M_padded,): added to.

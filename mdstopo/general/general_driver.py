@@ -291,7 +291,7 @@ class GeneralDriver:
         steps: "GeneralSteps | None" = None,
         who: int = -1,
         rates: bool = True,
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    ) -> tuple[tuple[FloatArray, FloatArray], FloatArray, FloatArray]:
         """States and a response anywhere on the motion.
 
         j: the response; -1: states alone.
@@ -302,7 +302,7 @@ class GeneralDriver:
         who: the member whose force is looked at; -1: at each place the one with the largest.
         rates: whether rates are wanted; without, they may be meaningless.
 
-        Returns q, v, a (3, K, n), multipliers (K, n_row + n_driven), and (K, 3) value, rate, member.
+        Returns q (K, n_q) with v, a (2, K, n), multipliers (K, n_row + n_driven), and (K, 3) value, rate, member.
         """
         model = self.scene.model
         packed, limits, room, room_ints, member_state = (
@@ -317,7 +317,7 @@ class GeneralDriver:
             self.entry.TAG, *packed, self.method.tables, limits, count, room, room_ints, member_state, exact, rates, j,
             who, places, q, out, lam, seen, self.work,
         )  # fmt: skip
-        return np.stack([q, *out]), lam, seen
+        return (q, out), lam, seen
 
     @property
     def _multipliers(self) -> int:
@@ -469,11 +469,9 @@ class GeneralDriver:
 
     def packed_start(self) -> tuple[FloatArray, FloatArray]:
         """Coordinates (n_q,) and velocities (n,) at the start, as kernels have them: copies."""
-        model = self.scene.model
-        begin = len(model.mass)
-        ends = np.cumsum([begin, len(model.q0), len(model.v0)])
-        q0, v0 = np.split(self._packed[1][: ends[-1]], ends[:-1])[1:]
-        return q0.copy(), v0.copy()
+        model, floats = self.scene.model, self._packed[1]
+        at_v = len(model.mass) + len(model.q0)
+        return floats[len(model.mass) : at_v].copy(), floats[at_v : at_v + len(model.v0)].copy()
 
     def _explain(self, code: int, time: float) -> str:
         if code == OK:
@@ -492,10 +490,10 @@ class GeneralDriver:
 
     def states(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Times, coordinates and velocities in the driver's room, with the room for more behind them."""
-        steps, model = int(self.limits[1]) + 1, self.scene.model
-        ends = np.cumsum([steps, steps * len(model.q0), steps * len(model.v0)])
-        t, q, v = np.split(self.room[: ends[-1]], ends[:-1])
-        return t, q.reshape(steps, -1), v.reshape(steps, -1)
+        steps, model, room = int(self.limits[1]) + 1, self.scene.model, self.room
+        at_v = steps + steps * len(model.q0)
+        end = at_v + steps * len(model.v0)
+        return room[:steps], room[steps:at_v].reshape(steps, -1), room[at_v:end].reshape(steps, -1)
 
     def _steps_until(self, time: float) -> int:
         return int(np.argmin(np.abs(self.states()[0] - time)))
@@ -551,8 +549,8 @@ class GeneralSteps:
         fraction = (times - self.t[step]) / (self.t[step + 1] - self.t[step])
         fraction[times == self.t[step + 1]] = 1.0
         places = np.stack([step.astype(np.float64), fraction], axis=1)
-        out, solved, _ = self._driver.sample_response(-1, places, True, self.count, self)
-        return out, self._all_rows(out[0], solved)
+        (q, out), solved, _ = self._driver.sample_response(-1, places, True, self.count, self)
+        return np.stack([q, *out]), self._all_rows(q, solved)
 
     def at(self, times: FloatArray) -> FloatArray:
         """q, v, a (3, T, n) at times (T,) within what was simulated."""

@@ -23,6 +23,7 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
     """The cubic between the ends of step k, and its derivative; returns k.
 
     Constant:
+      model: the compiled scene.
       history, k, c: the history of steps, the step, and a fraction of it.
     Out:
       q (n_q,), v (n,): coordinates and velocities.
@@ -39,6 +40,7 @@ def beside(tag, model, history, k, c, e, q, v, a, q_out, v_out):
     """The cubic of step k, a little later than at fraction c.
 
     Constant:
+      model: the compiled scene.
       history, k, c: the history of steps, the step, and a fraction of it.
       e: how much later (s); below 0: earlier.
     Out:

@@ -169,6 +169,12 @@ def _products(
 
     Of each: the entry that it is added to; where the slopes of two rows by the coordinates of one body begin among
     those of all joints; and which of its coordinates is meant.
+
+    row (n_joint, rows): the number of each row among the solved ones, or -1.
+    meet (n_meet, 4): of `_meetings`.
+    order, envelope: of `_order_rows`.
+    slopes_at: where the slopes of a row of a joint begin.
+    each: freedoms of a body.
     """
     for j, side, k, other in meet.tolist():
         for r, s in product(range(row.shape[1]), repeat=2):

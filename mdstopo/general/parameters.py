@@ -54,7 +54,7 @@ def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row,
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       row (2 D,): slopes dDelta/dq by the coordinates of the two bodies (m/m, m/rad).
       row_rate (2 D,): their rates in time; of inerters untouched.
@@ -87,7 +87,7 @@ def add_parameters(model, segment, t, member_state, q, v, a, z, weight, out):
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       z (n,): virtual displacements at this state.
       weight: factor of the stored energy, that of design members.
     Out:
@@ -121,7 +121,7 @@ def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, s
       group, who: the group, and the number of the member in it.
       t: time (s).
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       scale: factor of the derivatives of f*.
     Out:
       out (M_padded + P,): added to behind the members.

@@ -91,7 +91,7 @@ def add_sets(model, segment, member_state, q, v, z, weight, out):
     In:
       segment: number of the stretch of time between two breakpoints.
       member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
+      q (n_q,), v (n,): coordinates and velocities.
       z (n,): virtual displacements at this state.
       weight: factor of the stored energy, that of design members.
     Out:
@@ -130,7 +130,7 @@ def add_explicit_sets(model, member_state, segment, j, who, t, q, v, a, bars, sc
       j: the response.
       who: number of the member in its group.
       t: time (s).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       bars (3, n): slopes of the response by q, v, a, which tell the sign of the force.
       scale: factor of the derivatives.
     Out:
@@ -178,7 +178,7 @@ def add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, scal
       j: the response.
       who: of a member force the number of the member in its group.
       t: time (s).
-      q, v, a (n,): coordinates, velocities, accelerations (m, rad; m/s, rad/s; m/s^2, rad/s^2).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       bars (3, n): slopes of the response by q, v, a.
       scale: factor of the derivatives.
     Out:

@@ -60,7 +60,7 @@ def project(model, scale, q, v, workspace, mu, nu):
       model: the compiled scene.
       scale: size of the scene (m).
     In place:
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s); driven ones are in place already.
+      q (n_q,), v (n,): coordinates and velocities; driven ones are in place already.
     Out:
       workspace: workspace of a balance (`accelerations.Workspace`).
         It holds the joints at the state that was found, and the factors of their matrix.

@@ -624,7 +624,16 @@ def _inerter_slopes(model, member_state, segment, who, j, sign, q, v, a, bars):
 
 @kernel
 def _shifted_force(model, k, i, which, d, size, q, v, a, row):
-    """`inerter_force` with freedom d of the coordinates (which = 0) or the velocities (1) shifted by a size."""
+    """`inerter_force` at coordinates or velocities of which one is shifted.
+
+    Constant:
+      model: the compiled scene.
+      k, i: the block, and the member (padded).
+      which, d, size: 0: coordinates, 1: velocities; the freedom, and by how much it is shifted.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      row (2 D,): scratch.
+    """
     shift = np.zeros(v.shape[0])
     if which == 0:
         shift[d] = size

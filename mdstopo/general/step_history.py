@@ -126,13 +126,15 @@ def keep_stage(history, o, t, q, v, a, lam, workspace, tangent):
     tangent: whether its tangents are stored, and the factors of the joints' matrix where these are kept.
     """
     history.when[o] = t
-    copy_vector(q, history.stage_q[o])
-    copy_vector(v, history.stage_v[o])
-    copy_vector(a, history.stage_a[o])
+    for d in range(q.shape[0]):
+        history.stage_q[o, d] = q[d]
+    for d in range(v.shape[0]):
+        history.stage_v[o, d] = v[d]
+        history.stage_a[o, d] = a[d]
     copy_vector(lam, history.lam[o])
     if not tangent:
         return
-    copy_vector(workspace.turn, history.turn[o])
+    _copy(workspace.turn, history.turn[o])
     damped = workspace.switches[DAMPED] != 0  # else nobody reads C
     apart = has_factors(history)
     for p in range(workspace.k.shape[0]):

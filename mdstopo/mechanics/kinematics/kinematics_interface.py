@@ -127,6 +127,7 @@ def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
     """Pull a cotangent of what `retract` gives back to what it is given.
 
     In:
+      model: the compiled scene.
       q, moved (n_q,): coordinates before and behind the shift.
       bar (n,): cotangent of those behind it.
     Out:
@@ -139,6 +140,7 @@ def retract_jvp(model, q, moved, dq, dshift, out):
     """Push changes through `retract`.
 
     In:
+      model: the compiled scene.
       q, moved (n_q,): coordinates before and behind the shift.
       dq, dshift (n,): changes of those before it and of the shift.
     Out:
@@ -151,6 +153,7 @@ def advance_coordinates(model, q, v, a, e, out):
     """Where bodies are after some time at constant accelerations.
 
     In:
+      model: the compiled scene.
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       e: the time (s); below 0 it leads back.
     Out:
@@ -171,6 +174,7 @@ def stage_state(model, table, h, i, q0, v0, q, v, a):
     """Coordinates and velocities of a stage of an explicit Runge-Kutta step.
 
     In:
+      model: the compiled scene.
       table (3, 17, 17): coefficients of the method (`integrators.runge_kutta_tables`).
       h: length of the step (s).
       i: number of the stage.
@@ -186,6 +190,7 @@ def end_state(model, table, s, h, q0, v0, q, v, a, q_end, v_end):
     """Coordinates and velocities at the end of an explicit Runge-Kutta step.
 
     In:
+      model: the compiled scene.
       table (3, 17, 17), s: coefficients of the method, and number of its stages.
       h: length of the step (s).
       q0 (n_q,), v0 (n,): coordinates and velocities at its start.
@@ -200,6 +205,7 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
     """The cotangent of a stage's accelerations, from those of what depends on them.
 
     In:
+      model: the compiled scene.
       table (3, 17, 17), h: coefficients of the method, and length of the step (s).
       j: number of the stage.
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
@@ -215,6 +221,7 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
     """Cotangents of a step's start, from those of its stages and its end.
 
     In:
+      model: the compiled scene.
       table (3, 17, 17), s, h: coefficients of the method, number of stages, length of the step (s).
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
       u, g (s, n): cotangents of these.
@@ -228,6 +235,7 @@ def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
     """Changes of a stage's coordinates and velocities.
 
     In:
+      model: the compiled scene.
       table (3, 17, 17), h: coefficients of the method, and length of the step (s).
       i: number of the stage.
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
@@ -242,6 +250,7 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
     """Changes of the end of a step.
 
     In:
+      model: the compiled scene.
       table (3, 17, 17), s, h: coefficients of the method, number of stages, length of the step (s).
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
       changes (s, 3, n): changes of the stages' coordinates, velocities, accelerations.
@@ -255,6 +264,7 @@ def cubic(model, c, h, q0, v0, q1, v1, q, v):
     """The cubic through both ends of a step, and its derivative.
 
     In:
+      model: the compiled scene.
       c, h: fraction of the step, and its length (s).
       q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at its start and its end.
     Out:
@@ -267,6 +277,7 @@ def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q
     """Pull cotangents of a cubic back to both ends of the step.
 
     In:
+      model: the compiled scene.
       c, h, q0, v0, q1, v1: as of `cubic`.
       bar_q, bar_v (n,): cotangents of the coordinates and velocities at c.
     Out:
@@ -279,6 +290,7 @@ def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
     """Push changes of both ends of a step to its cubic.
 
     In:
+      model: the compiled scene.
       c, h, q0, v0, q1, v1: as of `cubic`.
       end_dq, end_dv (n,): changes of the end's coordinates and velocities.
     In and out:
@@ -291,6 +303,7 @@ def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
     """The quintic through both ends of a step with their accelerations, and its derivative.
 
     In:
+      model: the compiled scene.
       c, h: fraction of the step, and its length (s).
       q0, q1 (n_q,), v0, v1, a0, a1 (n,): coordinates, velocities, accelerations at its start and its end.
     Out:
@@ -334,6 +347,7 @@ def turned_pose(model, p, turned, q, v, rel):
     """`relative_pose` of one pair, of bodies whose attitudes are known.
 
     In:
+      model: the compiled scene.
       p: the pair.
       turned (n_body, A): of `turn_bodies`.
       q (n_q,), v (n,): coordinates and velocities.
@@ -357,6 +371,7 @@ def add_pair_force(model, rel, p, force, first, out):
     """Add a force on the relative pose of a pair to the forces on its bodies.
 
     In:
+      model: the compiled scene.
       rel (n_pair, POSE): relative poses.
       p: the pair.
       force, first: the force is force[first : first + D].
@@ -370,6 +385,7 @@ def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
     """The tangents of a pair in the freedoms of its bodies.
 
     In:
+      model: the compiled scene.
       p: the pair.
       rel (n_pair, POSE): relative poses.
       sums (n_pair, SUMS): forces and tangents by relative poses (`strides.sums_size`).
@@ -377,6 +393,11 @@ def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
     Out:
       k_out, c_out (n_pair, 2 D, 2 D): of which [p] = -dF/dq and, if damped, -dF/dv are written.
     """
+    raise NotImplementedError
+
+
+def pair_matrix_vjp(model, p, m, z, bar):
+    """bar (n,) -= m^T z for the matrix m (2 D, 2 D) of pair p and z (n,)."""
     raise NotImplementedError
 
 
@@ -456,6 +477,7 @@ def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
     """Estimate what rounding leaves uncertain of how far each pair has moved.
 
     In:
+      model: the compiled scene.
       inverse (n,): inverse masses and inertias.
       rel (n_pair, POSE), v (n,): relative poses and velocities at the start.
       load (n,): of `gross_loads`.
@@ -497,7 +519,8 @@ def second_rate(model, i, r, acc):
 def stretch_between(model, p, i, turn_one, turn_two, q, v):
     """Elongation (m) and its rate (m/s), as `member_rows` has them, to the bit.
 
-    p: the pair.
+    model: the compiled scene.
+    p, i: the pair, and the member (padded).
     turn_one, turn_two: `turn_of` its bodies.
     q (n_q,), v (n,): coordinates and velocities.
     """
@@ -508,7 +531,9 @@ def member_rows(model, p, i, q, v, row, row_rate):
     """Elongation (m) and its rate (m/s), and the member's row B of the compatibility matrix.
 
     In:
-      p: the pair.
+      model: the compiled scene.
+      model: the compiled scene.
+      p, i: the pair, and the member (padded).
       q (n_q,), v (n,): coordinates and velocities.
     Out:
       row, row_rate (2 D,): B and dB/dt over the freedoms of both bodies.
@@ -517,9 +542,11 @@ def member_rows(model, p, i, q, v, row, row_rate):
 
 
 def inerter_row(model, q, v, i, p, row, row_rate):
-    """B of a member of pair p, and what accelerations do not change of the elongation's second derivative.
+    """B of a member, and what accelerations do not change of the elongation's second derivative.
 
     In:
+      model: the compiled scene.
+      p, i: the pair, and the member (padded).
       q (n_q,), v (n,): coordinates and velocities.
     Out:
       row (2 D,): B; zero where the member has no length.
@@ -534,6 +561,7 @@ def add_inerter_tangents(model, pair, lo, count, inertance, member_state, q, v, 
     """Slopes by coordinates and velocities of what inerters take, sum s b B^T d2Delta/dt2, at fixed a.
 
     Constant:
+      model: the compiled scene.
       pair, lo, count, inertance: the pair, the first of its inerters and how many they are, b of each (kg).
       member_state (3, columns): of which row 0 has s.
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
@@ -557,6 +585,7 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
     """Add the forces, energy and tangents of members of one law to the sums of their pair.
 
     In:
+      model: the compiled scene.
       code, p (PARAMETERS,): the law and its parameters.
       lo, count: the first member (padded), and how many there are.
       counted: whether their energy is looked at.
@@ -571,7 +600,16 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
 
 
 def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
-    """`member_sums` of springs with parameters p (3 or more,)."""
+    """`member_sums` of springs.
+
+    In:
+      model: the compiled scene.
+      p (3 or more,): k, c, preload of the law.
+      start, count: the first spring (padded), and how many there are.
+      counted, member_state, r, tangent: as of `member_sums`.
+    Out:
+      o (SUMS,): added to.
+    """
     raise NotImplementedError
 
 
@@ -579,6 +617,7 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
     """Add what members do to a derivative by alpha^mu at one state: f_i (b_i . u) + weight V_i, at unit strength.
 
     In:
+      model: the compiled scene.
       code, p, lo, count, t, value, member_state, r: as of `member_sums`.
       modes_of (columns,): mode of every member.
       u (D,): virtual change of the relative pose.
@@ -592,6 +631,7 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
 def spring_designs(model, p, lo, count, rel, u, pair, out):
     """`member_designs` of springs without damping and preload, at S poses rel (S, n_pair, POSE) at once.
 
+    model: the compiled scene.
     p (1 or more,): stiffness (N/m) and what else the law has. lo, count: the springs. pair: theirs.
     u (S, n_pair, D): virtual changes of the poses. out (M_padded or more,): added to.
     """
@@ -599,17 +639,33 @@ def spring_designs(model, p, lo, count, rel, u, pair, out):
 
 
 def spring_designs_of_rows(model, p, lo, count, rel, u, pair, room, out):
-    """`spring_designs` of any springs, for R rows with u (R, S, n_pair, D) and out (R, M_padded or more).
+    """`spring_designs` of any springs, for R rows.
 
-    room (4 S lanes,): scratch.
+    In:
+      model: the compiled scene.
+      model: the compiled scene.
+      p (3 or more,): k, c, preload of the law.
+      lo, count, pair: the first spring (padded), how many there are, and their pair.
+      rel (S, n_pair, POSE): poses.
+      u (R, S, n_pair, D): virtual changes of the poses, of each row.
+    Out:
+      out (R, M_padded or more): added to.
+      room (4 S lanes,): scratch.
     """
     raise NotImplementedError
 
 
 def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r, u, j, pair, seen, out):
-    """`member_designs` without energy, at pose j, for R rows with u (R, S, n_pair, D) and out (R, M_padded or more).
+    """`member_designs` without energy, at one pose of S, for R rows.
 
-    seen (D + 1, count or more): scratch.
+    In:
+      model: the compiled scene.
+      code, p, lo, count, t, value, member_state, r: as of `member_sums`.
+      u (R, S, n_pair, D): virtual changes of the poses, of each row.
+      j, pair: the pose, and the pair of the members.
+    Out:
+      out (R, M_padded or more): added to.
+      seen (D + 1, count or more): scratch.
     """
     raise NotImplementedError
 
@@ -631,6 +687,7 @@ def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
     """`accelerations.joints_vjp` of a joint whose first rows put two points together and whose others are linear.
 
     In:
+      model: the compiled scene.
       j: the joint.
       w (PLACES,), wd, wdd (2 D,): where its bodies are, their velocities and accelerations.
       lam (rows,): its multipliers.
@@ -653,6 +710,7 @@ def contact_rows(model, j, q, v, rows, rates):
     """Where the point of a contact is as seen from the edge, with slopes.
 
     In:
+      model: the compiled scene.
       j: the contact.
       q (n_q,), v (n,): coordinates and velocities.
     Out:
@@ -668,6 +726,7 @@ def add_contact_curvature(model, j, q, rows, n, t, k):
     """Add what the directions of a contact's forces change by with both bodies: N H_n + T H_t, H second derivatives.
 
     In:
+      model: the compiled scene.
       j: the contact.
       q (n_q,): coordinates.
       rows (2, 2 D): of `contact_rows`.
@@ -685,7 +744,9 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
     """Displacement, velocity or acceleration of a point of body b as seen from body r: a component or the norm.
 
     In:
-      order, component: `planar_points.DISPLACEMENT`, ...; X, Y, NORM, ACROSS.
+      model: the compiled scene.
+      order: of the derivative by time, 0 to 2.
+      component: `planar_points.X`, Y, NORM or ACROSS.
       at (2 or more,): the point in the frame of b (m).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
@@ -695,7 +756,16 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
 
 
 def angle_motion(model, order, b, r, q, v, a, bars):
-    """The angle of body b as seen from body r, or its first or second derivative; arguments as of `point_motion`."""
+    """The angle of body b as seen from body r, or its first or second derivative.
+
+    In:
+      model: the compiled scene.
+      order: of the derivative.
+      b, r: the bodies.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      bars (3, n): slopes by q, v, a, added to.
+    """
     raise NotImplementedError
 
 

@@ -136,7 +136,7 @@ def difference(model, after, before, out):
 
 @part
 def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
-    """The derivatives of a sum."""
+    """The derivatives of a sum; see `kinematics_interface.retract_vjp`."""
     for d in range(bar.shape[0]):
         bar_q[d] = bar[d]
         bar_shift[d] = bar[d]
@@ -144,7 +144,7 @@ def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
 
 @part
 def retract_jvp(model, q, moved, dq, dshift, out):
-    """The derivatives of a sum."""
+    """The derivatives of a sum; see `kinematics_interface.retract_jvp`."""
     for d in range(dq.shape[0]):
         out[d] = dq[d] + dshift[d]
 
@@ -174,7 +174,7 @@ def relative_pose(model, q, v, rel):
 
 @part
 def turned_pose(model, p, turned, q, v, rel):
-    """See `planar_poses.fill_pose`."""
+    """See `planar_poses.fill_pose`; see `kinematics_interface.turned_pose`."""
     one = model.pair[p, 0]
     two = model.pair[p, 1]
     fill_pose(model.pair, p, model.home, q, v, turned[one, 0], turned[one, 1], turned[two, 0], turned[two, 1], rel)
@@ -205,14 +205,30 @@ def pair_displacement(model, rel, p, dq, out):
 
 @part
 def add_pair_force(model, rel, p, force, first, out):
-    """See `planar_poses`."""
+    """See `planar_poses`; see `kinematics_interface.add_pair_force`."""
     add_force_of_pair(model.pair, rel, p, force[first], force[first + 1], force[first + 2], out)
 
 
 @part
 def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
-    """See `planar_forces`."""
+    """See `planar_forces`; see `kinematics_interface.pair_tangent`."""
     tangent_of_pair(p, rel, sums, damped, k_out, c_out)
+
+
+@part
+def pair_matrix_vjp(model, p, m, z, bar):
+    """Six numbers of z, which are read once."""
+    one = FREEDOMS * model.pair[p, 0]
+    two = FREEDOMS * model.pair[p, 1]
+    z0 = z[one]
+    z1 = z[one + 1]
+    z2 = z[one + 2]
+    z3 = z[two]
+    z4 = z[two + 1]
+    z5 = z[two + 2]
+    for j in range(2 * FREEDOMS):
+        d = one + j if j < FREEDOMS else two + j - FREEDOMS
+        bar[d] -= (m[0, j] * z0 + m[1, j] * z1 + m[2, j] * z2) + (m[3, j] * z3 + m[4, j] * z4 + m[5, j] * z5)
 
 
 @part
@@ -229,7 +245,7 @@ def turning_rate(model, rel, p):
 
 @part
 def load_tangent(model, segment, t, q, turn):
-    """See `planar_forces`: each body has one angle."""
+    """See `planar_forces`: each body has one angle; see `kinematics_interface.load_tangent`."""
     tangent_of_loads(model, segment, t, q, turn.reshape(turn.size))
 
 
@@ -280,7 +296,7 @@ def add_gross_force(model, rel, p, force, out):
 
 @part
 def place_joint(model, j, q, turned, w):
-    """See `joints.revolute.place_turned`."""
+    """See `joints.revolute.place_turned`; see `kinematics_interface.place_joint`."""
     one = model.joint[j, 1]
     two = model.joint[j, 2]
     turns_one = turned_from(model.home, one, turned[one, 0], turned[one, 1])
@@ -295,7 +311,7 @@ def place_joint_alone(model, j, q, w):
 
 @part
 def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
-    """See `joints.revolute.revolute_vjp`; what rows behind the first two have is constant."""
+    """The angles' part; see `kinematics_interface.point_joint_vjp`. Rows behind the first two have constant slopes."""
     row = model.row
     one = FREEDOMS * model.joint[j, 1] + 2
     two = FREEDOMS * model.joint[j, 2] + 2
@@ -315,7 +331,7 @@ _KERNELS = (
     planar_steps.stage_jvp, planar_steps.end_jvp, planar_steps.cubic, planar_steps.cubic_vjp, planar_steps.cubic_jvp,
     planar_steps.quintic, planar_drives.drive_state, planar_drives.drive_acceleration,
     turn_bodies, planar_members.turn_of, relative_pose, turned_pose, pose_acceleration, pair_displacement,
-    add_pair_force, pair_tangent, pair_stiffness, turning_rate, add_loads, load_tangent,
+    add_pair_force, pair_tangent, pair_matrix_vjp, pair_stiffness, turning_rate, add_loads, load_tangent,
     home_extent, deflection, largest_turn, motion_weights, noise_of, arm_of, gross_loads, add_gross_force,
     rounding_of_pairs,
     planar_members.stretch_of, planar_members.member_motion, planar_members.motion_of_ends, planar_members.member_work,

@@ -178,7 +178,7 @@ def angle_response(order, home_b, home_r, qb, vb, ab, qr, vr, ar, slope):
     return ab[2] - ar[2]
 
 
-@kernel
+@part
 def point_motion(model, order, component, at, b, r, q, v, a, bars):
     """Motion of a point of body b as body r sees it; see `kinematics_interface.point_motion`."""
     slope = np.empty((6, 3))
@@ -192,7 +192,7 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
     return value
 
 
-@kernel
+@part
 def angle_motion(model, order, b, r, q, v, a, bars):
     """Angle of body b as body r sees it; see `kinematics_interface.angle_motion`."""
     slope = np.empty((6, 3))

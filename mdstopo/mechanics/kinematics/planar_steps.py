@@ -17,8 +17,9 @@ NODES, END, END_RATE = range(3)
 @part
 def stage_state(model, table, h, i, q0, v0, q, v, a):
     """Coordinates and velocities of stage i; see `kinematics_interface.stage_state`."""
+    ahead = h * table[VECTORS, NODES, i]
     for d in range(q0.shape[0]):
-        q[i, d] = q0[d] + h * table[VECTORS, NODES, i] * v0[d]
+        q[i, d] = q0[d] + ahead * v0[d]
         v[i, d] = v0[d]
     for j in range(i):
         w = h * h * table[BY_STAGE, i, j]
