@@ -31,11 +31,15 @@ STRIDE = re.compile(
 NO_STRIDES = {
     ("accelerations.py", "3 * model.size[1] + 1"): "a banded matrix with room for its pivots",
     ("compile.py", "reshape(-1, 6)"): "columns of a response",
-    ("driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",
+    ("general_driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",
+    ("extremes.py", "reshape(count, SAMPLES, 3)"): "a response, its rate and its member",
     ("generalized_alpha_step.py", "range(3)"): "names of columns",
     ("layout.py", "reshape(-1, 3)"): "columns of a product",
     ("members.py", "range(3)"): "names of columns",
     ("model.py", "range(6)"): "names of columns",
+    ("peak_search.py", "range(3)"): "names of columns",
+    ("peak_search.py", "np.empty(3)"): "a response, its rate and its member",
+    ("peak_search.py", "np.empty((count, SAMPLES, 3))"): "a response, its rate and its member",
     ("responses.py", "range(3)"): "coordinates, velocities, accelerations; terms of a difference",
     ("settle.py", "range(3)"): "how often it lands",
 }
