@@ -9,7 +9,7 @@ from mdstopo.case.reader import read_case
 CASE = """
 format: 1
 time: {{end: 0.5}}
-bodies: {{a: {{mass: 2, inertia: 0.3, position: [0.4, 0], angular_velocity: 3}}}}
+bodies: {{a: {{mass: 2, inertia: 0.3, position: [0.4, 0], velocity: [0, 1.2], angular_velocity: 3}}}}
 joints: [{{type: revolute, bodies: [a, ground], at: [0, 0]}}]
 bushings: [{{bodies: [a, ground], at: [0, 0], stiffness: [0, 0, {stiffness}], damping: [0, 0, {damping}]}}]
 members:
