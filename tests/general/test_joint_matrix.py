@@ -7,10 +7,10 @@ import pytest
 from mdstopo.case.reader import read_case
 from mdstopo.general.accelerations import factor_matrix, joint_state, make_workspace, solve_unknowns
 from mdstopo.general.compile import compile_general
-from mdstopo.general.forces import turn_bodies
 from mdstopo.general.joint_matrix import decompose, substitute, weakest
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.switches import OF_JOINTS
+from mdstopo.mechanics.kinematics.planar import turn_bodies
 
 #: every kind of joint; two of them share both bodies, one body is driven in part and one in all
 MECHANISM = """
@@ -56,7 +56,7 @@ joints:
 def _solve(ints, floats, q, transposed, a, lam, jac, factors):
     model = unpack_general(ints, floats)
     workspace = make_workspace(model)
-    turn_bodies(q, workspace.turned)
+    turn_bodies(model, q, workspace.turned)
     joint_state(model, q, np.zeros_like(q), workspace)
     singular = factor_matrix(
         model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, transposed

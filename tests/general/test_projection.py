@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from mdstopo.general.accelerations import factor_matrix, joint_state, make_workspace
-from mdstopo.general.forces import turn_bodies
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.projection import swept
+from mdstopo.mechanics.kinematics.planar import turn_bodies
 from tests.general.test_joint_matrix import MECHANISM, model_of
 
 
@@ -15,7 +15,7 @@ from tests.general.test_joint_matrix import MECHANISM, model_of
 def _swept(ints, floats, h, x, y, jac):
     model = unpack_general(ints, floats)
     workspace = make_workspace(model)
-    turn_bodies(model.q0, workspace.turned)
+    turn_bodies(model, model.q0, workspace.turned)
     joint_state(model, model.q0, np.zeros_like(model.q0), workspace)
     factor_matrix(model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, True)
     jac[:] = workspace.jac
