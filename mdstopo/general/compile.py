@@ -23,7 +23,7 @@ from mdstopo.mechanics.kinematics.planar import PLANAR
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.compile import home_of
 from mdstopo.scene.loads import generalised_loads
-from mdstopo.scene.model import HOME_COS, VECTOR, FloatArray, IndexArray
+from mdstopo.scene.model import EXCESS, HOME_COS, L0, QX, QY, VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
 from mdstopo.scene.signals import breakpoints, segment_values
@@ -222,8 +222,8 @@ def _members(
                 padded = -(-count // VECTOR) * VECTOR
                 member = np.zeros((6, padded))
                 member[0:2, :count], member[2:4, :count] = p_local[part].T, q_local[part].T
-                member[4, :count] = group.length[part] if rest is None else rest
-                member[5, :count] = (length[part] - member[4, :count]) * (length[part] + member[4, :count])
+                member[L0, :count] = group.length[part] if rest is None else rest
+                member[EXCESS, :count] = (length[part] - member[L0, :count]) * (length[part] + member[L0, :count])
                 variable = first + int(part[0]) if group.design else -1
                 blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0])])
                 rows.append(laws.parameters(record, curves))
@@ -289,7 +289,7 @@ def _reach(
     reach = np.zeros(len(pairs))
     member = members["member"]
     for pair, start, stop, *_ in members["block"].tolist():
-        reach[pair] = max(reach[pair], float(np.hypot(member[2, start:stop], member[3, start:stop]).max()))
+        reach[pair] = max(reach[pair], float(np.hypot(member[QX, start:stop], member[QY, start:stop]).max()))
     ties: tuple[Any, ...] = (*case.joints, *case.bushings)
     for tie in ties:
         a, b = (index[name] for name in tie.bodies)

@@ -13,7 +13,18 @@ from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotang
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SCALE, SET, level_of, unscale_general
 from mdstopo.general.method_interface import step_forward
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START, unpack_general
+from mdstopo.general.model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    INERTER,
+    PAIR,
+    START,
+    VARIED_BLOCK,
+    VARIED_PLACE,
+    VARIED_VALUE,
+    unpack_general,
+)
 from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, carve_history, restore_modes
@@ -225,9 +236,9 @@ def _parameters_through_step(model, member_state, history, w, column, sets, by_s
                 for d in range(width):
                     spare[d] += value * matrix[b, d]
         for e in range(model.varied.shape[0]):
-            k = model.varied[e, 0]
-            place = model.varied[e, 1]
-            if model.varied[e, 2] != c - members or place > FREE_LENGTH or model.active[segment, k] == 0:
+            k = model.varied[e, VARIED_BLOCK]
+            place = model.varied[e, VARIED_PLACE]
+            if model.varied[e, VARIED_VALUE] != c - members or place > FREE_LENGTH or model.active[segment, k] == 0:
                 continue
             for j in range(history.index[w + 1, FIRST] - o):
                 for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
@@ -264,11 +275,11 @@ def shift_times(model, history, member_state, count, state, j, square, column):
     n = model.mass.shape[0]
     dv = np.empty(n)
     for e in range(model.varied.shape[0]):
-        if model.varied[e, 1] <= FREE_LENGTH:
+        if model.varied[e, VARIED_PLACE] <= FREE_LENGTH:
             continue
         does, drop = time_jump(model, history, member_state, count, state, e, j, square, dv)
         if does:
-            c = model.member.shape[1] + model.varied[e, 2]
+            c = model.member.shape[1] + model.varied[e, VARIED_VALUE]
             for d in range(n):
                 column[c, n + d] += dv[d]
             column[c, 4 * n] += drop
@@ -301,7 +312,7 @@ def jump(model, history, member_state, count, state, column, sets, drops, j, squ
                 later -= history.saltation[e, 0, d] * column[i, d] + history.saltation[e, 1, d] * column[i, n + d]
             if i >= members:
                 for entry in range(model.varied.shape[0]):
-                    if model.varied[entry, 2] == i - members:
+                    if model.varied[entry, VARIED_VALUE] == i - members:
                         later += event_slope(model, history, member_state, e, entry)
             if sets.shape[0] > 0:
                 later += time_forward(model, history, e, sets, i)

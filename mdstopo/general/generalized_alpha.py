@@ -42,7 +42,10 @@ from mdstopo.general.step_history import (
     OLD,
     PARENT,
     SEGMENT,
+    SET_AFTER,
+    SET_BEFORE,
     STATE,
+    TIME_BY_SET,
     carve_history,
     copy_vector,
     keep_state,
@@ -180,9 +183,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 history.event[events, OLD] = 0
                 history.event[events, NEW] = int(member_state[MODE, i])
                 history.event[events, GRAZES] = 0
-                history.kept[events, 0] = 0.0
-                history.kept[events, 1] = member_state[SET, i]
-                history.kept[events, 2] = 0.0
+                history.kept[events, SET_BEFORE] = 0.0
+                history.kept[events, SET_AFTER] = member_state[SET, i]
+                history.kept[events, TIME_BY_SET] = 0.0
                 history.saltation[events] = 0.0
                 events += 1
         member_state[MODE, member_state.shape[1] - 1] = events
@@ -208,7 +211,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
                     history.saltation[e] = 0.0
-                    history.kept[e, 2] = 0.0
+                    history.kept[e, TIME_BY_SET] = 0.0
         begin = t
         pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
         done = 0.0

@@ -33,6 +33,8 @@ PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET = range(8)
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
 #: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
 KIND, BODY, REFERENCE, COMPONENT, ORDER, SUBJECT = range(6)
+#: columns of `GeneralModel.varied`: the block, the parameter's place in its law, which value, whether a time at an end
+VARIED_BLOCK, VARIED_PLACE, VARIED_VALUE, VARIED_END = range(4)
 #: rows of `GeneralModel.member` behind the ends in body frames (counted from the last)
 MEMBER_FREE_LENGTH, MEMBER_EXCESS = -2, -1
 #: the law code of an inerter, which is no function of elongation and rate

@@ -26,9 +26,22 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.events import block_of
 from mdstopo.general.members import MODE, SCALE, SET, level_of, rate_of_row
-from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, INERTER, OFFSET, PAIR, START
+from mdstopo.general.model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    GROUP,
+    INERTER,
+    OFFSET,
+    PAIR,
+    START,
+    VARIED_BLOCK,
+    VARIED_END,
+    VARIED_PLACE,
+    VARIED_VALUE,
+)
 from mdstopo.general.responses import value_at
-from mdstopo.general.step_history import EVENTS, MEMBER, OLD, SEGMENT, STATE, restore_modes
+from mdstopo.general.step_history import EVENTS, MEMBER, OLD, SEGMENT, SET_BEFORE, STATE, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import inerter_row, member_rows
 from mdstopo.mechanics.laws.table import (
@@ -97,8 +110,8 @@ def add_parameters(model, segment, t, member_state, q, v, a, z, weight, out):
     row_rate = np.empty(pair_freedoms(model))
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
-        k = model.varied[e, 0]
-        place = model.varied[e, 1]
+        k = model.varied[e, VARIED_BLOCK]
+        place = model.varied[e, VARIED_PLACE]
         if place > FREE_LENGTH or model.active[segment, k] == 0:
             continue
         own = weight if model.block[k, DESIGN] >= 0 else 0.0
@@ -107,7 +120,7 @@ def add_parameters(model, segment, t, member_state, q, v, a, z, weight, out):
             by_force, by_energy = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
             pulled = rate_of_row(model, model.block[k, PAIR], row, z)
             total += member_state[SCALE, i] * (own * by_energy - by_force * pulled)
-        out[members + model.varied[e, 2]] += total
+        out[members + model.varied[e, VARIED_VALUE]] += total
 
 
 @kernel
@@ -130,15 +143,15 @@ def add_force_parameters(model, segment, group, who, t, member_state, q, v, a, s
     row_rate = np.empty(pair_freedoms(model))
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
-        k = model.varied[e, 0]
-        place = model.varied[e, 1]
+        k = model.varied[e, VARIED_BLOCK]
+        place = model.varied[e, VARIED_PLACE]
         own = who - model.block[k, OFFSET]
         if place > FREE_LENGTH or model.active[segment, k] == 0 or model.block[k, GROUP] != group:
             continue
         if own >= 0 and own < model.block[k, COUNT]:
             i = model.block[k, START] + own
             slope, _ = parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row, row_rate)
-            out[members + model.varied[e, 2]] += scale * member_state[SCALE, i] * slope
+            out[members + model.varied[e, VARIED_VALUE]] += scale * member_state[SCALE, i] * slope
 
 
 @kernel
@@ -148,8 +161,8 @@ def event_slope(model, history, member_state, event, e):
     0 where the parameter is not in the margin m of the member that switched, or where the time is given. The modes
     in member_state are perhaps changed to those just before the event.
     """
-    k = model.varied[e, 0]
-    place = model.varied[e, 1]
+    k = model.varied[e, VARIED_BLOCK]
+    place = model.varied[e, VARIED_PLACE]
     state = history.event[event, STATE]
     who = history.event[event, MEMBER]
     if place > FREE_LENGTH or state == 0 or block_of(model, who) != k:
@@ -166,7 +179,7 @@ def event_slope(model, history, member_state, event, e):
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
     x, rate = member_rows(model, model.block[k, PAIR], who, q, v, row, row_rate)
-    x -= history.kept[event, 0]
+    x -= history.kept[event, SET_BEFORE]
     code = model.block[k, CODE]
     mode = int(history.event[event, OLD])
     by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, model.curves)
@@ -207,7 +220,9 @@ def add_event(model, history, member_state, event, factor, out):
     if factor == 0.0:
         return
     for e in range(model.varied.shape[0]):
-        out[model.member.shape[1] + model.varied[e, 2]] += factor * event_slope(model, history, member_state, event, e)
+        out[model.member.shape[1] + model.varied[e, VARIED_VALUE]] += factor * event_slope(
+            model, history, member_state, event, e
+        )
 
 
 @kernel
@@ -216,11 +231,11 @@ def begins_or_ends(model, history, count, state, e):
 
     count is the number of steps: the number of the last state.
     """
-    place = model.varied[e, 1]
+    place = model.varied[e, VARIED_PLACE]
     if place < ACTIVE_FROM:
         return 0
-    k = model.varied[e, 0]
-    edge = model.varied[e, 3] != 0
+    k = model.varied[e, VARIED_BLOCK]
+    edge = model.varied[e, VARIED_END] != 0
     before = edge and state == count
     after = edge and state == 0
     if state > 0:
@@ -259,13 +274,13 @@ def time_jump(model, history, member_state, count, state, e, j, square, dv):
     Returns whether it does anything, and the derivative of the integral by that time (0 without one).
     """
     dv[:] = 0.0
-    which = model.varied[e, 2]
-    if e > 0 and model.varied[e - 1, 2] == which:
+    which = model.varied[e, VARIED_VALUE]
+    if e > 0 and model.varied[e - 1, VARIED_VALUE] == which:
         return False, 0.0
     shifted = np.zeros(model.varied.shape[0], np.int64)
     way = 0
     for other in range(e, model.varied.shape[0]):
-        if model.varied[other, 2] == which:
+        if model.varied[other, VARIED_VALUE] == which:
             shifted[other] = begins_or_ends(model, history, count, state, other)
             way = shifted[other] if shifted[other] != 0 else way
     if way == 0:
@@ -281,7 +296,7 @@ def time_jump(model, history, member_state, count, state, e, j, square, dv):
         sign = -way if side == 0 else way
         for other in range(e, model.varied.shape[0]):
             if shifted[other] != 0:
-                model.active[segment, model.varied[other, 0]] = 1 - side
+                model.active[segment, model.varied[other, VARIED_BLOCK]] = 1 - side
         solve_accelerations(
             model, member_state, segment, history.t[state], history.q[state].copy(),
             history.v[state].copy(), np.bool_(False), workspace, a, lam,
@@ -296,7 +311,7 @@ def time_jump(model, history, member_state, count, state, e, j, square, dv):
             drop += sign * (value * value if square else value)
     for other in range(e, model.varied.shape[0]):
         if shifted[other] != 0:
-            model.active[segment, model.varied[other, 0]] = 1
+            model.active[segment, model.varied[other, VARIED_BLOCK]] = 1
     return True, drop
 
 
@@ -322,7 +337,7 @@ def add_times(model, history, member_state, count, state, j, square, lam_v, rate
     """
     dv = np.empty(lam_v.shape[0])
     for e in range(model.varied.shape[0]):
-        if model.varied[e, 1] < ACTIVE_FROM:
+        if model.varied[e, VARIED_PLACE] < ACTIVE_FROM:
             continue
         does, drop = time_jump(model, history, member_state, count, state, e, j, square, dv)
         if not does:
@@ -332,4 +347,4 @@ def add_times(model, history, member_state, count, state, j, square, lam_v, rate
             total += rate
         for d in range(dv.shape[0]):
             total += lam_v[d] * dv[d]
-        out[model.member.shape[1] + model.varied[e, 2]] += total
+        out[model.member.shape[1] + model.varied[e, VARIED_VALUE]] += total

@@ -19,9 +19,35 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, KIND, OFFSET, PAIR, START, STOP, SUBJECT
+from mdstopo.general.model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    GROUP,
+    KIND,
+    OFFSET,
+    PAIR,
+    START,
+    STOP,
+    SUBJECT,
+    VARIED_BLOCK,
+    VARIED_END,
+    VARIED_PLACE,
+    VARIED_VALUE,
+)
 from mdstopo.general.responses import ENERGY, MEMBER_FORCE, member_force
-from mdstopo.general.step_history import EVENTS, FIRST, MEMBER, NEW, OLD, SEGMENT, STATE
+from mdstopo.general.step_history import (
+    EVENTS,
+    FIRST,
+    MEMBER,
+    NEW,
+    OLD,
+    SEGMENT,
+    SET_AFTER,
+    SET_BEFORE,
+    STATE,
+    TIME_BY_SET,
+)
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     freedoms,
@@ -197,7 +223,7 @@ def made_set(model, history, e):
     if slot < 0:
         return -1, -1
     made = law_makes_set(model.block[k, CODE], history.event[e, OLD], history.event[e, NEW])
-    if made or history.kept[e, 0] != history.kept[e, 1]:
+    if made or history.kept[e, SET_BEFORE] != history.kept[e, SET_AFTER]:
         return slot, k
     return -1, -1
 
@@ -210,7 +236,7 @@ def time_back(model, history, e, pulled, bar):
     """
     slot, _ = slot_of(model, history.event[e, MEMBER])
     if slot >= 0:
-        bar[slot] -= pulled * history.kept[e, 2]
+        bar[slot] -= pulled * history.kept[e, TIME_BY_SET]
 
 
 @kernel
@@ -220,20 +246,22 @@ def time_forward(model, history, e, sets, i):
     sets (slots, M_padded + P): derivatives of the sets (m) by each alpha^mu, then by each value; i: one of these.
     """
     slot, _ = slot_of(model, history.event[e, MEMBER])
-    return -history.kept[e, 2] * sets[slot, i] if slot >= 0 else 0.0
+    return -history.kept[e, TIME_BY_SET] * sets[slot, i] if slot >= 0 else 0.0
 
 
 @kernel
 def own_slope(model, history, e, entry, rate):
     """Slope of the set that event e has made by the parameter of an entry of `varied`; rate: dDelta/dt there."""
-    place = model.varied[entry, 1]
-    k = model.varied[entry, 0]
+    place = model.varied[entry, VARIED_PLACE]
+    k = model.varied[entry, VARIED_BLOCK]
     if place <= FREE_LENGTH:
         return law_set_slope(model.block[k, CODE], model.law[k], place)
     if place != ACTIVE_FROM:
         return 0.0
     state = history.event[e, STATE]
-    begins = model.active[history.index[state - 1, SEGMENT], k] == 0 if state > 0 else model.varied[entry, 3] != 0
+    begins = (
+        model.active[history.index[state - 1, SEGMENT], k] == 0 if state > 0 else model.varied[entry, VARIED_END] != 0
+    )
     return rate if begins else 0.0
 
 
@@ -246,8 +274,12 @@ def begins_divided(model, member_state, q, v, near):
     row = np.empty(pair_freedoms(model))
     row_rate = np.empty(pair_freedoms(model))
     for e in range(model.varied.shape[0]):
-        k = model.varied[e, 0]
-        if not law_remembers(model.block[k, CODE]) or model.varied[e, 1] > FREE_LENGTH or model.active[0, k] == 0:
+        k = model.varied[e, VARIED_BLOCK]
+        if (
+            not law_remembers(model.block[k, CODE])
+            or model.varied[e, VARIED_PLACE] > FREE_LENGTH
+            or model.active[0, k] == 0
+        ):
             continue
         p = model.law[k]
         for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
@@ -285,9 +317,9 @@ def sets_back(model, history, e, bar, lam_q, out):
     p = model.block[k, PAIR]
     _, rate = member_rows(model, p, history.event[e, MEMBER], history.q[s], history.v[s], row, row_rate)
     for entry in range(model.varied.shape[0]):
-        if model.varied[entry, 0] == k:
+        if model.varied[entry, VARIED_BLOCK] == k:
             own = own_slope(model, history, e, entry, rate)
-            out[model.member.shape[1] + model.varied[entry, 2]] += bar[slot] * own
+            out[model.member.shape[1] + model.varied[entry, VARIED_VALUE]] += bar[slot] * own
     for r in range(pair_freedoms(model)):
         lam_q[place_in_pair(model, model.block[k, PAIR], r)] += bar[slot] * row[r]
     bar[slot] = 0.0
@@ -337,8 +369,10 @@ def sets_forward(model, history, e, column, sets):
         for r in range(pair_freedoms(model)):
             sets[slot, i] += row[r] * column[i, place_in_pair(model, model.block[k, PAIR], r)]
     for entry in range(model.varied.shape[0]):
-        if model.varied[entry, 0] == k:
-            sets[slot, model.member.shape[1] + model.varied[entry, 2]] += own_slope(model, history, e, entry, rate)
+        if model.varied[entry, VARIED_BLOCK] == k:
+            sets[slot, model.member.shape[1] + model.varied[entry, VARIED_VALUE]] += own_slope(
+                model, history, e, entry, rate
+            )
 
 
 @kernel

@@ -10,7 +10,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.compiler.vector import lanes
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import SCALE, level_of, rate_of_row
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START
+from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START, VARIED_BLOCK, VARIED_PLACE, VARIED_VALUE
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.step_history import has_factors
 from mdstopo.general.strides import pair_freedoms
@@ -129,8 +129,8 @@ def _add_parameters(model, segment, history, at, member_state, z, j, out):
     total = np.empty(out.shape[0])
     members = model.member.shape[1]
     for e in range(model.varied.shape[0]):
-        k = model.varied[e, 0]
-        place = model.varied[e, 1]
+        k = model.varied[e, VARIED_BLOCK]
+        place = model.varied[e, VARIED_PLACE]
         if place > FREE_LENGTH or model.active[segment, k] == 0:
             continue
         total[:] = 0.0
@@ -142,4 +142,4 @@ def _add_parameters(model, segment, history, at, member_state, z, j, out):
             for m in range(out.shape[0]):
                 total[m] -= member_state[SCALE, i] * (slope * rate_of_row(model, model.block[k, PAIR], row, z[m, j]))
         for m in range(out.shape[0]):
-            out[m, members + model.varied[e, 2]] += total[m]
+            out[m, members + model.varied[e, VARIED_VALUE]] += total[m]

@@ -45,7 +45,10 @@ from mdstopo.general.step_history import (
     OLD,
     PARENT,
     SEGMENT,
+    SET_AFTER,
+    SET_BEFORE,
     STATE,
+    TIME_BY_SET,
     carve_history,
     copy_vector,
     has_factors,
@@ -269,10 +272,10 @@ def log_switches(
         history.event[events, OLD] = old
         history.event[events, NEW] = new
         history.event[events, GRAZES] = 1 if beyond < graze and kind > 0 else 0
-        history.kept[events, 0] = member_state[SET, who]
+        history.kept[events, SET_BEFORE] = member_state[SET, who]
         member_state[SET, who] += grown
-        history.kept[events, 1] = member_state[SET, who]
-        history.kept[events, 2] = by_set
+        history.kept[events, SET_AFTER] = member_state[SET, who]
+        history.kept[events, TIME_BY_SET] = by_set
         member_state[MODE, who] = new
         events += 1
         member_state[MODE, member_state.shape[1] - 1] = events
@@ -407,9 +410,9 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 history.event[events, OLD] = 0
                 history.event[events, NEW] = int(member_state[MODE, i])
                 history.event[events, GRAZES] = 0
-                history.kept[events, 0] = 0.0
-                history.kept[events, 1] = member_state[SET, i]
-                history.kept[events, 2] = 0.0
+                history.kept[events, SET_BEFORE] = 0.0
+                history.kept[events, SET_AFTER] = member_state[SET, i]
+                history.kept[events, TIME_BY_SET] = 0.0
                 history.saltation[events] = 0.0
                 events += 1
         member_state[MODE, member_state.shape[1] - 1] = events
@@ -447,7 +450,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     return NEEDS_ROOM, count, 0, t
                 for e in range(first, events):
                     history.saltation[e] = 0.0  # the time is given: it does not vary with the design
-                    history.kept[e, 2] = 0.0
+                    history.kept[e, TIME_BY_SET] = 0.0
         while t < end:
             where[0] = -1
             held = held + 1 if wanted * brake > BRAKED else 0

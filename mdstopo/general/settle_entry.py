@@ -7,7 +7,18 @@ from mdstopo.general.accelerations import joint_slopes, joint_state, make_worksp
 from mdstopo.general.direct import own_force
 from mdstopo.general.forces import general_forces
 from mdstopo.general.members import SCALE, scale_general, set_modes
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, PAIR, START, unpack_general
+from mdstopo.general.model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    INERTER,
+    PAIR,
+    START,
+    VARIED_BLOCK,
+    VARIED_PLACE,
+    VARIED_VALUE,
+    unpack_general,
+)
 from mdstopo.general.parameters import parameter_slopes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -137,8 +148,8 @@ def value_forces(ints, floats, alpha, member_state, q, out):
     rest(model, alpha, member_state, q, v)
     out[:] = 0.0
     for e in range(model.varied.shape[0]):
-        k = model.varied[e, 0]
-        place = model.varied[e, 1]
+        k = model.varied[e, VARIED_BLOCK]
+        place = model.varied[e, VARIED_PLACE]
         if place > FREE_LENGTH or model.active[0, k] == 0 or model.block[k, CODE] == INERTER:
             continue
         p = model.block[k, PAIR]
@@ -146,4 +157,4 @@ def value_forces(ints, floats, alpha, member_state, q, out):
             slope, _ = parameter_slopes(model, k, i, place, start, model.times[0], member_state, q, v, v, row, row_rate)
             slope *= member_state[SCALE, i]
             for r in range(pair_freedoms(model)):
-                out[model.varied[e, 2], place_in_pair(model, p, r)] -= slope * row[r]
+                out[model.varied[e, VARIED_VALUE], place_in_pair(model, p, r)] -= slope * row[r]

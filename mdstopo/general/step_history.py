@@ -17,6 +17,8 @@ from mdstopo.scene.model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES = range(5)
+#: columns of `kept`
+SET_BEFORE, SET_AFTER, TIME_BY_SET = range(3)
 
 #: what the lengths of arrays are, in terms of what `carve_history` is given
 SIZES = {
@@ -195,11 +197,11 @@ def restore_modes(history, happened, member_state):
         e -= 1
         if history.event[e, MEMBER] >= 0:
             member_state[MODE, history.event[e, MEMBER]] = history.event[e, OLD]
-            member_state[SET, history.event[e, MEMBER]] = history.kept[e, 0]
+            member_state[SET, history.event[e, MEMBER]] = history.kept[e, SET_BEFORE]
     while e < happened:
         if history.event[e, MEMBER] >= 0:
             member_state[MODE, history.event[e, MEMBER]] = history.event[e, NEW]
-            member_state[SET, history.event[e, MEMBER]] = history.kept[e, 1]
+            member_state[SET, history.event[e, MEMBER]] = history.kept[e, SET_AFTER]
         e += 1
     member_state[MODE, member_state.shape[1] - 1] = e
 

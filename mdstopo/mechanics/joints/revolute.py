@@ -6,6 +6,7 @@ Parameters: s_A (2), s_B (2), -, -, -, -, Phi at home (2). Used by the fixed joi
 from mdstopo.compiler.jit import part
 from mdstopo.mechanics.joints.kernels import AtHome, JointKernels
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
+from mdstopo.scene.model import HOME_X, HOME_Y
 
 #: places of w: x, y of a body and by what angle it has turned since home, for both; cos and sin of both angles psi;
 #: then what has changed since home: x and y of both, cos and sin of both
@@ -27,8 +28,8 @@ def place_turned(home, a, b, q, turns_a, turns_b, w):
     for side in range(2):
         body = a if side == 0 else b
         c, s, c_since, s_since = turns_a if side == 0 else turns_b
-        w[3 * side] = home[body, 0] + q[3 * body]
-        w[3 * side + 1] = home[body, 1] + q[3 * body + 1]
+        w[3 * side] = home[body, HOME_X] + q[3 * body]
+        w[3 * side + 1] = home[body, HOME_Y] + q[3 * body + 1]
         w[3 * side + 2] = q[3 * body + 2]
         w[6 + 2 * side] = c
         w[7 + 2 * side] = s

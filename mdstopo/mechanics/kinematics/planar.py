@@ -69,6 +69,7 @@ from mdstopo.mechanics.kinematics.planar_scales import (
 from mdstopo.mechanics.kinematics.planar_scales import (
     noise_of as noise_of_pair,
 )
+from mdstopo.scene.model import HOME_X, HOME_Y
 
 COORDINATES = FREEDOMS = ROWS = 3
 ROTATIONS = 1
@@ -254,7 +255,7 @@ def home_extent(model):
     """The largest of all |x| and |y|."""
     extent = 0.0
     for b in range(model.home.shape[0]):
-        extent = max(extent, abs(model.home[b, 0]), abs(model.home[b, 1]))
+        extent = max(extent, abs(model.home[b, HOME_X]), abs(model.home[b, HOME_Y]))
     return extent
 
 

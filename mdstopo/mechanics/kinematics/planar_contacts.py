@@ -6,6 +6,7 @@ the edge's first end and u its direction or normal. Their second derivatives hav
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
+from mdstopo.scene.model import HOME_X, HOME_Y
 
 
 @kernel
@@ -24,8 +25,8 @@ def contact_rows(model, j, q, v, rows, rates):
     qy = sb * c[4] + cb * c[5]
     wa = v[a + 2]
     wb = v[b + 2]
-    zx = home[two, 0] - home[one, 0] + (q[b] - q[a]) + qx
-    zy = home[two, 1] - home[one, 1] + (q[b + 1] - q[a + 1]) + qy
+    zx = home[two, HOME_X] - home[one, HOME_X] + (q[b] - q[a]) + qx
+    zy = home[two, HOME_Y] - home[one, HOME_Y] + (q[b + 1] - q[a + 1]) + qy
     vx = v[b] - v[a] - wb * qy
     vy = v[b + 1] - v[a + 1] + wb * qx
     for i in range(2):
@@ -68,8 +69,8 @@ def add_contact_curvature(model, j, q, rows, n, t, k):
     qx = cb * c[4] - sb * c[5]
     qy = sb * c[4] + cb * c[5]
     lever = ux * qx + uy * qy
-    zx = model.home[two, 0] - model.home[one, 0] + (q[b] - q[a]) + qx
-    zy = model.home[two, 1] - model.home[one, 1] + (q[b + 1] - q[a + 1]) + qy
+    zx = model.home[two, HOME_X] - model.home[one, HOME_X] + (q[b] - q[a]) + qx
+    zy = model.home[two, HOME_Y] - model.home[one, HOME_Y] + (q[b + 1] - q[a + 1]) + qy
     k[2, 2] += ux * zx + uy * zy
     k[2, 5] -= lever
     k[5, 2] -= lever

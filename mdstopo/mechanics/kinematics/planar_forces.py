@@ -1,7 +1,7 @@
 """Applied loads on bodies in a plane, and the tangents of loads and of what acts between the bodies of a pair."""
 
 from mdstopo.compiler.jit import inline, kernel, part
-from mdstopo.mechanics.kinematics.planar_poses import turned_body
+from mdstopo.mechanics.kinematics.planar_poses import COS_A, DX, DY, OMEGA_A, SIN_A, VX, VY, turned_body
 
 
 @part
@@ -80,10 +80,10 @@ def pair_tangent(p, rel, sums, damped, k_out, c_out):
       c_out (n_pair, 6, 6): of which [p] = -dF/dv is written, if damped.
     """
     o = sums[p]
-    ca = rel[p, 7]
-    sa = rel[p, 8]
-    wx = sa * rel[p, 0] + ca * rel[p, 1]
-    wy = sa * rel[p, 1] - ca * rel[p, 0]
+    ca = rel[p, COS_A]
+    sa = rel[p, SIN_A]
+    wx = sa * rel[p, DX] + ca * rel[p, DY]
+    wy = sa * rel[p, DY] - ca * rel[p, DX]
     # K_xi turned into global axes: rows and columns x, y, theta
     kxx, kxy, kyx, kyy = _turned(ca, sa, o[7], o[8], o[10], o[11])
     kxt = ca * o[9] - sa * o[12]
@@ -96,14 +96,14 @@ def pair_tangent(p, rel, sums, damped, k_out, c_out):
     ay = kyx * wx + kyy * wy - kyt
     at = ktx * wx + kty * wy - ktt
     if damped:
-        omega = rel[p, 9]
+        omega = rel[p, OMEGA_A]
         cxx, cxy, _, cyy = _turned(ca, sa, o[16], o[17], o[17], o[18])
         cxt = ca * o[19] - sa * o[20]
         cyt = sa * o[19] + ca * o[20]
         ctt = o[21]
         # -J R xi'_d
-        gx = sa * rel[p, 4] + ca * rel[p, 5]
-        gy = sa * rel[p, 5] - ca * rel[p, 4]
+        gx = sa * rel[p, VX] + ca * rel[p, VY]
+        gy = sa * rel[p, VY] - ca * rel[p, VX]
         ax += cxx * gx + cxy * gy
         ay += cxy * gx + cyy * gy
         at += cxt * gx + cyt * gy
@@ -130,7 +130,7 @@ def pair_tangent(p, rel, sums, damped, k_out, c_out):
     m[2, 1] += fx
     m[2, 3] += fy
     m[2, 4] -= fx
-    m[2, 2] += o[0] * rel[p, 0] + o[1] * rel[p, 1]
+    m[2, 2] += o[0] * rel[p, DX] + o[1] * rel[p, DY]
 
 
 @part

@@ -10,6 +10,7 @@ import math
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
+from mdstopo.scene.model import HOME_X, HOME_Y
 
 
 @kernel
@@ -22,8 +23,8 @@ def inerter_row(model, q, v, i, p, row, row_rate):
     b_body = 3 * two
     ca, sa, _, _ = turned_body(model.home, one, q[a_body + 2])
     cb, sb, _, _ = turned_body(model.home, two, q[b_body + 2])
-    home_x = model.home[two, 0] - model.home[one, 0]
-    home_y = model.home[two, 1] - model.home[one, 1]
+    home_x = model.home[two, HOME_X] - model.home[one, HOME_X]
+    home_y = model.home[two, HOME_Y] - model.home[one, HOME_Y]
     px = ca * m[0, i] - sa * m[1, i]
     py = sa * m[0, i] + ca * m[1, i]
     qx = cb * m[2, i] - sb * m[3, i]
@@ -65,8 +66,8 @@ def add_inerter_tangents(model, pair, lo, count, inertance, member_state, q, v, 
     ib = 3 * two
     ca, sa, _, _ = turned_body(model.home, one, q[ia + 2])
     cb, sb, _, _ = turned_body(model.home, two, q[ib + 2])
-    home_x = model.home[two, 0] - model.home[one, 0]
-    home_y = model.home[two, 1] - model.home[one, 1]
+    home_x = model.home[two, HOME_X] - model.home[one, HOME_X]
+    home_y = model.home[two, HOME_Y] - model.home[one, HOME_Y]
     wa = v[ia + 2]
     wb = v[ib + 2]
     ra = a[ia + 2]

@@ -28,6 +28,7 @@ from mdstopo.mechanics.laws.alike import (
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent, elongation_of
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
 from mdstopo.mechanics.laws.table import SPRING, law
+from mdstopo.scene.model import EXCESS, HOME_X, HOME_Y, L0, PX, PY, QX, QY
 
 
 @inline
@@ -41,10 +42,10 @@ def direction(member, i, dx, dy, c, s):
 
     Returns L (m), b = dL/dxi (3 numbers), 1 / L (1/m; 0 where there is no length) and R q (2 numbers, m).
     """
-    ax = c * member[2, i] - s * member[3, i]
-    ay = s * member[2, i] + c * member[3, i]
-    rx = dx + ax - member[0, i]
-    ry = dy + ay - member[1, i]
+    ax = c * member[QX, i] - s * member[QY, i]
+    ay = s * member[QX, i] + c * member[QY, i]
+    rx = dx + ax - member[PX, i]
+    ry = dy + ay - member[PY, i]
     r2 = rx * rx + ry * ry
     y = 1.0 / math.sqrt(r2) if r2 > ZERO_LENGTH_SQUARED else 0.0
     return r2 * y, y * rx, y * ry, y * (ax * ry - ay * rx), y, ax, ay
@@ -53,13 +54,13 @@ def direction(member, i, dx, dy, c, s):
 @inline
 def stretched(member, i, r, length):
     """Elongation Delta (m) of member i at the relative pose r (POSE,), where it has a length."""
-    x = member[2, i]
-    y = member[3, i]
-    rx = r[0] + (r[2] * x - r[3] * y) - member[0, i]
-    ry = r[1] + (r[3] * x + r[2] * y) - member[1, i]
+    x = member[QX, i]
+    y = member[QY, i]
+    rx = r[0] + (r[2] * x - r[3] * y) - member[PX, i]
+    ry = r[1] + (r[3] * x + r[2] * y) - member[PY, i]
     ux = r[10] + (r[12] * x - r[13] * y)
     uy = r[11] + (r[13] * x + r[12] * y)
-    return elongation_of(rx, ry, length, ux, uy, member[4, i], member[5, i])
+    return elongation_of(rx, ry, length, ux, uy, member[L0, i], member[EXCESS, i])
 
 
 @inline
@@ -94,10 +95,10 @@ def motion_of_ends(model, i, r):
     """Elongation and its rate of member i from its ends; see `kinematics_interface.motion_of_ends`."""
     c = r[2]
     s = r[3]
-    ax = c * model.member[2, i] - s * model.member[3, i]
-    ay = s * model.member[2, i] + c * model.member[3, i]
-    x = r[0] + ax - model.member[0, i]
-    y = r[1] + ay - model.member[1, i]
+    ax = c * model.member[QX, i] - s * model.member[QY, i]
+    ay = s * model.member[QX, i] + c * model.member[QY, i]
+    x = r[0] + ax - model.member[PX, i]
+    y = r[1] + ay - model.member[PY, i]
     length = math.sqrt(x * x + y * y)
     rate = (x * r[4] + y * r[5] + (ax * y - ay * x) * r[6]) / length if length > 0.0 else 0.0
     return stretched(model.member, i, r, length), rate
@@ -343,8 +344,8 @@ def member_between(model, i, one, two, q, turn_one, turn_two):
     qy = sb * m[2, i] + cb * m[3, i]
     wx = q[b] - q[a]
     wy = q[b + 1] - q[a + 1]
-    x = model.home[two, 0] - model.home[one, 0] + wx + qx - px
-    y = model.home[two, 1] - model.home[one, 1] + wy + qy - py
+    x = model.home[two, HOME_X] - model.home[one, HOME_X] + wx + qx - px
+    y = model.home[two, HOME_Y] - model.home[one, HOME_Y] + wy + qy - py
     ux = wx + (cb_since * m[2, i] - sb_since * m[3, i]) - (ca_since * m[0, i] - sa_since * m[1, i])
     uy = wy + (sb_since * m[2, i] + cb_since * m[3, i]) - (sa_since * m[0, i] + ca_since * m[1, i])
     length = math.sqrt(x * x + y * y)

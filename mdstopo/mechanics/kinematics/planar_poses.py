@@ -12,6 +12,7 @@ digits of members that hardly stretch.
 
 from mdstopo.compiler.jit import part
 from mdstopo.mechanics.angles import small_turn
+from mdstopo.scene.model import HOME_COS, HOME_SIN, HOME_X, HOME_Y
 
 #: columns of a relative pose: d, cos and sin of theta, xi', cos and sin of psi_A, omega_A, then what has changed since
 #: home: d - d_0, cos theta - cos theta_0, sin theta - sin theta_0
@@ -29,8 +30,8 @@ def turned_body(home, body, angle):
 @part
 def turned_from(home, body, m, s):
     """`turned_body` from cos - 1 and sin of the angle."""
-    c0 = home[body, 3]
-    s0 = home[body, 4]
+    c0 = home[body, HOME_COS]
+    s0 = home[body, HOME_SIN]
     dc = c0 * m - s0 * s
     ds = s0 * m + c0 * s
     return c0 + dc, s0 + ds, dc, ds
@@ -69,12 +70,12 @@ def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):
     two = pair[p, 1]
     a = 3 * one
     b = 3 * two
-    ca = home[one, 3]
-    sine_a = home[one, 4]
-    cb = home[two, 3]
-    sine_b = home[two, 4]
-    home_x = home[two, 0] - home[one, 0]
-    home_y = home[two, 1] - home[one, 1]
+    ca = home[one, HOME_COS]
+    sine_a = home[one, HOME_SIN]
+    cb = home[two, HOME_COS]
+    sine_b = home[two, HOME_SIN]
+    home_x = home[two, HOME_X] - home[one, HOME_X]
+    home_y = home[two, HOME_Y] - home[one, HOME_Y]
     c0 = ca * cb + sine_a * sine_b
     s0 = ca * sine_b - sine_a * cb
     # of the relative turn: cos - 1 and sin
@@ -95,20 +96,20 @@ def fill_pose(pair, p, home, q, v, ma, sa, mb, sb, rel):
     omega = v[a + 2]
     uc = c0 * m - s0 * s
     us = s0 * m + c0 * s
-    rel[p, 0] = dx
-    rel[p, 1] = dy
-    rel[p, 2] = c0 + uc
-    rel[p, 3] = s0 + us
-    rel[p, 4] = ca * u + sine_a * w + omega * dy
-    rel[p, 5] = ca * w - sine_a * u - omega * dx
-    rel[p, 6] = v[b + 2] - omega
-    rel[p, 7] = ca
-    rel[p, 8] = sine_a
-    rel[p, 9] = omega
-    rel[p, 10] = (ca * wx + sine_a * wy) + (dc * home_x + ds * home_y)
-    rel[p, 11] = (ca * wy - sine_a * wx) + (dc * home_y - ds * home_x)
-    rel[p, 12] = uc
-    rel[p, 13] = us
+    rel[p, DX] = dx
+    rel[p, DY] = dy
+    rel[p, COS] = c0 + uc
+    rel[p, SIN] = s0 + us
+    rel[p, VX] = ca * u + sine_a * w + omega * dy
+    rel[p, VY] = ca * w - sine_a * u - omega * dx
+    rel[p, VT] = v[b + 2] - omega
+    rel[p, COS_A] = ca
+    rel[p, SIN_A] = sine_a
+    rel[p, OMEGA_A] = omega
+    rel[p, UX] = (ca * wx + sine_a * wy) + (dc * home_x + ds * home_y)
+    rel[p, UY] = (ca * wy - sine_a * wx) + (dc * home_y - ds * home_x)
+    rel[p, UC] = uc
+    rel[p, US] = us
 
 
 @part
@@ -124,13 +125,13 @@ def pair_displacement(pair, rel, p, dq, out):
     """out (3,) = T dq for pair p: the change of its relative pose under a change dq (n,) of all coordinates."""
     a = 3 * pair[p, 0]
     b = 3 * pair[p, 1]
-    ca = rel[p, 7]
-    sa = rel[p, 8]
+    ca = rel[p, COS_A]
+    sa = rel[p, SIN_A]
     x = dq[b] - dq[a]
     y = dq[b + 1] - dq[a + 1]
     turn = dq[a + 2]
-    out[0] = ca * x + sa * y + rel[p, 1] * turn
-    out[1] = ca * y - sa * x - rel[p, 0] * turn
+    out[0] = ca * x + sa * y + rel[p, DY] * turn
+    out[1] = ca * y - sa * x - rel[p, DX] * turn
     out[2] = dq[b + 2] - turn
 
 
@@ -148,8 +149,8 @@ def add_pair_force(pair, rel, p, qx, qy, qt, out):
     """
     a = 3 * pair[p, 0]
     b = 3 * pair[p, 1]
-    ca = rel[p, 7]
-    sa = rel[p, 8]
+    ca = rel[p, COS_A]
+    sa = rel[p, SIN_A]
     fx = ca * qx - sa * qy
     fy = sa * qx + ca * qy
     out[b] += fx
@@ -157,4 +158,4 @@ def add_pair_force(pair, rel, p, qx, qy, qt, out):
     out[b + 2] += qt
     out[a] -= fx
     out[a + 1] -= fy
-    out[a + 2] += qx * rel[p, 1] - qy * rel[p, 0] - qt
+    out[a + 2] += qx * rel[p, DY] - qy * rel[p, DX] - qt
