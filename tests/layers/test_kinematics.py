@@ -42,6 +42,7 @@ NO_STRIDES = {
     ("peak_search.py", "np.empty((count, SAMPLES, 3))"): "a response, its rate and its member",
     ("responses.py", "range(3)"): "coordinates, velocities, accelerations; terms of a difference",
     ("settle.py", "range(3)"): "how often it lands",
+    ("step_history.py", "range(3)"): "names of columns",
 }
 #: modules that take something of the plane itself, and what
 OF_THE_PLANE = {
