@@ -182,7 +182,7 @@ class BundleMethod:
         steepest = float(own.steepest[own.group == 0].max(initial=0.0))
         if np.isnan(state.kkt):
             penalty = np.maximum(state.penalty, self.first_penalty(own) if len(state.penalty) else 0.0) * BOUND
-            unit = steepest if state.restoring else residual_unit(state, steepest)
+            unit = steepest if state.restoring else residual_unit(state, _steepness_of_highest(own), steepest)
             state.kkt = self.model.residual(own, state.alpha, penalty, unit)
         reach = state.trust, self.settings.number("move_limit")
         around = self.model.around(state.alpha, reach, state.steps, state.changes, max(steepest, 1e-300))
@@ -285,6 +285,13 @@ class BundleMethod:
             some = rows.distance > 0.0
             over = (rows.values() - levels[rows.group])[some] / rows.distance[some] ** 2
             np.maximum.at(state.concavity, rows.group[some], over)
+
+
+def _steepness_of_highest(own: Bundle) -> float:
+    """The largest gradient entry of the highest row of the objective: lower rows, which may not compete at all, may be
+    steeper by far."""
+    rows = np.flatnonzero(own.group == 0)
+    return float(own.steepest[rows[own.values()[rows].argmax()]]) if len(rows) else 0.0
 
 
 def _is_null_step(seen: Bundle, here: Floats, values: Floats, there: Floats) -> bool:

@@ -36,6 +36,8 @@ FLOOR = 1e-5
 MATCH_COSINE = 0.5
 #: how much a rejected trial shrinks the box where its rows tell what stood in the way
 NULL_STEP_SHRINK = 0.7
+#: how far a row may lie below the highest, or from its limit, to compete in the residual, in largest gradient entries
+NEAR = 1e-3
 #: a violation below this share of the tolerance is none
 NOTHING = 1e-3
 
@@ -255,8 +257,9 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepe
     """The projected KKT residual at x, relative to the largest gradient entry `steepest`.
 
     own: the iterate's rows; penalty (J,): bounds of the constraints' multipliers. The multipliers are those of the
-    proximal step, whose curvature is that entry: they make the residual all but least. It is the largest of: what a
-    step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
+    proximal step, whose curvature is that entry: they make the residual all but least. Where that step is long, rows
+    that do not compete here stop it; so it is tried without them, too, and the smaller residual told. It is the largest
+    of: what a step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
     the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
     """
     if steepest == 0.0:
@@ -265,9 +268,25 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepe
         np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
         np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,
     )  # fmt: skip
+    found = _residual_with(lines, x, space, penalty, steepest)
+    near = _gaps(lines) <= NEAR * steepest
+    if near.all() or not (near & (lines.group == 0)).any():
+        return found
+    return min(found, _residual_with(lines.subset(near), x, space, penalty, steepest))
+
+
+def _residual_with(lines: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float) -> float:
+    """The residual with the multipliers of the proximal step of these lines, as `residual` has it."""
     flat = Curvature.diagonal_of(np.full(len(x), steepest))
     trial = subproblem(lines, x, space, (space.lower, space.upper), penalty, flat)
     return residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
+
+
+def _gaps(lines: Bundle) -> Floats:
+    """How far the lines (K,) are from carrying a multiplier: below the highest of the objective, or from the limit."""
+    values = lines.values()
+    objective = lines.group == 0
+    return np.where(objective, values.max(initial=-np.inf, where=objective) - values, np.abs(values))
 
 
 def residual_of(
@@ -286,8 +305,6 @@ def residual_of(
     """
     gradient = (multipliers @ _matrix(lines) + linear @ space.linear.A) / steepest
     moved = float(np.abs(x - np.clip(x - gradient, space.lower, space.upper)).max(initial=0.0))
-    values = lines.values()
-    objective = lines.group == 0
-    gaps = multipliers * np.where(objective, values.max(initial=-np.inf, where=objective) - values, np.abs(values))
+    gaps = multipliers * _gaps(lines)
     slack = np.where(space.linear.equal, 0.0, np.abs(linear * space.linear.excess(x)))
-    return max(moved, float(gaps.sum() + slack.sum()) / steepest, abs(1.0 - float(multipliers[objective].sum())))
+    return max(moved, float(gaps.sum() + slack.sum()) / steepest, abs(1.0 - float(multipliers[lines.group == 0].sum())))

@@ -169,6 +169,12 @@ def _determinant(x: Floats) -> Floats:
     return np.asarray((x[:, 0] - size) * (x[:, 0] + size))
 
 
+def _outside(x: Floats) -> float:
+    """How far points (K, 3) lie outside the cone, at most: where one is on its boundary to rounding the scaling fails,
+    and a step may leave the cone by far more."""
+    return float((np.sqrt(x[:, 1] ** 2 + x[:, 2] ** 2) - x[:, 0]).max(initial=0.0))
+
+
 def _product(a: Floats, b: Floats) -> Floats:
     """The cone's product a o b, (K, 3)."""
     return np.concatenate([(a * b).sum(axis=1, keepdims=True), a[:, :1] * b[:, 1:] + b[:, :1] * a[:, 1:]], axis=1)
@@ -262,6 +268,7 @@ class _Interior:
             residuals = self._residuals(point)
             gap = self._gap(point) / self.count
             worst = max((float(np.abs(r).max(initial=0.0)) for r in residuals), default=0.0)
+            worst = max(worst, _outside(point.s_norm), _outside(point.y_norm))
             score = max(gap / GAP, worst / RESIDUAL)
             if not np.isfinite(score):
                 break

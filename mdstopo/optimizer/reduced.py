@@ -16,6 +16,12 @@ import numpy as np
 from mdstopo.optimizer.curvature import Curvature
 from mdstopo.optimizer.problem import Floats, Ints
 
+#: slack over multiplier, in the scaled problem, below which a row is all but active
+ACTIVE = 1e-3
+
+#: passes after which the largest entry of each row of a system is near one (D. Ruiz, 2001)
+SCALINGS = 4
+
 #: dv (N,), de (J + 1,), dy (R,), da (m,)
 Step = tuple[Floats, Floats, Floats, Floats]
 
@@ -50,31 +56,45 @@ class Reduced(ABC):
 
 
 class ByVariables(Reduced):
-    """Rows eliminated: a symmetric system of the variables, the levels and the linear rows."""
+    """Rows eliminated but those that are all but active: a symmetric system of the variables, the levels, the linear
+    rows and the rows that are left.
+
+    The changes of the multipliers of eliminated rows are quotients by their S, which multiply the rounding of the
+    solution: of rows that are all but active nothing would be left of them.
+    """
 
     def factor(self, D: Floats, rows: Rows, L: Floats, E: Floats) -> None:
         n, g, m = self.n, self.groups, len(L)
         self.rows = rows
-        M = np.zeros((n + g + m, n + g + m))
-        self.whole = np.zeros((len(rows.S), n + g))
-        self.whole[:, :n] = rows.G
-        self.whole[np.arange(len(rows.S)), n + rows.level] = rows.C
-        M[: n + g, : n + g] = self.whole.T @ (self.whole / rows.S[:, None])
+        self.kept = rows.S < ACTIVE
+        whole = np.zeros((len(rows.S), n + g))
+        whole[:, :n] = rows.G
+        whole[np.arange(len(rows.S)), n + rows.level] = rows.C
+        self.gone, stay = whole[~self.kept], whole[self.kept]
+        self.weight = 1.0 / rows.S[~self.kept]
+        first, size = n + g + m, n + g + m + len(stay)
+        M = np.zeros((size, size))
+        M[: n + g, : n + g] = self.gone.T @ (self.gone * self.weight[:, None])
         M[:n, :n] += self.P.dense()
         M[np.arange(n), np.arange(n)] += D
         M[np.arange(n + 1, n + g), np.arange(n + 1, n + g)] += E
-        M[n + g :, :n] = self.A
-        M[:n, n + g :] = self.A.T
-        M[np.arange(n + g, n + g + m), np.arange(n + g, n + g + m)] = -L
+        M[n + g : first, :n] = self.A
+        M[:n, n + g : first] = self.A.T
+        M[first:, : n + g] = stay
+        M[: n + g, first:] = stay.T
+        M[np.arange(n + g, size), np.arange(n + g, size)] = -np.concatenate([L, rows.S[self.kept]])
         self.inverse = _Inverse(M)
 
     def solve(self, r_v: Floats, r_e: Floats, r_y: Floats, r_a: Floats) -> Step:
         n, g = self.n, self.groups
-        right = np.concatenate([r_v, r_e, r_a])
-        right[: n + g] += self.whole.T @ (r_y / self.rows.S)
+        right = np.concatenate([r_v, r_e, r_a, r_y[self.kept]])
+        right[: n + g] += self.gone.T @ (r_y[~self.kept] * self.weight)
         found = self.inverse.times(right)
-        dy = (self.whole @ found[: n + g] - r_y) / self.rows.S
-        return found[:n], found[n : n + g], dy, found[n + g :]
+        dy = np.empty(len(r_y))
+        dy[~self.kept] = (self.gone @ found[: n + g] - r_y[~self.kept]) * self.weight
+        first = n + g + len(r_a)
+        dy[self.kept] = found[first:]
+        return found[:n], found[n : n + g], dy, found[n + g : first]
 
 
 class ByRows(Reduced):
@@ -112,9 +132,10 @@ class _Inverse:
     """
 
     def __init__(self, M: Floats) -> None:
-        size = np.sqrt(np.abs(np.diag(M)))
-        largest = np.sqrt(np.abs(M).max(axis=1, initial=0.0))
-        self.scale = 1.0 / np.where(size > 0.0, size, np.where(largest > 0.0, largest, 1.0))
+        self.scale = np.ones(len(M))
+        for _ in range(SCALINGS):
+            largest = np.sqrt(np.abs(M * self.scale).max(axis=1, initial=0.0) * self.scale)
+            self.scale /= np.where(largest > 0.0, largest, 1.0)
         self.M = M * self.scale[:, None] * self.scale
         if not np.isfinite(self.M).all():
             raise np.linalg.LinAlgError

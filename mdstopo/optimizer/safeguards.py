@@ -45,10 +45,11 @@ GRADIENT_SHARE = 1e-5
 RESIDUAL_SHARE = 0.1
 
 
-def residual_unit(state: State, steepest: float) -> float:
+def residual_unit(state: State, steepest: float, steepest_row: float = 0.0) -> float:
     """What the KKT residual is relative to: the largest |dU/dalpha| here, `steepest`, or a share of the largest of any
-    iterate: at a smooth minimum inside the bounds the gradient itself vanishes. The largest is kept in the state."""
-    state.largest_gradient = max(state.largest_gradient, steepest)
+    iterate: at a smooth minimum inside the bounds the gradient itself vanishes. The largest is kept in the state, also
+    that of other rows, `steepest_row`."""
+    state.largest_gradient = max(state.largest_gradient, steepest, steepest_row)
     return max(steepest, GRADIENT_SHARE * state.largest_gradient)
 
 

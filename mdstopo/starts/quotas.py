@@ -1,5 +1,7 @@
 """Several starts in quotas: all go a little way, those that find what another found are dropped, the best go on.
 
+Those that begin at the best design do so one after the other: the next one at what the last one has made better.
+
 Which go on depends on the states alone, and is written into them (`State.dropped`): a resumed run, and one on any
 number of processes, decides alike. One that is resumed with another number of starts decides anew (`carried_over`).
 """
@@ -12,11 +14,14 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_count
-from mdstopo.optimizer.start_families import begins_at_best, best_run, family_of, rank
+from mdstopo.optimizer.start_families import Family, begins_at_best, best_run, family_of, rank
 from mdstopo.optimizer.state import State
 from mdstopo.starts.single_start import StartTask
 from mdstopo.status import RunStatus
 
+#: iterations after which a start that is far behind is dropped; and by how much it is then: the share of the best U, or
+#: of the bound of a limit, by which it is worse
+LOOK, LAGGING = 5, 1.0 / 3.0
 #: iterations after which it is decided who goes on; the share of the starts that do
 QUOTAS, SHARE = (20, 40), 1.0 / 3.0
 #: a start that has fallen by this share of U within so many iterations goes on, too
@@ -36,17 +41,61 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     if count == 1 or stage_count(case) > 1:
         yield [StartTask(index, families[index]) for index in range(count)]
         return
+    tolerance = case.optimizer.tolerance
     late = [index for index in range(count) if begins_at_best(families[index])]
     early = [index for index in range(count) if index not in late]
-    yield [StartTask(index, families[index], QUOTAS[0]) for index in early]
-    # of the others alone: a resumed run may have begun some of these, and must begin the rest as it would have
-    best = states[best_run([states[index] for index in early], case.optimizer.tolerance)]
-    for index in late:
-        yield [StartTask(index, families[index], QUOTAS[0], None if best is None else best.best_alpha)]
+    yield [StartTask(index, families[index], LOOK) for index in early]
+    if not any(_has_gone_on(states[index]) for index in early):
+        # a softened start begins at the optimum of another problem, and is slow to leave it
+        look([i for i in early if families[i] is not Family.SOFTENED], early, tolerance, states, keep)
+    yield [StartTask(index, families[index], QUOTAS[0]) for index in early if _goes_on(states[index])]
+    for place, index in enumerate(late):
+        # of those before alone: a resumed run may have begun later ones, and must begin the rest as it would have
+        before = [*early, *late[:place]]
+        best = states[before[best_run([states[each] for each in before], tolerance)]]
+        yield [StartTask(index, families[index], LOOK, None if best is None else best.best_alpha)]
+        if not _has_gone_on(states[index]):
+            look([index], [*before, index], tolerance, states, keep)
+        yield [StartTask(each, families[each], QUOTAS[0]) for each in (index,) if _goes_on(states[each])]
     for quota, following in zip(QUOTAS, (*QUOTAS[1:], None), strict=True):
-        drop(case.optimizer.tolerance, states, quota, keep)
-        going = [i for i, state in enumerate(states) if state is not None and not state.dropped]
+        drop(tolerance, states, quota, keep)
+        going = [i for i, state in enumerate(states) if _goes_on(state)]
         yield [StartTask(i, families[i], following) for i in going]
+
+
+def look(
+    asked: Sequence[int], others: Sequence[int], tolerance: float, states: States, keep: Callable[[int, State], None]
+) -> None:
+    """Mark those of the starts `asked` that are far behind the best of `others`. tolerance: of violations."""
+    best = states[others[best_run([states[each] for each in others], tolerance)]]
+    for index in asked:
+        state = states[index]
+        if state is not None and state.running and best is not None and lags(state, best, tolerance):
+            states[index] = marked = _dropped(state, "other starts were far better")
+            keep(index, marked)
+
+
+def lags(state: State, best: State, tolerance: float) -> bool:
+    """Whether a start is far behind the best, and nothing says that it will not be: U does not fall fast."""
+    if state.best_violation > tolerance:
+        left = best.best_plain if best.best_violation > tolerance else 0.0
+        return state.best_plain > left + LAGGING
+    worse = state.best_objective - best.best_objective > LAGGING * abs(best.best_objective)
+    return worse and not falls(state, 1)
+
+
+def _dropped(state: State, why: str) -> State:
+    reason = f"dropped after {state.iteration} iterations: {why}"
+    return replace(state, dropped=True, status=RunStatus.MAX_ITERATIONS, reason=reason)
+
+
+def _goes_on(state: State | None) -> bool:
+    return state is not None and not state.dropped
+
+
+def _has_gone_on(state: State | None) -> bool:
+    """Whether a start has been let go on beyond the first look."""
+    return state is not None and state.iteration > LOOK
 
 
 def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
@@ -67,8 +116,7 @@ def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, Stat
             kept.append(state)
         elif state.running:
             why = "another start came to the same" if twin else "other starts were better"
-            reason = f"dropped after {state.iteration} iterations: {why}"
-            states[index] = marked = replace(state, dropped=True, status=RunStatus.MAX_ITERATIONS, reason=reason)
+            states[index] = marked = _dropped(state, why)
             keep(index, marked)
 
 
@@ -77,7 +125,7 @@ def carried_over(case: Case, states: States, before: int) -> States:
 
     The end is to be that of a run that had so many starts from the beginning. So a start is taken over where that run
     would have it in the same state: it began alike, and nobody has decided about it as yet. One that has gone beyond
-    the first quota begins again, as it may be dropped there now; what it was there is no longer known.
+    the first look begins again, as it may be dropped there now; what it was there is no longer known.
     """
     if before == len(states):
         return states
@@ -85,7 +133,7 @@ def carried_over(case: Case, states: States, before: int) -> States:
     found: States = [None] * len(states)
     for index, state in enumerate(states[:before]):
         alike = family_of(index, before) is family_of(index, len(states))
-        if state is None or not alike or (in_quotas and state.iteration > QUOTAS[0]):
+        if state is None or not alike or (in_quotas and state.iteration > LOOK):
             continue
         found[index] = replace(state, dropped=False, status=RunStatus.RUNNING, reason="") if state.dropped else state
     return found
@@ -98,12 +146,12 @@ def near(state: State, best: State, tolerance: float) -> bool:
     return state.best_objective - best.best_objective <= BEHIND * abs(best.best_objective)
 
 
-def falls(state: State) -> bool:
-    """Whether U has lately been falling fast."""
+def falls(state: State, lately: int = LATELY) -> bool:
+    """Whether U has been falling fast within so many iterations."""
     objective = np.array(state.history.objective)
-    if not state.running or len(objective) <= LATELY:
+    if not state.running or len(objective) <= lately:
         return False
-    before, now = np.nanmin(objective[:-LATELY]), np.nanmin(objective)
+    before, now = np.nanmin(objective[:-lately]), np.nanmin(objective)
     return bool(before - now >= FALLING * abs(before))
 
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from mdstopo.optimizer.conic import Lines, Norms, Program, solve
 from mdstopo.optimizer.curvature import Curvature, learnt
 from mdstopo.optimizer.problem import LinearRows
+from mdstopo.optimizer.reduced import Rows, reduced
 
 
 def no_lines(n):
@@ -93,6 +94,60 @@ def test_the_solution_meets_its_optimality_conditions(n, lines, norms, groups, d
             assert multiplier[mine].sum() <= p.penalty[j - 1] * (1.0 + 1e-6)
             if top > 1e-6:
                 assert multiplier[mine].sum() == pytest.approx(p.penalty[j - 1], rel=1e-4)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_norms_are_solved_as_exactly_as_lines(seed):
+    """In a small box many norms are all but lines, and nearly all are active in turn: multipliers of active rows are
+    no quotients of rounding. A step that is wrong by 1e-9 of the box hides what the next one could gain."""
+    rng = np.random.default_rng(seed)
+    n, norms, box = 30, 50, 0.02
+    vector = rng.normal(size=(norms, 2))
+    vector *= 10.0 / np.hypot(vector[:, 0], vector[:, 1])[:, None] * (1.0 + 0.01 * rng.uniform(size=(norms, 1)))
+    group = np.arange(norms) % 2
+    p = Program(
+        np.full(n, -box), np.full(n, box), no_lines(n),
+        Norms(vector, rng.normal(size=(norms, n)), rng.normal(size=(norms, n)), 10.0 * group, group),
+        np.array([50.0]), LinearRows(np.ones((1, n)), np.zeros(1), np.array([True])),
+        Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), 1e-4 * np.eye(n)),
+    )  # fmt: skip
+    found = solve(p)
+    assert found.solved
+    assert found.gap < 1e-11
+    assert found.residual < 1e-11
+
+
+def test_multipliers_of_active_rows_are_no_quotients_of_rounding():
+    """Rows whose slack is all but nothing beside their multiplier meet the first two equations of the linear system."""
+    rng = np.random.default_rng(1)
+    n, count = 20, 30
+    rows = Rows(rng.normal(size=(count, n)), np.arange(count) % 2, np.full(count, -1.0),
+                np.where(np.arange(count) < 8, 1e-14, 1e4))  # fmt: skip
+    D, E, L, A = 10.0 ** rng.uniform(-8, 8, n), np.ones(1), np.zeros(1), np.ones((1, n))
+    flat = Curvature(np.zeros(n), np.zeros((n, 0)), np.zeros(0), np.eye(n))
+    system = reduced(flat, A, 2, count)
+    system.factor(D, rows, L, E)
+    right = [rng.normal(size=size) for size in (n, 2, count, 1)]
+    dv, de, dy, da = system.solve(*right)
+    C = np.zeros((count, 2))
+    C[np.arange(count), rows.level] = rows.C
+    size = max(1.0, float(np.abs(dy).max()))
+    assert np.abs((1.0 + D) * dv + rows.G.T @ dy + A.T @ da - right[0]).max() < 1e-9 * size
+    assert np.abs(np.array([0.0, 1.0]) * de + C.T @ dy - right[1]).max() < 1e-12 * size
+    assert np.abs(rows.G @ dv + C @ de - rows.S * dy - right[2]).max() < 1e-9 * size
+
+
+def test_no_solution_lies_outside_the_cones():
+    """Where a norm's slack is on the boundary to rounding the next step may leave the cone, at no gap."""
+    p = program(4, 4, 4, 1, False, False, 14)
+    p.lines.group[0] = 0
+    found = solve(p)
+    _, slope, _ = values(p, found.d)
+    multiplier = np.concatenate([found.lines, found.norms])
+    gradient = p.curvature.times(found.d) + multiplier @ slope + found.linear @ p.linear.A
+    inside = (found.d > p.lower) & (found.d < p.upper)
+    assert inside.any()
+    assert np.abs(gradient[inside]).max() < 1e-6
 
 
 @pytest.mark.parametrize("dense", [False, True])

@@ -2,8 +2,11 @@
 
 import numpy as np
 
+from mdstopo.optimizer.bundle import Bundle
+from mdstopo.optimizer.competing_rows import FeasibleSet, residual
 from mdstopo.optimizer.gsao import Gsao
 from mdstopo.optimizer.interface import run
+from mdstopo.optimizer.problem import LinearRows, Sample
 from mdstopo.settings.optimizer_presets import settings
 from mdstopo.status import RunStatus
 from tests.optimizer.toys import Toy
@@ -53,6 +56,24 @@ def test_a_smooth_minimum_inside_the_bounds_converges_although_its_gradient_vani
         state = ended(problem)
         assert state.status is RunStatus.CONVERGED
         assert np.allclose(state.best_alpha, [0.4, 0.6], atol=1e-5)
+
+
+def test_the_residual_is_relative_to_the_highest_row_and_not_to_a_steeper_one_that_does_not_compete() -> None:
+    """Row 1, far below, is a hundred thousand times as steep: x_0 has half of its range to go nevertheless."""
+    slopes = np.array([[1e-3, 0.0], [0.0, 100.0]])
+    problem = Toy(lambda x: (np.array([1.0, 0.5]) + slopes @ x, slopes), [0.5, 0.0], 0.0, 1.0)
+    problem.competes = True
+    assert Gsao(problem, settings()).start().kkt > 0.1
+
+
+def test_rows_that_do_not_compete_do_not_make_the_residual_larger_than_it_is() -> None:
+    """A flat row 1e-10 below the highest makes the design all but optimal. The highest alone would lead so far that
+    the third row, far below, stops it and seems to compete."""
+    slope = np.array([[1e-4, 0.0], [0.0, 0.0], [-80.0, 80.0]])
+    value = np.array([1.0, 1.0 - 1e-10, 0.2])
+    rows = Bundle.of(Sample(1.0, value, slope), np.arange(3))
+    space = FeasibleSet(np.zeros(2), np.ones(2), LinearRows.none(2), np.ones(2))
+    assert residual(rows, np.full(2, 0.5), space, np.zeros(0), 1e-3) < 2e-6
 
 
 def test_what_is_told_of_a_converged_run_is_the_design_that_has_converged() -> None:

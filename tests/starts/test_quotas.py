@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.optimizer.start_families import Family
 from mdstopo.optimizer.state import State
-from mdstopo.starts.quotas import QUOTAS, drop, rounds
+from mdstopo.starts.quotas import LOOK, QUOTAS, drop, lags, rounds
 from mdstopo.starts.single_start import LONG_FIRST_STEPS, make_optimizer
 from mdstopo.status import RunStatus
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
@@ -47,15 +47,58 @@ def test_what_one_start_finds_afterwards_does_not_change_who_goes_on(first: Stat
     assert decided(states) == [False, False, False]
 
 
-def test_starts_that_begin_at_the_best_do_so_at_that_of_the_others_also_when_resumed(first: State) -> None:
-    """Six starts, the last two from the best: one of these had begun when the run was stopped, and found better."""
+def ignore(_index: int, _state: State) -> None:
+    """Keep nothing."""
+
+
+def test_starts_that_begin_at_the_best_do_so_one_after_the_other_also_when_resumed(first: State) -> None:
+    """Six starts, the last two from the best: the second of these from what the first one has found, and neither from
+    what later ones had found when the run was stopped."""
     case = limited(hand_made_case(), 60)
     early: list[State | None] = [at(first, QUOTAS[0], value) for value in (0.3, 0.1, 0.2, 0.4)]
-    for late in (None, at(first, QUOTAS[0], 0.01)):
-        going = rounds(case, [*early, late, None], lambda index, state: None)
-        tasks = [next(going)[0] for _ in range(3)][1:]
-        assert [task.index for task in tasks] == [4, 5]
-        assert all(task.best is not None and task.best[0] == 0.1 for task in tasks)
+    later = at(first, QUOTAS[0], 0.01)
+    for states in ([*early, None, None], [*early, None, later], [*early, at(first, 3, 0.09), later]):
+        tasks = {}
+        for asked in rounds(case, states, ignore):
+            tasks |= {task.index: task for task in asked if task.index >= 4 and task.quota == LOOK}
+            if 4 in tasks and states[4] is None:
+                states[4] = at(first, LOOK, 0.09)
+            if 5 in tasks:
+                break
+        assert [None if task.best is None else task.best[0] for task in tasks.values()] == [0.1, 0.09]
+        assert [task.family for task in tasks.values()] == [Family.OTHER_FROM, Family.OTHER_TO]
+
+
+def falling(state: State, *objectives: float) -> State:
+    """The state with a history of these objectives."""
+    history = replace(state.history, objective=list(objectives))
+    return replace(at(state, LOOK, min(objectives)), history=history)
+
+
+def test_a_start_that_is_far_behind_at_the_first_look_is_dropped_unless_it_falls_fast(first: State) -> None:
+    best = falling(first, 9.0, 3.0, 3.0)
+    assert not lags(falling(first, 9.0, 3.9, 3.9), best, 0.0)
+    assert lags(falling(first, 9.0, 4.1, 4.1), best, 0.0)
+    assert not lags(falling(first, 9.0, 9.0, 4.1), best, 0.0)
+    broken = [replace(best, best_violation=1.0, best_plain=excess) for excess in (0.3, 0.4, 0.6)]
+    assert [lags(each, best, 0.0) for each in broken] == [False, True, True]
+    assert [lags(each, broken[0], 0.0) for each in broken] == [False, False, False]
+    assert lags(replace(best, best_violation=1.0, best_plain=0.7), broken[0], 0.0)
+
+
+def test_who_is_far_behind_is_decided_once_and_never_of_a_softened_start(first: State) -> None:
+    case = limited(hand_made_case(), 60)
+    slow = falling(first, 9.0, 5.0, 5.0)
+    states: list[State | None] = [falling(first, 9.0, 1.0, 1.0), slow, slow]
+    going = rounds(case, states, ignore)
+    assert [task.index for task in next(going)] == [0, 1, 2]
+    assert [task.index for task in next(going)] == [0, 1]
+    assert states[2] is not None
+    assert states[2].dropped
+    states = [at(first, LOOK + 1, 0.1), slow, slow]  # resumed: the first has gone on, so the others were to
+    going = rounds(case, states, ignore)
+    next(going)
+    assert [task.index for task in next(going)] == [0, 1, 2]
 
 
 def test_random_designs_begin_with_long_steps_where_the_case_states_none() -> None:
