@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-import mdstopo.engine
+import mdstopo.sensitivity.springs_driver
 from mdstopo.engine import Evaluator
 from mdstopo.scene import compile as scenes
 from mdstopo.scene.grids import STRIDE, row_of
@@ -196,5 +196,5 @@ def test_inner_peaks_of_a_grid_are_those_of_members_in_no_order(monkeypatch):
 
 def test_the_engine_makes_its_scenes_of_grids():
     # what the tests above replace is what the engine calls
-    assert mdstopo.engine.compile_members is scenes.compile_members
+    assert mdstopo.sensitivity.springs_driver.compile_members is scenes.compile_members
     assert scenes.row_of is row_of
