@@ -93,7 +93,8 @@ def main(asked: list[str]) -> None:
             continue
         with TemporaryDirectory() as folder:
             for line in commands(name, Path(folder), "--fronts" in asked):
-                run([sys.executable, "-m", "mdstopo", *line], check=True)
+                # a start that passes a limit ends `run` with an exit code, and is drawn all the same
+                run([sys.executable, "-m", "mdstopo", *line], check=line[0] != "run")
 
 
 if __name__ == "__main__":
