@@ -1,5 +1,7 @@
 """What Python calls for finished steps of a general scene: states and responses anywhere on the motion."""
 
+from typing import Any
+
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
@@ -9,7 +11,71 @@ from mdstopo.general.model import KIND, SUBJECT, unpack_general
 from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
+from mdstopo.general.structures import bundle
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, quintic
+
+#: a finished motion, and a workspace for responses on it: the scene, the method's coefficients, state of the members,
+#: steps and how many there are; one state with its multipliers, slopes of the response there, states beside it
+FIELDS = (
+    "model", "tables", "member_state", "history", "count", "work", "workspace", "q", "v", "a", "lam", "bars", "row_bar",
+    "near_q", "near", "ends_q", "ends",
+)  # fmt: skip
+
+
+class Motion:
+    """A finished motion inside kernels, whose parts `FIELDS` names; made by `finished`."""
+
+    def __init__(self, *_parts: Any) -> None: ...
+
+
+bundle(Motion, FIELDS)
+
+
+@kernel
+def finished(model, tables, member_state, history, count, work):
+    """A `Motion`, with its workspace.
+
+    model: the compiled scene.
+    tables: coefficients of the method.
+    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+    history: the history of steps (`StepHistory`).
+    count: number of steps.
+    work (WORK,): counts of work, added to.
+    """
+    n_q = model.q0.shape[0]
+    n = model.mass.shape[0]
+    n_row = model.size[0]
+    return Motion(
+        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n_q), np.empty(n),
+        np.zeros(n), np.zeros(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
+        np.empty((2, n_q)), np.empty((2, 2, n)),
+    )  # fmt: skip
+
+
+@kernel
+def evaluate_here(tag, motion, j, k, c, who, rates):
+    """Response j at the state in `motion.q` and `motion.v`, of fraction c of step k, whose modes are put in place.
+
+    tag: the method of integration (`method_interface`).
+    motion: the finished motion; a, lam, bars, row_bar and the workspace are overwritten.
+    j: the response; below 0 only the balance is made. k, c: the step, and the fraction of it.
+    who: the member whose force is meant; -1: the one with the largest.
+    rates: whether the rate is wanted (`responses.rated`).
+
+    Returns the value, its rate (per s) and the number of the member.
+    """
+    t = time_at(motion.history, k, c)
+    q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
+    model = motion.model
+    if j >= 0 and model.response[j, KIND] == MEMBER_FORCE and who < 0:
+        segment = motion.history.index[k, SEGMENT]
+        solve_accelerations(model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, lam)
+        who = largest_force(model, motion.member_state, segment, t, model.response[j, SUBJECT], q, v, a)
+    value, rate = rated(
+        tag, model, motion.member_state, motion.history, k, c, j, who, rates, t, q, v, motion.workspace, a,
+        lam, motion.bars, motion.row_bar, motion.near_q, motion.near,
+    )  # fmt: skip
+    return value, rate, who
 
 
 @entry
@@ -61,75 +127,22 @@ def sample_response(
     """
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
-    workspace = make_workspace(model)
-    n = model.mass.shape[0]
+    motion = finished(model, tables, member_state, history, count, work)
     n_row = model.size[0]
-    no = np.bool_(False)
-    bars = np.empty((3, n))
-    row_bar = np.empty(n_row)
-    near_q = np.empty(model.q0.shape[0])
-    near = np.empty((3, n))
-    ends_q = np.empty((2, model.q0.shape[0]))
-    ends = np.empty((2, 2, n))
     last = -1
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
-        q = out_q[i]
-        v = out[0, i]
-        a = out[1, i]
-        lam = lam_out[i, :n_row]
-        segment = history.index[k, SEGMENT]
-        last = go_to(
-            tag,
-            model,
-            tables,
-            member_state,
-            history,
-            count,
-            k,
-            c,
-            exact,
-            last,
-            workspace,
-            ends_q,
-            ends,
-            lam,
-            q,
-            v,
-            work,
-        )
-        t = time_at(history, k, c)
-        seen[i, 2] = who
-        if j >= 0 and model.response[j, KIND] == MEMBER_FORCE and who < 0:
-            solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
-            seen[i, 2] = largest_force(model, member_state, segment, t, model.response[j, SUBJECT], q, v, a)
-        value, rate = rated(
-            tag,
-            model,
-            member_state,
-            history,
-            k,
-            c,
-            j,
-            int(seen[i, 2]),
-            rates,
-            t,
-            q,
-            v,
-            workspace,
-            a,
-            lam,
-            bars,
-            row_bar,
-            near_q,
-            near,
-        )
-        seen[i, 0] = value
-        seen[i, 1] = rate
+        last = go_to(tag, motion, k, c, exact, last)
+        seen[i, 0], seen[i, 1], seen[i, 2] = evaluate_here(tag, motion, j, k, c, who, rates)
+        copy_vector(motion.q, out_q[i])
+        copy_vector(motion.v, out[0, i])
+        copy_vector(motion.a, out[1, i])
+        copy_vector(motion.lam, lam_out[i, :n_row])
         for m in range(model.driven.shape[0]):
             d = model.driven[m]
-            lam_out[i, n_row + m] = workspace.f[d] - model.mass[d] * a[d] - held_back(model, workspace, d, a, lam)
+            force = motion.workspace.f[d] - model.mass[d] * motion.a[d]
+            lam_out[i, n_row + m] = force - held_back(model, motion.workspace, d, motion.a, motion.lam)
 
 
 @entry
@@ -160,47 +173,20 @@ def compare(
     """
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
-    workspace = make_workspace(model)
-    n = model.mass.shape[0]
-    n_row = model.size[0]
+    motion = finished(model, tables, member_state, history, count, work)
+    workspace, near_q, near, lam = motion.workspace, motion.near_q, motion.near, motion.lam
     no = np.bool_(False)
     group = model.response[j, SUBJECT]
-    q = np.empty(model.q0.shape[0])
-    v = np.empty(n)
-    a = np.empty(n)
-    lam = np.empty(n_row)
-    near_q = np.empty(model.q0.shape[0])
-    near = np.empty((2, n))
-    ends_q = np.empty((2, model.q0.shape[0]))
-    ends = np.empty((2, 2, n))
     force = np.empty(top.shape[0])
     last = -1
-    for i in range(top.shape[0]):
-        top[i] = 0.0
+    top[:] = 0.0
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
         segment = history.index[k, SEGMENT]
-        last = go_to(
-            tag,
-            model,
-            tables,
-            member_state,
-            history,
-            count,
-            k,
-            c,
-            exact,
-            last,
-            workspace,
-            ends_q,
-            ends,
-            lam,
-            q,
-            v,
-            work,
-        )
+        last = go_to(tag, motion, k, c, exact, last)
         t = time_at(history, k, c)
+        q, v, a = motion.q, motion.v, motion.a
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
         group_forces(model, member_state, segment, t, group, q, v, a, force)
         for m in range(top.shape[0]):
@@ -229,33 +215,19 @@ def time_at(history, k, c):
 
 
 @kernel
-def go_to(
-    tag, model, tables, member_state, history, count, k, c, exact, last, workspace, ends_q, ends, lam, q, v, work
-):
-    """The state at a fraction of a step, with the modes of that step.
+def go_to(tag, motion, k, c, exact, last):
+    """Put the state at a fraction of a step into `motion.q` and `motion.v`, with the modes of that step.
 
-    Constant:
-      tag: the method of integration (`method_interface`).
-      model: the compiled scene.
-      tables: coefficients of the method.
-      count: number of steps.
-    In:
-      k, c: number of the step, and the fraction of it.
-      exact: whether the state inside it is that of the method's own motion; else of a quintic.
-      last: number of the step whose ends are in `ends`; -1: none.
-    In place:
-      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-        The modes become those of step k.
-      history: the history of steps (`StepHistory`).
-      ends_q (2, n_q), ends (2, 2, n): coordinates, and velocities and accelerations, of the quintic's start and end.
-    Out:
-      workspace: workspace of a balance (`accelerations.Workspace`).
-      lam (n_row,): scratch.
-      q (n_q,), v (n,): the state.
-      work (WORK,): counts of work, added to.
+    tag: the method of integration (`method_interface`).
+    motion: the finished motion; its workspace, lam and the ends of the quintic are overwritten.
+    k, c: number of the step, and the fraction of it.
+    exact: whether the state inside it is that of the method's own motion; else of a quintic.
+    last: number of the step whose ends the quintic has; -1: none.
 
-    Returns the number of the step whose ends are in `ends` now.
+    Returns the number of the step whose ends it has now.
     """
+    model, member_state, history, workspace = motion.model, motion.member_state, motion.history, motion.workspace
+    q, v, ends_q, ends = motion.q, motion.v, motion.ends_q, motion.ends
     no = np.bool_(False)
     h = history.t[k + 1] - history.t[k]
     segment = history.index[k, SEGMENT]
@@ -264,7 +236,7 @@ def go_to(
         copy_vector(history.q[k if c <= 0.0 else k + 1], q)
         copy_vector(history.v[k if c <= 0.0 else k + 1], v)
     elif exact:
-        point_of(tag, model, tables, member_state, history, count, k, c, no, workspace, q, v, work)
+        point_of(tag, model, motion.tables, member_state, history, motion.count, k, c, no, workspace, q, v, motion.work)
     else:
         if k != last:
             for e in range(2):
@@ -272,7 +244,7 @@ def go_to(
                 copy_vector(history.v[k + e], ends[e, 0])
                 solve_accelerations(
                     model, member_state, segment, history.t[k + e], ends_q[e], ends[e, 0], no, workspace, ends[e, 1],
-                    lam,
+                    motion.lam,
                 )  # fmt: skip
             last = k
         quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], q, v)

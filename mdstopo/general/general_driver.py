@@ -427,7 +427,7 @@ class GeneralDriver:
 
         return histories(self, alpha, j)
 
-    def watch(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
+    def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
         """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
         _, count, _ = self.run(alpha, False)
         t = self.states()[0][: count + 1]

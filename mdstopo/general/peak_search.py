@@ -3,16 +3,13 @@
 A motion is a sequence of steps, or of pieces of steps (`minima`), on each of which the response is smooth. Samples of a
 piece lie at its start, its end and in between (`SAMPLES`); between two of them where the rate falls through zero a peak
 is refined on the method's own motion. Where steps are many to a vibration, as those of a method without error control
-are, what lies between the ends of one is looked at only where a peak may be.
+are, what lies between the ends of one is sampled only where a peak may be.
 """
-
-from typing import Any
 
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.dense_output import go_to, time_at
+from mdstopo.general.dense_output import evaluate_here, finished, go_to, time_at
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
@@ -29,15 +26,14 @@ from mdstopo.general.extremes import (
     WHO,
 )
 from mdstopo.general.method_interface import derivatives
-from mdstopo.general.model import KIND, ORDER, SUBJECT, unpack_general
-from mdstopo.general.responses import MEMBER_FORCE, kinked, largest_force, rate_is_by_state, rated
+from mdstopo.general.model import ORDER, unpack_general
+from mdstopo.general.responses import kinked, rate_is_by_state
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
-from mdstopo.general.structures import bundle
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
 
 #: columns of a sample: value, rate, member
 G, DG, MEMBER = range(3)
-#: columns of a piece: the step, the fractions of it at which the piece begins and ends, the member looked at
+#: columns of a piece: the step, the fractions of it at which the piece begins and ends, the member meant
 PIECE_STEP, PIECE_LOW, PIECE_HIGH, PIECE_MEMBER = range(4)
 #: values or rates that differ by less than this, relative to the largest, differ by rounding
 ROUNDING = 1e-13
@@ -53,88 +49,23 @@ TRIALS = 60
 #: falls) at both ends, with rates that differ by at most one share, and a mean rate that is theirs to another
 MARGIN, ALIKE, EVEN = 4.0, 0.5, 0.1
 
-#: a finished motion, and room for looking at it: the scene, the method's coefficients, state of the members, steps and
-#: how many there are; one state with its multipliers, slopes of the response there, states beside it
-FIELDS = (
-    "model", "tables", "member_state", "history", "count", "work", "workspace", "q", "v", "a", "lam", "bars", "row_bar",
-    "near_q", "near", "ends_q", "ends",
-)  # fmt: skip
-
-
-class Motion:
-    """A finished motion inside kernels, whose parts `FIELDS` names; made by `finished`."""
-
-    def __init__(self, *_parts: Any) -> None: ...
-
-
-bundle(Motion, FIELDS)
-
-
-@kernel
-def finished(model, tables, member_state, history, count, work):
-    """A `Motion`, with room for looking at it.
-
-    model: the compiled scene.
-    tables: coefficients of the method.
-    member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
-    history: the history of steps (`StepHistory`).
-    count: number of steps.
-    work (WORK,): counts of work, added to.
-    """
-    n_q = model.q0.shape[0]
-    n = model.mass.shape[0]
-    n_row = model.size[0]
-    return Motion(
-        model, tables, member_state, history, count, work, make_workspace(model), np.empty(n_q), np.empty(n),
-        np.empty(n), np.empty(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
-        np.empty((2, n_q)), np.empty((2, 2, n)),
-    )  # fmt: skip
-
-
-@kernel
-def evaluate_here(tag, motion, j, k, c, who):
-    """Response j at the state in `motion.q` and `motion.v`, of fraction c of step k, whose modes are put in place.
-
-    tag: the method of integration (`method_interface`).
-    motion: the finished motion; a, lam, bars, row_bar and the workspace are overwritten.
-    j: the response. k, c: the step, and the fraction of it.
-    who: the member whose force is looked at; -1: the one with the largest.
-
-    Returns the value, its rate (per s) and the number of the member.
-    """
-    t = time_at(motion.history, k, c)
-    q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
-    model = motion.model
-    if model.response[j, KIND] == MEMBER_FORCE and who < 0:
-        segment = motion.history.index[k, SEGMENT]
-        solve_accelerations(model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, lam)
-        who = largest_force(model, motion.member_state, segment, t, model.response[j, SUBJECT], q, v, a)
-    value, rate = rated(
-        tag, model, motion.member_state, motion.history, k, c, j, who, np.bool_(True), t, q, v, motion.workspace, a,
-        lam, motion.bars, motion.row_bar, motion.near_q, motion.near,
-    )  # fmt: skip
-    return value, rate, who
-
 
 @kernel
 def evaluate_exactly(tag, motion, j, k, c, who):
     """Response j at fraction c of step k, on the method's own motion; returns what `evaluate_here` does.
 
     tag: the method of integration (`method_interface`).
-    motion: the finished motion, whose state becomes the one looked at.
+    motion: the finished motion, whose state becomes that one.
     j: the response. k, c: the step, and the fraction of it.
-    who: the member whose force is looked at; -1: the one with the largest.
+    who: the member whose force is meant; -1: the one with the largest.
     """
-    go_to(
-        tag, motion.model, motion.tables, motion.member_state, motion.history, motion.count, k, c, np.bool_(True), -1,
-        motion.workspace, motion.ends_q, motion.ends, motion.lam, motion.q, motion.v, motion.work,
-    )  # fmt: skip
-    return evaluate_here(tag, motion, j, k, c, who)
+    go_to(tag, motion, k, c, np.bool_(True), -1)
+    return evaluate_here(tag, motion, j, k, c, who, np.bool_(True))
 
 
 @kernel
 def sample_ends(tag, motion, j, seen, accelerations):
-    """Look at both ends of every step, on the step's own side.
+    """Evaluate a response at both ends of every step, on the step's own side.
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j: the response.
     seen (count, SAMPLES, 3): the first and the last sample of each step are written.
@@ -161,7 +92,7 @@ def sample_ends(tag, motion, j, seen, accelerations):
             copy_vector(history.v[k + e], motion.v)
             t = time_at(history, k, float(e))
             drive_state(motion.model, history.index[k, SEGMENT], t, motion.q, motion.v)
-            value, rate, who = evaluate_here(tag, motion, j, k, float(e), -1)
+            value, rate, who = evaluate_here(tag, motion, j, k, float(e), -1, np.bool_(True))
             seen[k, e * LAST, G] = value
             seen[k, e * LAST, DG] = rate
             seen[k, e * LAST, MEMBER] = who
@@ -170,7 +101,7 @@ def sample_ends(tag, motion, j, seen, accelerations):
 
 @kernel
 def sample_inside(tag, motion, j, k, seen, accelerations):
-    """Look at step k between its ends, on the quintic through these.
+    """Evaluate a response in step k between its ends, on the quintic through these.
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j, k: the response, the step.
     seen (SAMPLES, 3): all samples but the first and the last are written.
@@ -189,7 +120,7 @@ def sample_inside(tag, motion, j, k, seen, accelerations):
         c = i / LAST
         quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], motion.q, motion.v)
         drive_state(motion.model, history.index[k, SEGMENT], time_at(history, k, c), motion.q, motion.v)
-        value, rate, who = evaluate_here(tag, motion, j, k, c, -1)
+        value, rate, who = evaluate_here(tag, motion, j, k, c, -1, np.bool_(True))
         seen[i, G] = value
         seen[i, DG] = rate
         seen[i, MEMBER] = who
@@ -213,14 +144,14 @@ def has_no_peak(h, left, right, sign, limit):
 
 @kernel
 def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
-    """Look at every step of a motion.
+    """Sample a response on every step of a motion.
 
     Constant:
       tag: the method of integration (`method_interface`).
       motion: the finished motion.
       j: the response.
-      both: whether peaks of -g are looked for, too.
-      fine: whether steps are many to a vibration, so that not all have to be looked at inside.
+      both: whether peaks of -g are wanted, too.
+      fine: whether steps are many to a vibration, so that not all have to be sampled inside.
       closeness: how far below the highest a peak may be, relative to it.
     Out:
       seen (count, SAMPLES, 3): values, rates, members; NaN inside steps that are plain.
@@ -276,7 +207,9 @@ def add_row(rows, found, t, w, c, sample, sign):
 
 @kernel
 def evaluate_piece(tag, motion, j, who, pieces, w, c, sample):
-    """Look exactly at fraction c of piece w; without pieces of step w, at member `who` (-1: the leading one).
+    """Evaluate a response exactly at fraction c of piece w.
+
+    Without pieces w is a step, and `who` the member whose force is meant (-1: the largest).
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j: the response.
     pieces (P, 4): steps and fractions of them, or no rows. sample (3,): out, value, rate and member.
@@ -606,7 +539,7 @@ def peaks_of_pieces(
       count: number of steps.
       room, room_ints: flat arrays of the history of steps (`carve_history`).
       j: the response.
-      who: without pieces the member whose force is looked at; -1: at each place the one with the largest.
+      who: without pieces the member whose force is meant; -1: at each place the one with the largest.
       pieces (P, 4): step, fractions at its start and its end, member; no rows: the steps as they are.
       t (P + 1,): ends of the pieces (s).
       seen (P, SAMPLES, 3): value, rate (per s) and member at the samples.

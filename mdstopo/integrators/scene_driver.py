@@ -152,7 +152,7 @@ class SceneDriver(Protocol):
     def simulate(self, alpha: FloatArray) -> tuple[Status, Steps]:
         """Simulate a design; the steps come back in arrays of their own."""
 
-    def watch(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
+    def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
         """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
 
     def met(self, count: int) -> int:

@@ -41,7 +41,7 @@ class SpringsDriver(Driver):
 
         return histories(self, alpha)
 
-    def watch(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
+    def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
         """(n_resp, T): the stored energy of a design at times (T,), for each objective that looks at it."""
         from mdstopo.responses.stored_energy import stored_energy
 

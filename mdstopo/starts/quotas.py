@@ -21,7 +21,7 @@ from mdstopo.status import RunStatus
 
 #: iterations after which a start that is far behind is dropped; and by how much it is then: the share of the best U, or
 #: of the bound of a limit, by which it is worse
-LOOK, LAGGING = 5, 1.0 / 3.0
+TRIAL, LAGGING = 5, 1.0 / 3.0
 #: iterations after which it is decided who goes on; the share of the starts that do
 QUOTAS, SHARE = (20, 40), 1.0 / 3.0
 #: a start that has fallen by this share of U within so many iterations goes on, too
@@ -44,18 +44,18 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
     tolerance = case.optimizer.tolerance
     late = [index for index in range(count) if begins_at_best(families[index])]
     early = [index for index in range(count) if index not in late]
-    yield [StartTask(index, families[index], LOOK) for index in early]
+    yield [StartTask(index, families[index], TRIAL) for index in early]
     if not any(_has_gone_on(states[index]) for index in early):
         # a softened start begins at the optimum of another problem, and is slow to leave it
-        look([i for i in early if families[i] is not Family.SOFTENED], early, tolerance, states, keep)
+        drop_lagging([i for i in early if families[i] is not Family.SOFTENED], early, tolerance, states, keep)
     yield [StartTask(index, families[index], QUOTAS[0]) for index in early if _goes_on(states[index])]
     for place, index in enumerate(late):
         # of those before alone: a resumed run may have begun later ones, and must begin the rest as it would have
         before = [*early, *late[:place]]
         best = states[before[best_run([states[each] for each in before], tolerance)]]
-        yield [StartTask(index, families[index], LOOK, None if best is None else best.best_alpha)]
+        yield [StartTask(index, families[index], TRIAL, None if best is None else best.best_alpha)]
         if not _has_gone_on(states[index]):
-            look([index], [*before, index], tolerance, states, keep)
+            drop_lagging([index], [*before, index], tolerance, states, keep)
         yield [StartTask(each, families[each], QUOTAS[0]) for each in (index,) if _goes_on(states[each])]
     for quota, following in zip(QUOTAS, (*QUOTAS[1:], None), strict=True):
         drop(tolerance, states, quota, keep)
@@ -63,7 +63,7 @@ def rounds(case: Case, states: States, keep: Callable[[int, State], None]) -> It
         yield [StartTask(i, families[i], following) for i in going]
 
 
-def look(
+def drop_lagging(
     asked: Sequence[int], others: Sequence[int], tolerance: float, states: States, keep: Callable[[int, State], None]
 ) -> None:
     """Mark those of the starts `asked` that are far behind the best of `others`. tolerance: of violations."""
@@ -94,8 +94,8 @@ def _goes_on(state: State | None) -> bool:
 
 
 def _has_gone_on(state: State | None) -> bool:
-    """Whether a start has been let go on beyond the first look."""
-    return state is not None and state.iteration > LOOK
+    """Whether a start has been let go on beyond the trial."""
+    return state is not None and state.iteration > TRIAL
 
 
 def drop(tolerance: float, states: States, quota: int, keep: Callable[[int, State], None]) -> None:
@@ -125,7 +125,7 @@ def carried_over(case: Case, states: States, before: int) -> States:
 
     The end is to be that of a run that had so many starts from the beginning. So a start is taken over where that run
     would have it in the same state: it began alike, and nobody has decided about it as yet. One that has gone beyond
-    the first look begins again, as it may be dropped there now; what it was there is no longer known.
+    the trial begins again, as it may be dropped there now; what it was there is no longer known.
     """
     if before == len(states):
         return states
@@ -133,7 +133,7 @@ def carried_over(case: Case, states: States, before: int) -> States:
     found: States = [None] * len(states)
     for index, state in enumerate(states[:before]):
         alike = family_of(index, before) is family_of(index, len(states))
-        if state is None or not alike or (in_quotas and state.iteration > LOOK):
+        if state is None or not alike or (in_quotas and state.iteration > TRIAL):
             continue
         found[index] = replace(state, dropped=False, status=RunStatus.RUNNING, reason="") if state.dropped else state
     return found

@@ -31,7 +31,7 @@ def test_starts_that_lag_are_dropped_at_a_quota_and_a_third_goes_on(straight: tu
     assert len(states) == STARTS
     dropped = [state for state in states if state.dropped]
     assert dropped
-    decided = (quotas.LOOK, *quotas.QUOTAS)
+    decided = (quotas.TRIAL, *quotas.QUOTAS)
     assert all(state.iteration in decided and "dropped after" in state.reason for state in dropped)
     assert 1 <= sum(state.iteration == 50 for state in states) <= STARTS // 3 + 1
     assert not states[straight[0].best_start].dropped
@@ -79,7 +79,7 @@ def test_a_run_resumed_with_another_number_of_starts_ends_as_one_that_had_so_man
     before: int, asked: int | None, again: bool, straight: tuple[Outcome, Path], tmp_path: Path
 ) -> None:
     """Whatever it had reached before: all, or stopped before, between and beyond the quotas. again: whether a start
-    had gone on beyond the first look, so that it begins anew."""
+    had gone on beyond the trial, so that it begins anew."""
     path = tmp_path / "resumed.h5"
     told: list[str] = []
     go(path, starts=before, **({} if asked is None else {"stop_requested": stop_after(asked)}))
@@ -104,7 +104,7 @@ def test_starts_that_a_run_with_more_of_them_would_have_alike_are_taken_over(tmp
     found = quotas.carried_over(case, [*old, *[None] * 4], 4)
     for index, (before, after) in enumerate(zip(old, found, strict=False)):
         # the fourth of four begins at the best of the others
-        kept = before is not None and before.iteration <= quotas.LOOK and index < 3
+        kept = before is not None and before.iteration <= quotas.TRIAL and index < 3
         assert (after is not None) == kept
         assert after is None or before is None or (after.running and after.alpha.tobytes() == before.alpha.tobytes())
     assert [each is not None for each in found] == [False, True, True, *[False] * 5]

@@ -7,7 +7,7 @@ import pytest
 
 from mdstopo.optimizer.start_families import Family
 from mdstopo.optimizer.state import State
-from mdstopo.starts.quotas import LOOK, QUOTAS, drop, lags, rounds
+from mdstopo.starts.quotas import QUOTAS, TRIAL, drop, lags, rounds
 from mdstopo.starts.single_start import LONG_FIRST_STEPS, make_optimizer
 from mdstopo.status import RunStatus
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
@@ -60,9 +60,9 @@ def test_starts_that_begin_at_the_best_do_so_one_after_the_other_also_when_resum
     for states in ([*early, None, None], [*early, None, later], [*early, at(first, 3, 0.09), later]):
         tasks = {}
         for asked in rounds(case, states, ignore):
-            tasks |= {task.index: task for task in asked if task.index >= 4 and task.quota == LOOK}
+            tasks |= {task.index: task for task in asked if task.index >= 4 and task.quota == TRIAL}
             if 4 in tasks and states[4] is None:
-                states[4] = at(first, LOOK, 0.09)
+                states[4] = at(first, TRIAL, 0.09)
             if 5 in tasks:
                 break
         assert [None if task.best is None else task.best[0] for task in tasks.values()] == [0.1, 0.09]
@@ -72,7 +72,7 @@ def test_starts_that_begin_at_the_best_do_so_one_after_the_other_also_when_resum
 def falling(state: State, *objectives: float) -> State:
     """The state with a history of these objectives."""
     history = replace(state.history, objective=list(objectives))
-    return replace(at(state, LOOK, min(objectives)), history=history)
+    return replace(at(state, TRIAL, min(objectives)), history=history)
 
 
 def test_a_start_that_is_far_behind_at_the_first_look_is_dropped_unless_it_falls_fast(first: State) -> None:
@@ -95,7 +95,7 @@ def test_who_is_far_behind_is_decided_once_and_never_of_a_softened_start(first: 
     assert [task.index for task in next(going)] == [0, 1]
     assert states[2] is not None
     assert states[2].dropped
-    states = [at(first, LOOK + 1, 0.1), slow, slow]  # resumed: the first has gone on, so the others were to
+    states = [at(first, TRIAL + 1, 0.1), slow, slow]  # resumed: the first has gone on, so the others were to
     going = rounds(case, states, ignore)
     next(going)
     assert [task.index for task in next(going)] == [0, 1, 2]
