@@ -26,6 +26,9 @@ from mdstopo.compiler.fields import FloatArray
 from mdstopo.compiler.jit import by_type
 from mdstopo.compiler.kernel import Kernel
 
+#: what a joint transmits (`transmitted`)
+FORCE, MOMENT, ACROSS_FORCE = range(3)
+
 #: by the name of the model's type
 _MOVED_BY: dict[str, "Kinematics"] = {}
 #: what a structure's type is called beside its maker (`general.structures`)
@@ -36,8 +39,9 @@ _ENDING = "Structure"
 class Kinematics:
     """How the bodies of one kind of model move.
 
-    coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. kernels: a
-    function for each of this module.
+    coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. at_home (N): the
+    coordinates of a body that has not moved. kernels: a function for each of this module, without those that only
+    bodies of another kind have (`OPTIONAL`).
     """
 
     coordinates: int
@@ -45,6 +49,7 @@ class Kinematics:
     rotations: int
     attitude: int
     rows: int
+    at_home: tuple[float, ...]
     kernels: Mapping[str, Kernel]
 
     def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:
@@ -737,6 +742,38 @@ def add_contact_curvature(model, j, q, rows, n, t, k):
     raise NotImplementedError
 
 
+def transmitted(model, j, which, q, lam, by_lam, by_q):
+    """Norm of the force or of the moment that a joint transmits, at the first body's joint point.
+
+    In:
+      model: the compiled scene.
+      j: the joint.
+      which: FORCE or MOMENT; in a plane ACROSS_FORCE: the norm of the force, with the slopes of the component
+        perpendicular to it, a quarter turn ahead, in global axes; these are zero where the force has one direction.
+      q (n_q,): coordinates.
+      lam (rows,): its multipliers.
+    Out:
+      by_lam (rows,), by_q (2 D,): slopes; zero where the norm is zero.
+
+    Returns it (N or N m).
+    """
+    raise NotImplementedError
+
+
+def reaction(model, j, q, lam, out):
+    """Force and moment of a joint on its first body at its joint point, global axes: -Phi_q^T lam, moved there.
+
+    In:
+      model: the compiled scene.
+      j: the joint.
+      q (n_q,): coordinates.
+      lam (rows,): its multipliers.
+    Out:
+      out (D,): force (N) and moment (N m).
+    """
+    raise NotImplementedError
+
+
 # Motion of points
 
 
@@ -746,8 +783,8 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
     In:
       model: the compiled scene.
       order: of the derivative by time, 0 to 2.
-      component: `planar_points.X`, Y, NORM or ACROSS.
-      at (2 or more,): the point in the frame of b (m).
+      component: `components.X`, Y, NORM or ACROSS; in space X, Y, Z or NORM.
+      at (D - T or more,): the point in the frame of b (m).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       bars (3, n): slopes by q, v, a, added to.
@@ -756,7 +793,7 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
 
 
 def angle_motion(model, order, b, r, q, v, a, bars):
-    """The angle of body b as seen from body r, or its first or second derivative.
+    """In a plane: the angle of body b as seen from body r, or its first or second derivative.
 
     In:
       model: the compiled scene.
@@ -769,6 +806,41 @@ def angle_motion(model, order, b, r, q, v, a, bars):
     raise NotImplementedError
 
 
+def turn_motion(model, order, component, b, r, q, v, a, bars):
+    """In space: how body b has turned since the start as seen from body r, or how fast it turns.
+
+    Of order 0 it is the rotation vector of S(t) S(start)^T, S = R_r^T R_b; of order 1 the angular velocity
+    omega_b - omega_r, of order 2 the derivatives of its components by time: all in the axes of r.
+
+    In:
+      model: the compiled scene.
+      order: 0 to 2.
+      component: `components.X`, Y, Z or NORM.
+      b, r: the bodies.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      bars (3, n): slopes by q, v, a, added to.
+    """
+    raise NotImplementedError
+
+
+def tilt_motion(model, axis, b, r, q, v, a, bars):
+    """In space: the angle between an axis of body b now and at the start, as seen from body r.
+
+    In:
+      model: the compiled scene.
+      axis (3 or more,): a unit vector in the frame of b.
+      b, r: the bodies.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      bars (3, n): slopes by q, v, a, added to.
+    """
+    raise NotImplementedError
+
+
+#: functions that only one kind of bodies has: an angle is a number in a plane, a turn has three components in space
+OPTIONAL = frozenset({"angle_motion", "turn_motion", "tilt_motion"})
+
 #: all of the functions above, by name
 INTERFACE: dict[str, Callable[..., Any]] = {
     name: each for name, each in globals().items() if isinstance(each, FunctionType) and each.__module__ == __name__
@@ -780,8 +852,13 @@ def move_by(maker: type, kinematics: Kinematics) -> None:
     _MOVED_BY[maker.__name__] = kinematics
 
 
+def kinematics_of(model: Any) -> Kinematics:
+    """How the bodies of a model move, from its type in a kernel that is compiled."""
+    return _MOVED_BY[type(model).__name__.removesuffix(_ENDING)]
+
+
 def _of(name: str, model: Any) -> Any:
-    return _MOVED_BY[type(model).__name__.removesuffix(_ENDING)].kernels[name]
+    return kinematics_of(model).kernels[name]
 
 
 for _name, _stub in INTERFACE.items():
