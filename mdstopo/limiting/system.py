@@ -81,7 +81,7 @@ class System:
 
     def mass(self, body: str) -> float:
         """The mass of a body (kg)."""
-        return self.case.body(body).mass
+        return float(self.case.body(body).mass)
 
     @cached_property
     def _solved(self) -> tuple[Cubics, Floats]:
