@@ -27,7 +27,6 @@ from mdstopo.general.model import (
     COUNT,
     GROUP,
     INERTER,
-    JOINT_CODE,
     KIND,
     OFFSET,
     ORDER,
@@ -39,7 +38,15 @@ from mdstopo.general.model import (
 )
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
 from mdstopo.general.step_history import SEGMENT
-from mdstopo.general.strides import dimensions, energy_column, is_turning, pair_freedoms, place_in_joint, place_in_pair, pull_column
+from mdstopo.general.strides import (
+    dimensions,
+    energy_column,
+    is_turning,
+    pair_freedoms,
+    place_in_joint,
+    place_in_pair,
+    pull_column,
+)
 from mdstopo.mechanics.kinematics.components import ACROSS, NORM, X, Y
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     ACROSS_FORCE,
@@ -81,13 +88,14 @@ def _chosen_of_bodies(pick: Callable[[ResponseKernels], Any]) -> Callable[[F], F
 
     def make(stub: F) -> F:
         function = cast(FunctionType, stub)
-        made = {}
-        for word, there in (("plane", lambda each: each.in_plane), ("space", lambda each: each.in_space)):
-            name = f"{function.__name__}_in_{word}"
+        def of(where: str) -> Any:
+            name = f"{function.__name__}_{where}"
             named = FunctionType(function.__code__.replace(co_name=name), function.__globals__, name)
             named.__doc__, named.__qualname__, named.__module__ = function.__doc__, name, function.__module__
-            made[word] = chosen(LISTED, lambda each, there=there: pick(each) if there(each) else None, part)(named)
-        by_type(function, "model", lambda model: made["plane" if kinematics_of(model).rotations == 1 else "space"])
+            return chosen(LISTED, lambda each: pick(each) if getattr(each, where) else None, part)(named)
+
+        in_plane, in_space = of("in_plane"), of("in_space")
+        by_type(function, "model", lambda model: in_plane if kinematics_of(model).rotations == 1 else in_space)
         return stub
 
     return make

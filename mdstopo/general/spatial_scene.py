@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
+from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, Signal
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints import spatial_table as joints
@@ -50,7 +50,8 @@ def _frames(load_case: LoadCase) -> Frames:
 
 
 def _masses(body: Any) -> list[float]:
-    return [body.mass] * 3 + principal(np.asarray(body.inertia))[0].tolist()
+    moments: list[float] = principal(np.asarray(body.inertia))[0].tolist()
+    return [body.mass, body.mass, body.mass, *moments]
 
 
 def _velocities(body: Any, home: FloatArray) -> list[float]:
@@ -124,9 +125,7 @@ def _no_bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArr
     return np.zeros(0, dtype=np.int64), np.zeros((0, BUSHING))
 
 
-def _no_contacts(
-    case: Case, index: dict[str, int], pairs: Pairs
-) -> tuple[IndexArray, FloatArray, tuple[str, ...]]:
+def _no_contacts(case: Case, index: dict[str, int], pairs: Pairs) -> tuple[IndexArray, FloatArray, tuple[str, ...]]:
     del case, index, pairs
     return np.zeros(0, dtype=np.int64), np.zeros((0, CONTACT)), ()
 

@@ -89,7 +89,7 @@ class Scene(Protocol):
     """One load case as arrays; bodies: names in the order of the state; skipped: what was left out, and why.
 
     n: freedoms of the bodies that move. degrees_of_freedom: those of them that are free, less the independent rows
-    of joints.
+    of joints. redundant: joints with rows that others imply.
     """
 
     @property
@@ -104,6 +104,8 @@ class Scene(Protocol):
     def n(self) -> int: ...
     @property
     def degrees_of_freedom(self) -> int: ...
+    @property
+    def redundant(self) -> tuple[str, ...]: ...
 
 
 class Steps(Protocol):

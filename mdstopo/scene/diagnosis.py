@@ -41,7 +41,8 @@ class Diagnosis:
         meeting = self._collapsed(design, q)
         if meeting >= 0 and status in (Status.STEP_TOO_SMALL, Status.STEP_LIMIT, Status.NEWTON_FAILED):
             return Status.ZERO_LENGTH, f"{self.member(meeting)}, {where}"
-        return status, f"{where}; the fastest body is {fastest_body(self.scene.bodies, v[: self.scene.n].reshape(-1, 3))}"
+        fastest = fastest_body(self.scene.bodies, v[: self.scene.n].reshape(-1, 3))
+        return status, f"{where}; the fastest body is {fastest}"
 
     def _collapsed(self, design: FloatArray, q: FloatArray) -> int:
         """Padded index of the member that has shrunk to nothing while it carries a force, or -1."""

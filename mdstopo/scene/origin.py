@@ -174,7 +174,8 @@ def _load_case(load_case: LoadCase, origin: Point) -> LoadCase:
 def _motion(motion: Motion, origin: Point) -> Motion:
     """A motion whose positions, where it prescribes such, are from `origin`."""
     axes = zip(("x", "y", "z"), origin, strict=False)
-    return replace(motion, **{axis: _along(getattr(motion, axis), along) for axis, along in axes})
+    moved: dict[str, Any] = {axis: _along(getattr(motion, axis), along) for axis, along in axes}
+    return replace(motion, **moved)
 
 
 def _along(part: Prescribed | None, along: float) -> Prescribed | None:

@@ -199,8 +199,8 @@ def joint_transmitted(code, par, w, lam, which, by_lam, by_q):
       par (WIDTH,): its parameters.
       w (PLACES,): where both bodies are (`revolute.place_joint`).
       lam (3,): multipliers (N, N m).
-      which: FORCE or MOMENT; ACROSS_FORCE: the norm of the force, with the slopes of the component perpendicular to it, a
-        quarter turn ahead, in global axes; these are zero where the force has one direction.
+      which: FORCE or MOMENT; ACROSS_FORCE: the norm of the force, with the slopes of the component perpendicular to
+        it, a quarter turn ahead, in global axes; these are zero where the force has one direction.
     Out:
       by_lam (3,), by_q (6,): slopes; zero where the norm is zero.
     """

@@ -824,12 +824,12 @@ def turn_motion(model, order, component, b, r, q, v, a, bars):
     raise NotImplementedError
 
 
-def tilt_motion(model, axis, b, r, q, v, a, bars):
+def tilt_motion(model, at, b, r, q, v, a, bars):
     """In space: the angle between an axis of body b now and at the start, as seen from body r.
 
     In:
       model: the compiled scene.
-      axis (3 or more,): a unit vector in the frame of b.
+      at (3 or more,): the axis, a unit vector in the frame of b.
       b, r: the bodies.
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:

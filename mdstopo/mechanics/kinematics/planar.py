@@ -357,8 +357,9 @@ _KERNELS = (
     planar_inerters.inerter_row, planar_inerters.add_inerter_tangents, planar_members.keep_apart,
     planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums, planar_members.member_designs,
     planar_members.spring_designs, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
-    place_joint, place_joint_alone, point_joint_vjp, transmitted, reaction, planar_bushings.add_bushings, planar_contacts.contact_rows,
-    planar_contacts.add_contact_curvature, planar_points.point_motion, planar_points.angle_motion,
+    place_joint, place_joint_alone, point_joint_vjp, transmitted, reaction, planar_bushings.add_bushings,
+    planar_contacts.contact_rows, planar_contacts.add_contact_curvature, planar_points.point_motion,
+    planar_points.angle_motion,
 )  # fmt: skip
 
 #: how bodies in a plane move
