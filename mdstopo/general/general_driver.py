@@ -594,7 +594,6 @@ class GeneralSteps:
         from mdstopo.general.start_entry import reactions
 
         model = self._driver.scene.model
-        (ints, floats), *_ = self.kept
         row = np.full(model.row.shape, -1, dtype=np.int64)
         i = 0
         for j in range(len(model.joint)):
@@ -604,7 +603,7 @@ class GeneralSteps:
         full = np.zeros((len(q), len(model.q0)))
         full[:, : q.shape[1]] = q
         out = np.zeros((len(q), len(model.joint), self._driver.scene.kinematics.freedoms))
-        reactions(ints, floats, row, full, np.ascontiguousarray(lam), out)
+        reactions(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
         return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}
 
 

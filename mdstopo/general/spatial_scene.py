@@ -4,16 +4,29 @@ Arrays have points and axes of a body in its principal axes: there the masses ar
 R_home = R P, with the body's own axes R and the principal ones P among them (`scene.rotations.principal`).
 """
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, Signal
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
-from mdstopo.mechanics.joints import spatial_table as joints
 from mdstopo.mechanics.joints.kernels import FITTED
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
+from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
+from mdstopo.mechanics.kinematics.spatial_joints import (
+    ACROSS,
+    CYLINDRICAL,
+    DISTANCE,
+    FIXED,
+    PLANAR,
+    PRISMATIC,
+    REVOLUTE,
+    ROWS_OF,
+    SPHERICAL,
+    UNIVERSAL,
+    row_of_joint,
+)
 from mdstopo.mechanics.kinematics.spatial_poses import HOME
 from mdstopo.scene.loads import Loads
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -31,6 +44,17 @@ APART, LENGTH, JOINT_PAR = slice(24, 27), 27, 30
 #: `GeneralModel.load_follows`: a force and a moment in global axes; both turn with the body; a force and an angular
 #: acceleration in global axes
 STAYS, FOLLOWS, ACCELERATES = range(3)
+#: the codes of joints by their words
+JOINTS = {
+    "spherical": SPHERICAL,
+    "revolute": REVOLUTE,
+    "universal": UNIVERSAL,
+    "prismatic": PRISMATIC,
+    "cylindrical": CYLINDRICAL,
+    "planar": PLANAR,
+    "fixed": FIXED,
+    "distance": DISTANCE,
+}
 #: numbers of a bushing (`GeneralModel.bushing`), of which there is none yet
 BUSHING = 12
 
@@ -130,6 +154,21 @@ def _no_contacts(case: Case, index: dict[str, int], pairs: Pairs) -> tuple[Index
     return np.zeros(0, dtype=np.int64), np.zeros((0, CONTACT)), ()
 
 
+class JointRows(NamedTuple):
+    """What is asked of a joint when a case is compiled (`dimension.JointRecord`)."""
+
+    rows: int
+    steady: tuple[tuple[int, ...], ...]
+
+
+def _joint_kernels(joint: type[Joint]) -> JointRows:
+    """Rows that put points together have constant slopes by shifts, and such that hold directions have none."""
+    code = JOINTS[joint.type]
+    kinds = [row_of_joint.py_func(code, r)[0] for r in range(ROWS_OF[code])]
+    shifts = tuple(range(SPATIAL.freedoms - SPATIAL.rotations))
+    return JointRows(len(kinds), tuple(shifts if kind in (MEETS, ACROSS) else () for kind in kinds))
+
+
 def _joint_row(joint: Any, home: FloatArray, first: int, second: int, frames: Frames) -> list[float]:
     """See `JOINT_PAR`."""
     row = np.zeros(JOINT_PAR)
@@ -176,8 +215,8 @@ SPACE = Dimension(
     bushings=_no_bushings,
     contacts=_no_contacts,
     reaches=lambda contact: np.zeros(len(contact)),
-    joint_code=joints.code_of,
-    joint_kernels=joints.kernels_of,
+    joint_code=lambda kind: JOINTS[kind.type],
+    joint_kernels=_joint_kernels,
     has_norm=lambda kind: True,
     joint_row=_joint_row,
     response_row=_response_row,

@@ -10,8 +10,8 @@ from mdstopo.general.projection import project
 from mdstopo.general.runge_kutta import scene_size, start_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair, place_of_turn
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
-from mdstopo.mechanics.joints.table import joint_rows
-from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, reaction, rotations, turn_bodies
+from mdstopo.mechanics.joints.table import joint_reaction, joint_rows
+from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, rotations, turn_bodies
 
 
 @entry
@@ -59,25 +59,25 @@ def assemble(ints, floats, q, v, move, phi, rates):
 
 
 @entry
-def reactions(ints, floats, row, q, lam, out):
+def reactions(joint, joint_par, home, row, q, lam, out):
     """Force and moment of each joint on its first body, at many states.
 
     Constant:
-      ints, floats: the packed scene (`pack_general`).
-      row (n_joint, rows): the place of each row of a joint among all that there are multipliers of, or -1.
+      joint (n_joint, 5), joint_par (n_joint, 12), home (n / 3, 5), row (n_joint, rows): as in `GeneralModel`.
     In:
-      q (T, n_q): coordinates.
+      q (T, n): coordinates (m, rad).
       lam (T, n_row): multipliers.
     Out:
-      out (T, n_joint, D): force and moment at the joint's point, global axes (N, N m).
+      out (T, n_joint, D): Fx, Fy, M (N, N, N m).
     """
-    model = unpack_general(ints, floats)
+    w = np.empty(PLACES)
     mine = np.empty(row.shape[1])
     for k in range(q.shape[0]):
-        for j in range(row.shape[0]):
+        for j in range(joint.shape[0]):
             for i in range(row.shape[1]):
                 mine[i] = lam[k, row[j, i]] if row[j, i] >= 0 else 0.0
-            reaction(model, j, q[k], mine, out[k, j])
+            place_joint(home, joint[j, 1], joint[j, 2], q[k], w)
+            joint_reaction(joint[j, 0], joint[j, 4], joint_par[j], w, mine, out[k, j])
 
 
 @entry

@@ -760,20 +760,6 @@ def transmitted(model, j, which, q, lam, by_lam, by_q):
     raise NotImplementedError
 
 
-def reaction(model, j, q, lam, out):
-    """Force and moment of a joint on its first body at its joint point, global axes: -Phi_q^T lam, moved there.
-
-    In:
-      model: the compiled scene.
-      j: the joint.
-      q (n_q,): coordinates.
-      lam (rows,): its multipliers.
-    Out:
-      out (D,): force (N) and moment (N m).
-    """
-    raise NotImplementedError
-
-
 # Motion of points
 
 

@@ -15,7 +15,7 @@ from mdstopo.compiler.kernel import Kernel
 from mdstopo.mechanics.angles import small_turn
 from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.revolute import place_joint as place_joint_of_bodies
-from mdstopo.mechanics.joints.table import joint_reaction, joint_transmitted
+from mdstopo.mechanics.joints.table import joint_transmitted
 from mdstopo.mechanics.kinematics import (
     planar_bushings,
     planar_contacts,
@@ -334,14 +334,6 @@ def transmitted(model, j, which, q, lam, by_lam, by_q):
     return joint_transmitted(model.joint[j, 0], model.joint_par[j], w, lam, which, by_lam, by_q)
 
 
-@part
-def reaction(model, j, q, lam, out):
-    """See `joints.table.joint_reaction`."""
-    w = np.empty(PLACES)
-    place_joint_of_bodies(model.home, model.joint[j, 1], model.joint[j, 2], q, w)
-    joint_reaction(model.joint[j, 0], model.joint[j, 4], model.joint_par[j], w, lam, out)
-
-
 _KERNELS = (
     coordinates, freedoms, rotations, attitude, most_rows, pose_size, joint_places,
     retract, difference, retract_vjp, retract_jvp, planar_steps.advance_coordinates, moved_most,
@@ -357,7 +349,7 @@ _KERNELS = (
     planar_inerters.inerter_row, planar_inerters.add_inerter_tangents, planar_members.keep_apart,
     planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums, planar_members.member_designs,
     planar_members.spring_designs, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
-    place_joint, place_joint_alone, point_joint_vjp, transmitted, reaction, planar_bushings.add_bushings,
+    place_joint, place_joint_alone, point_joint_vjp, transmitted, planar_bushings.add_bushings,
     planar_contacts.contact_rows, planar_contacts.add_contact_curvature, planar_points.point_motion,
     planar_points.angle_motion,
 )  # fmt: skip
