@@ -47,6 +47,6 @@ def _largest(driver: SceneDriver, alpha: FloatArray) -> list[float] | None:
     status, steps = driver.simulate(alpha)
     if status is not Status.OK:
         return None
-    moved = np.abs(steps.state - np.stack([steps.state[0, 0], np.zeros_like(steps.state[0, 0])]))
+    moved = np.abs(np.stack([steps.q - steps.q[0], steps.v], axis=1))
     along, turned = moved.reshape(len(moved), 2, -1, 3)[..., :2], moved[..., 2::3]
     return [float(along[:, 0].max()), float(turned[:, 0].max()), float(along[:, 1].max()), float(turned[:, 1].max())]

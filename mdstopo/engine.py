@@ -20,6 +20,7 @@ from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult, Scene, SceneDriver, SceneFamily
 from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
+from mdstopo.scene.border import border_of
 from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.origin import extent_of, origin_of, seen_from
@@ -197,7 +198,7 @@ class Evaluator:
         status, steps = driver.simulate(design)
         message = ""
         if not status.ok:
-            status, message = driver.explain(design, status, float(steps.t[-1]), steps.state[-1])
+            status, message = driver.explain(design, status, float(steps.t[-1]), steps.q[-1], steps.v[-1])
         elif too_coarse:
             status, message = Status.STEP_TOO_LARGE, too_coarse
         else:
@@ -206,8 +207,7 @@ class Evaluator:
                 status, message = Status.ZERO_LENGTH, driver.member(meeting)
         work = work_named(driver.work.tolist())
         bodies = next(each.bodies for each in self.case.load_cases if each.name == load_case)
-        home = np.array([value for body in bodies for value in (*body.position, body.angle)])
-        return Trajectory.of(load_case, steps, status, message, work, home)
+        return Trajectory.of(load_case, steps, status, message, work, border_of(self.case, bodies))
 
     def histories(self, alpha: FloatArray, objective: str) -> tuple[Status, FloatArray, FloatArray]:
         """Times (T,) of the steps and dg(t)/dalpha (T, N) of an objective's response at them, by `direct`.
@@ -304,7 +304,7 @@ class Evaluator:
         if result.status.ok:
             return Status.UNRESOLVED, driver.member(result.unresolved)
         status, steps = driver.simulate(design)
-        return driver.explain(design, status, float(steps.t[-1]), steps.state[-1])
+        return driver.explain(design, status, float(steps.t[-1]), steps.q[-1], steps.v[-1])
 
     def _evaluation(
         self,

@@ -7,7 +7,7 @@ from dataclasses import field
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray, FrozenDict, Pair, read_only
+from mdstopo.case.arrays import Components, FloatArray, FrozenDict, read_only
 from mdstopo.case.value import Value, frozen
 
 
@@ -20,12 +20,13 @@ class Response(Value):
     """A scalar seen over time.
 
     kind: the word of its record (`case.responses`). Fields that a kind does not use are None.
-    at_local is in body coordinates of `body`; component: x | y | norm. numbers: up to four of its own for its kernels.
+    at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
+    its own for its kernels; of a tilt: its axis, a unit vector in body coordinates.
     """
 
     kind: str
     body: str | None = None
-    at_local: Pair | None = None
+    at_local: Components | None = None
     relative_to: str | None = None
     component: str | None = None
     group: str | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ IndexArray = NDArray[np.intp]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+#: a Pair in the plane, a Triple in space: what `Case.dimension` says no type can tell
+Components: TypeAlias = Any
 
 _K = TypeVar("_K")
 _V = TypeVar("_V")
@@ -85,5 +87,5 @@ class Table(Value):
 Signal = float | Table
 """A scalar quantity over time: a constant, or a Table with m = 1."""
 
-VectorSignal = tuple[Signal, Signal]
-"""Two components over time. A table of [t, x, y] becomes two Tables with the same times."""
+VectorSignal = tuple[Signal, ...]
+"""Two components over time, three in space. A table of [t, x, y] becomes two Tables with the same times."""

@@ -23,6 +23,7 @@ from mdstopo.case.aims import (
     VolumeRow,
 )
 from mdstopo.case.arrays import (
+    Components,
     FloatArray,
     FrozenDict,
     IndexArray,
@@ -36,6 +37,7 @@ from mdstopo.case.arrays import (
 from mdstopo.case.design_space import DesignSpace, slots_of
 from mdstopo.case.errors import Mistake
 from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
+from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.laws import (
     LAWS,
     ActuatorLaw,
@@ -51,6 +53,7 @@ from mdstopo.case.laws import (
 )
 from mdstopo.case.marks import Marks
 from mdstopo.case.parts import (
+    AnyBody,
     Body,
     Bushing,
     Contact,
@@ -60,6 +63,7 @@ from mdstopo.case.parts import (
     Motion,
     PointGrid,
     Prescribed,
+    SpatialBody,
 )
 from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
@@ -70,10 +74,12 @@ __all__ = [
     "JOINTS",
     "LAWS",
     "ActuatorLaw",
+    "AnyBody",
     "Body",
     "Bushing",
     "Case",
     "Combine",
+    "Components",
     "Contact",
     "CrushLaw",
     "CubicLaw",
@@ -104,6 +110,8 @@ __all__ = [
     "RevoluteJoint",
     "Signal",
     "SolverSettings",
+    "SpatialBody",
+    "SpatialJoint",
     "SpringLaw",
     "Table",
     "TableLaw",
@@ -123,7 +131,7 @@ class Case(Value):
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
     the user should know. uncertainty: None where all is certain; the other fields are the nominal case. shared: groups
     whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws that are
-    varied.
+    varied. dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`, joints `SpatialJoint`.
     """
 
     title: str
@@ -133,7 +141,7 @@ class Case(Value):
     sha256: str
     overrides: Mapping[str, str]
     files: Mapping[str, str]
-    bodies: tuple[Body, ...]
+    bodies: tuple[AnyBody, ...]
     joints: tuple[Joint, ...]
     bushings: tuple[Bushing, ...]
     points: Mapping[str, PointGrid]
@@ -151,6 +159,7 @@ class Case(Value):
     mirrored: tuple[tuple[str, ...], ...] = ()
     variables: tuple[Variable, ...] = ()
     contacts: tuple[Contact, ...] = ()
+    dimension: int = 2
 
     @property
     def design_groups(self) -> tuple[MemberGroup, ...]:
@@ -226,7 +235,7 @@ class Case(Value):
             return np.concatenate([design, self.start[self.n_design :]])
         return design
 
-    def body(self, name: str) -> Body:
+    def body(self, name: str) -> AnyBody:
         """The body of that name; KeyError where there is none (``ground`` is none)."""
         for body in self.bodies:
             if body.name == name:

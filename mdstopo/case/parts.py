@@ -2,7 +2,19 @@
 
 from __future__ import annotations
 
-from mdstopo.case.arrays import FloatArray, IndexArray, Pair, Signal, Triple, VectorSignal, read_only, read_only_index
+from typing import Any, TypeAlias
+
+from mdstopo.case.arrays import (
+    Components,
+    FloatArray,
+    IndexArray,
+    Pair,
+    Signal,
+    Triple,
+    VectorSignal,
+    read_only,
+    read_only_index,
+)
 from mdstopo.case.laws import Law
 from mdstopo.case.value import Value, frozen
 
@@ -26,8 +38,36 @@ class Body(Value):
 
 
 @frozen
+class SpatialBody(Value):
+    """A rigid body in space at the start.
+
+    mass in kg; inertia (3, 3): the tensor about the centre of mass along the body axes in kg m^2; position of the
+    centre of mass in m; rotation (3, 3): its columns are the body axes in global coordinates; velocity in m/s and
+    angular_velocity in rad/s, global components.
+    stated: those of ``orientation``, ``velocity``, ``angular_velocity`` that the file gives (others are defaults).
+    """
+
+    name: str
+    mass: float
+    inertia: FloatArray
+    position: Triple
+    rotation: FloatArray
+    velocity: Triple = (0.0, 0.0, 0.0)
+    angular_velocity: Triple = (0.0, 0.0, 0.0)
+    stated: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        for name in ("inertia", "rotation"):
+            object.__setattr__(self, name, read_only(getattr(self, name)))
+
+
+#: a Body in the plane, a SpatialBody in space: what `Case.dimension` says no type can tell
+AnyBody: TypeAlias = Any
+
+
+@frozen
 class PointGrid(Value):
-    """Named points on one body: local (n, 2) in body coordinates, world (n, 2) global at the start."""
+    """Named points on one body: local (n, 2) in body coordinates, world (n, 2) global at the start; (n, 3) in space."""
 
     name: str
     body: str
@@ -43,7 +83,7 @@ class PointGrid(Value):
 class MemberGroup(Value):
     """A group of M candidate members between two bodies, filters applied, P slow and Q fast.
 
-    from_local (nP, 2), to_local (nQ, 2): the end points in body coordinates, each stored once;
+    from_local (nP, 2), to_local (nQ, 2): the end points in body coordinates, each stored once, (n, 3) in space;
     from_world, to_world: the same in the global frame at the start.
     from_index, to_index (M,): which of them each member joins. length (M,): initial lengths in m, > 0.
     laws: forces that add. cost (M,): V_i. design: whether members are design variables; where not, alpha = 1.
@@ -90,22 +130,22 @@ class MemberGroup(Value):
 
     @property
     def p_local(self) -> FloatArray:
-        """(M, 2) first ends in body coordinates of ``body_from``; made anew at each access."""
+        """(M, 2 or 3) first ends in body coordinates of ``body_from``; made anew at each access."""
         return self.from_local[self.from_index]
 
     @property
     def q_local(self) -> FloatArray:
-        """(M, 2) second ends in body coordinates of ``body_to``; made anew at each access."""
+        """(M, 2 or 3) second ends in body coordinates of ``body_to``; made anew at each access."""
         return self.to_local[self.to_index]
 
     @property
     def p_world(self) -> FloatArray:
-        """(M, 2) first ends in the global frame at the start; made anew at each access."""
+        """(M, 2 or 3) first ends in the global frame at the start; made anew at each access."""
         return self.from_world[self.from_index]
 
     @property
     def q_world(self) -> FloatArray:
-        """(M, 2) second ends in the global frame at the start; made anew at each access."""
+        """(M, 2 or 3) second ends in the global frame at the start; made anew at each access."""
         return self.to_world[self.to_index]
 
 
@@ -113,15 +153,19 @@ class MemberGroup(Value):
 class Load(Value):
     """A force in N at a point that rides on the body, and a couple in N m.
 
-    at_local: the point in body coordinates. frame: ``global``, or ``body`` for a force that turns with it.
-    A load stated as accelerations has become force = m a and moment = J times the angular acceleration.
+    at_local: the point in body coordinates. frame: ``global``, or ``body`` for a force that turns with it; in space it
+    is that of the moment, too.
+    A load stated as accelerations has become force = m a and moment = J times the angular acceleration. In space J of
+    global axes turns with the body: an angular acceleration in rad/s^2 of global components stays one, the moment is J
+    at that time times it, and `moment` is zero; None elsewhere.
     """
 
     body: str
     force: VectorSignal = (0.0, 0.0)
-    at_local: Pair = (0.0, 0.0)
-    moment: Signal = 0.0
+    at_local: Components = (0.0, 0.0)
+    moment: Any = 0.0  # Signal, in space VectorSignal
     frame: str = "global"
+    angular_acceleration: VectorSignal | None = None
 
 
 @frozen
@@ -134,12 +178,13 @@ class Prescribed(Value):
 
 @frozen
 class Motion(Value):
-    """Prescribed motion of a body; None leaves that coordinate free."""
+    """Prescribed motion of a body; None leaves that coordinate free. angle: in the plane; z: in space."""
 
     body: str
     x: Prescribed | None = None
     y: Prescribed | None = None
     angle: Prescribed | None = None
+    z: Prescribed | None = None
 
 
 @frozen(kw_only=True)
@@ -191,9 +236,9 @@ class LoadCase(Value):
     """
 
     name: str
-    gravity: Pair
+    gravity: Components
     start: float
     end: float
     loads: tuple[Load, ...]
     motions: tuple[Motion, ...]
-    bodies: tuple[Body, ...]
+    bodies: tuple[AnyBody, ...]

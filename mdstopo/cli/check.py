@@ -74,6 +74,9 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         freedoms = {name: engine.degrees_of_freedom(name) for name in engine.scenes}
         for name, freedom in freedoms.items():
             output.say(f"load case {name}: {freedom} degrees of freedom")
+            redundant = engine.scenes[name].redundant
+            if redundant:
+                output.say(f"load case {name}: joints with rows that others imply: {', '.join(redundant)}")
         document["degrees_of_freedom"] = max(freedoms.values())
         found = frequencies(case, engine)
         for name in freedoms:
@@ -93,12 +96,10 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
 
 
 def _say_bodies(output: Output, case: "Case") -> None:
+    from mdstopo.cli.check_numbers import body_rows
+
     output.say(f"{len(case.bodies)} bodies")
-    rows = [["body", "mass, kg", "inertia, kg m2", "x, m", "y, m", "angle, rad"]]
-    for body in case.bodies:
-        values = (body.mass, body.inertia, *body.position, body.angle)
-        rows.append([body.name, *(number(value) for value in values)])
-    output.table(rows)
+    output.table(body_rows(case))
 
 
 def _say_joints(output: Output, case: "Case") -> None:

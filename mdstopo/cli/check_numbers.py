@@ -5,6 +5,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.case.columns import point_columns
 from mdstopo.case.model import GROUND, Case, SpringLaw, Table, VolumeRow
 from mdstopo.cli.output import number
 
@@ -22,11 +23,12 @@ class Vibrates(Protocol):
 def totals(case: Case) -> list[tuple[str, float, str]]:
     """Name, value, unit of what sums up the case."""
     masses = np.array([body.mass for body in case.bodies])
-    positions = np.array([body.position for body in case.bodies]).reshape(-1, 2)
+    positions = np.array([body.position for body in case.bodies]).reshape(-1, case.dimension)
     rows = [("mass", float(masses.sum()), "kg")]
     if len(masses):
         center = masses @ positions / masses.sum()
-        rows += [("centre of mass, x", float(center[0]), "m"), ("centre of mass, y", float(center[1]), "m")]
+        axes = point_columns(case)
+        rows += [(f"centre of mass, {axis}", float(value), "m") for axis, value in zip(axes, center, strict=True)]
     if case.n_design:
         rows += [
             ("volume at alpha = 1", float(case.cost.sum()), ""),
@@ -45,9 +47,25 @@ def totals(case: Case) -> list[tuple[str, float, str]]:
             if load.body != GROUND:
                 force += [_at(component, load_case.start) for component in load.force]
         rows += [
-            (f"external force at the start{label}, x", float(force[0]), "N"),
-            (f"external force at the start{label}, y", float(force[1]), "N"),
+            (f"external force at the start{label}, {axis}", float(value), "N")
+            for axis, value in zip(point_columns(case), force, strict=True)
         ]
+    return rows
+
+
+def body_rows(case: Case) -> list[list[str]]:
+    """A table of the bodies: mass, inertia, and how they stand at the start."""
+    if case.dimension == 2:
+        rows = [["body", "mass, kg", "inertia, kg m2", "x, m", "y, m", "angle, rad"]]
+        for body in case.bodies:
+            values = (body.mass, body.inertia, *body.position, body.angle)
+            rows.append([body.name, *(number(value) for value in values)])
+        return rows
+    rows = [["body", "mass, kg", "principal moments, kg m2", "x, m", "y, m", "z, m", "turned by, rad"]]
+    for body in case.bodies:
+        moments = ", ".join(number(value) for value in np.linalg.eigvalsh(body.inertia))
+        angle = float(np.arccos(np.clip(0.5 * (np.trace(body.rotation) - 1.0), -1.0, 1.0)))
+        rows.append([body.name, number(body.mass), moments, *(number(value) for value in (*body.position, angle))])
     return rows
 
 

@@ -24,7 +24,7 @@ from mdstopo.cli.options import (
 from mdstopo.cli.output import Output, duration, number
 
 if TYPE_CHECKING:
-    from mdstopo.case.model import Case
+    from mdstopo.case.model import Case, FloatArray
     from mdstopo.general.settle import Settled
     from mdstopo.store.contents import Motion
 
@@ -128,10 +128,20 @@ def _load_cases(case: "Case", names: tuple[str, ...]) -> list[str]:
 def _say_motion(output: Output, case: "Case", name: str, motion: "Motion") -> None:
     output.say(f"load case {name}: {len(motion.t) - 1} steps from {number(motion.t[0])} to {number(motion.t[-1])} s")
     rows = [["body", "x, m", "y, m", "angle, rad", "vx, m/s", "vy, m/s", "rate, rad/s"]]
-    for index, body in enumerate(case.bodies):
-        part = slice(3 * index, 3 * index + 3)
-        rows.append([body.name, *(number(value) for value in (*motion.q[-1, part], *motion.v[-1, part]))])
+    if case.dimension > 2:
+        rows = [["body", *(f"{axis}, m" for axis in "xyz"), *(f"v{axis}, m/s" for axis in "xyz")]]
+        rows[0] += [f"rate {axis}, rad/s" for axis in "xyz"]
+    for body, (q, v) in _last(case, motion).items():
+        place = q[:3]  # in space the attitude stands in the result file
+        rows.append([body, *(number(value) for value in (*place, *v))])
     output.table(rows)
+
+
+def _last(case: "Case", motion: "Motion") -> "dict[str, tuple[FloatArray, FloatArray]]":
+    """The coordinates and velocities of each body at the end."""
+    count = len(case.bodies)
+    q, v = motion.q[-1].reshape(count, -1), motion.v[-1].reshape(count, -1)
+    return {body.name: (q[i], v[i]) for i, body in enumerate(case.bodies)}
 
 
 def _motion_document(case: "Case", motion: "Motion", rest: "Settled | None") -> dict[str, Any]:
@@ -139,8 +149,5 @@ def _motion_document(case: "Case", motion: "Motion", rest: "Settled | None") -> 
     return settled | {
         "steps": len(motion.t) - 1,
         "end": motion.t[-1],
-        "bodies": {
-            body.name: {"q": motion.q[-1, 3 * i : 3 * i + 3], "v": motion.v[-1, 3 * i : 3 * i + 3]}
-            for i, body in enumerate(case.bodies)
-        },
+        "bodies": {body: {"q": q, "v": v} for body, (q, v) in _last(case, motion).items()},
     }

@@ -8,38 +8,47 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mdstopo.case.model import LoadCase, Prescribed, Table
+from mdstopo.case.model import LoadCase, Motion, Prescribed, Table
 from mdstopo.case.spline import slopes
-from mdstopo.mechanics.kinematics.planar import PLANAR
+from mdstopo.general.dimension import Dimension
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.signals import segment_values
 
 
-def prescribed(load_case: LoadCase) -> Iterator[tuple[int, str, Prescribed]]:
-    """(coordinate, axis, what is prescribed) of every driven coordinate, by body as declared, then x, y, angle."""
+def prescribed(load_case: LoadCase, dimension: Dimension) -> Iterator[tuple[int, str, Prescribed]]:
+    """(freedom, axis, what is prescribed) of everything that is driven, by body as declared, then by freedom."""
     names = [body.name for body in load_case.bodies]
     for motion in load_case.motions:
-        first = PLANAR.freedoms * names.index(motion.body)
-        for axis, part in enumerate((motion.x, motion.y, motion.angle)):
+        first = dimension.kinematics.freedoms * names.index(motion.body)
+        for axis, word in enumerate(dimension.axes):
+            part = getattr(motion, word)
             if part is not None:
-                yield first + axis, ("x", "y", "angle")[axis], part
+                yield first + axis, word, part
 
 
-def motion_times(load_case: LoadCase) -> list[float]:
+def drives_all(motion: Motion, dimension: Dimension) -> bool:
+    """Whether a motion leaves nothing of its body free."""
+    whole = len(dimension.axes) == dimension.kinematics.freedoms
+    return whole and all(getattr(motion, word) is not None for word in dimension.axes)
+
+
+def motion_times(load_case: LoadCase, dimension: Dimension) -> list[float]:
     """Rows of the tables of all prescribed motions, s."""
     times: list[float] = []
-    for _, _, part in prescribed(load_case):
+    for _, _, part in prescribed(load_case, dimension):
         if isinstance(part.signal, Table):
             times += part.signal.times.tolist()
     return times
 
 
-def drives(load_case: LoadCase, times: FloatArray, home: FloatArray, v0: FloatArray) -> tuple[IndexArray, FloatArray]:
-    """Driven coordinates (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,).
+def drives(
+    load_case: LoadCase, times: FloatArray, dimension: Dimension, home: FloatArray, v0: FloatArray
+) -> tuple[IndexArray, FloatArray]:
+    """Driven freedoms (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,).
 
-    What is driven is the change since home (n,).
+    What is driven is the change since home (n,), where freedoms are as they are stated; v0 (n,): velocities there.
     """
-    parts = list(prescribed(load_case))
+    parts = list(prescribed(load_case, dimension))
     cubics = np.zeros((len(times) - 1, len(parts), 4))
     for i, (d, _, part) in enumerate(parts):
         if part.kind == "position":

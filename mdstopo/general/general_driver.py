@@ -68,7 +68,7 @@ class GeneralDriver:
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
-        self._packed = self.ints, self.floats = pack_general(model)
+        self._packed = self.ints, self.floats = pack_general(model, scene.kinematics)
         self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS])
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
@@ -121,6 +121,11 @@ class GeneralDriver:
             self._entry = load_method(self.method.kind)
         return self._entry
 
+    @property
+    def _is_planar(self) -> bool:
+        """Whether vectors have one direction across them, which rows of norms can tell (`evaluation.Peak.across`)."""
+        return self.scene.kinematics.rotations == 1
+
     def _make_room(self, steps: int, stages: int, events: int) -> None:
         # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
         factors = self.method.kind.explicit and not self._inertial
@@ -151,7 +156,7 @@ class GeneralDriver:
         assemble(self.ints, self.floats, q, v, move, phi, rates)
         size = size_of(self.case)
         span = self.scene.load_case.end - self.scene.load_case.start
-        speed = max(speed_of(self.case, v), size / span)
+        speed = max(speed_of(self.case, v, self.scene.kinematics), size / span)
         mistakes = []
         for j, joint in enumerate(self.case.joints):
             misfit, rate = float(np.abs(phi[j]).max()), float(np.abs(rates[j]).max())
@@ -178,7 +183,7 @@ class GeneralDriver:
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
         window = CLOSENESS if rows.window is None else rows.window
-        across = self._across() if rows.cones and gradient else None
+        across = self._across() if rows.cones and gradient and self._is_planar else None
         code, count, time = self.run(alpha, gradient)
         self.quadrature_breakpoints = []
         for _ in range(ROUNDS):
@@ -417,7 +422,8 @@ class GeneralDriver:
         """Gradients of what `evaluate` found by `direct`, `iterative` or `constant_load`; cones: tell `across`, too."""
         from mdstopo.general.methods import differentiate
 
-        across = np.zeros_like(looked.gradients) if cones and method != "constant_load" else None
+        tell = cones and method != "constant_load" and self._is_planar
+        across = np.zeros_like(looked.gradients) if tell else None
         gradients, message = differentiate(self, method, alpha, looked, across)
         return Differentiated(Status.OK, message, gradients, across)
 
@@ -441,7 +447,9 @@ class GeneralDriver:
         """The times that the case gives: ends of segments, without those that steps land on for other reasons."""
         return self._model.times
 
-    def explain(self, alpha: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
+    def explain(
+        self, alpha: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[Status, str]:
         """The status of the last run, and who is to blame for it, in words."""
         return status, self._message
 
@@ -485,7 +493,7 @@ class GeneralDriver:
         if code == STEP_LIMIT and self.where[0] >= 0:
             who = self.member(int(self.where[0]))
             return f"{when}; {who} brakes too fast for explicit steps: a larger slip or a smaller damping needs fewer"
-        v = self.states()[2][self._steps_until(time), : self.scene.n]
+        v = self.states()[2][self._steps_until(time), : self.scene.n].reshape(self.scene.n_bodies, -1)
         return f"{when}; the fastest body is {fastest_body(self.scene.bodies, v)}"
 
     def states(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -539,10 +547,11 @@ class GeneralSteps:
         self.count = count
         t, q, v = driver.states()
         self.t: FloatArray = t[: count + 1].copy()
-        self.state: FloatArray = np.stack([q[: count + 1], v[: count + 1]], axis=1)
+        self.q: FloatArray = q[: count + 1].copy()
+        self.v: FloatArray = v[: count + 1].copy()
 
-    def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """q, v, a (3, T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
+    def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """q (T, n_q), v, a (T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
         if self.count == 0:
             raise ValueError("no step was completed")
         step = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, self.count - 1)
@@ -550,10 +559,10 @@ class GeneralSteps:
         fraction[times == self.t[step + 1]] = 1.0
         places = np.stack([step.astype(np.float64), fraction], axis=1)
         (q, out), solved, _ = self._driver.sample_response(-1, places, True, self.count, self)
-        return np.stack([q, *out]), self._all_rows(q, solved)
+        return (q, out[0], out[1]), self._all_rows(q, solved)
 
-    def at(self, times: FloatArray) -> FloatArray:
-        """q, v, a (3, T, n) at times (T,) within what was simulated."""
+    def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """q (T, n_q), v and a (T, n) at times (T,) within what was simulated."""
         return self.balanced(np.asarray(times, dtype=np.float64))[0]
 
     def _all_rows(self, q: FloatArray, solved: FloatArray) -> FloatArray:
@@ -566,9 +575,8 @@ class GeneralSteps:
             if model.row[j, r] >= 0:
                 lam[:, i] = solved[:, model.row[j, r]]
         if n_row < len(places):
-            from mdstopo.general.start_entry import slopes_of
-
             each = self._driver.scene.kinematics.freedoms
+            slopes_of = self._driver.scene.kinematics.of_python("slopes_of")
             phi, jac = np.zeros(model.row.shape), np.zeros((*model.row.shape, 2 * each))
             for k in range(len(q)):
                 slopes_of(model.joint, model.joint_par, model.home, q[k].copy(), phi, jac)
@@ -582,8 +590,6 @@ class GeneralSteps:
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
         """Joint name -> force and moment (T, D) on its first body, at states q (T, n_q) with lam (T, n_rows)."""
-        from mdstopo.general.start_entry import reactions
-
         model = self._driver.scene.model
         row = np.full(model.row.shape, -1, dtype=np.int64)
         i = 0
@@ -594,7 +600,8 @@ class GeneralSteps:
         full = np.zeros((len(q), len(model.q0)))
         full[:, : q.shape[1]] = q
         out = np.zeros((len(q), len(model.joint), self._driver.scene.kinematics.freedoms))
-        reactions(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
+        of_all = self._driver.scene.kinematics.of_python("reactions")
+        of_all(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
         return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}
 
 

@@ -5,7 +5,7 @@ watches that it stays fulfilled. Unknowns are ordered so that bodies that are ti
 Cuthill-McKee where there are many); so are the rows alone, for the matrix that is left of them without the bodies.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product
 from typing import NamedTuple
 
@@ -13,7 +13,6 @@ import numpy as np
 
 from mdstopo.case.model import Case
 from mdstopo.general.model import JOINT_FIRST
-from mdstopo.mechanics.joints.table import LISTED
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -43,6 +42,7 @@ def arrange(
     case: Case,
     joint: IndexArray,
     joint_par: FloatArray,
+    unchanging: Sequence[tuple[tuple[int, ...], ...]],
     free: IndexArray,
     mass: FloatArray,
     home: FloatArray,
@@ -52,7 +52,8 @@ def arrange(
     """Choose the rows of the joints that are solved, and order the unknowns and these rows.
 
     case: for the joints' names.
-    joint (n_joint, 5), joint_par (n_joint, 12): the joints, as in `GeneralModel`.
+    joint (n_joint, 5), joint_par: the joints, as in `GeneralModel`.
+    unchanging: of each joint and row the slopes that are the same wherever bodies are (`JointKernels.steady`).
     free (n,): 1 for freedoms that are unknowns, 0 for driven ones.
     mass (n,): mass (kg) or inertia (kg m^2) of each freedom.
     home (n_body, n_home): where the bodies stand by the case, as in `GeneralModel`; rows are compared there.
@@ -99,7 +100,7 @@ def arrange(
         inverse = np.where(free == 1, 1.0 / mass, 0.0)
         for entry, a, b, axis in _products(row, meet, order, envelope, slopes_at, each):
             one, two = (divmod(place // (2 * each), bodies.rows) for place in (a, b))
-            fixed = [axis in LISTED[int(joint[j, 0])].steady[r] for j, r in (one, two)]
+            fixed = [axis in unchanging[j][r] for j, r in (one, two)]
             slopes = [float(jac.flat[place + axis]) for place in (a, b)]
             if all(fixed):
                 body = int(joint[one[0], JOINT_FIRST + a % (2 * each) // each])
@@ -114,11 +115,9 @@ def arrange(
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: Kinematics) -> FloatArray:
     """(n_joint, rows, 2 D): Phi_q of the joints at home."""
-    from mdstopo.general.start_entry import slopes_of
-
     jac = np.zeros((len(joint), bodies.rows, 2 * bodies.freedoms))
-    q = np.zeros(bodies.coordinates * len(home))
-    slopes_of(joint, joint_par, home, q, np.zeros((len(joint), bodies.rows)), jac)
+    q = np.tile(bodies.at_home, len(home))
+    bodies.of_python("slopes_of")(joint, joint_par, home, q, np.zeros((len(joint), bodies.rows)), jac)
     return jac
 
 

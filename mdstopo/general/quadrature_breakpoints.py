@@ -84,7 +84,8 @@ def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
     kernels = LISTED[kind]
     if kernels.needs_accelerations:
         return 0.0
-    return float(NOUGHT * (1.0 if kernels.vector is None else size_of(driver.case)) / span**order)
+    of_lengths = kernels.vector is not None and not kernels.vector.is_turn
+    return float(NOUGHT * (size_of(driver.case) if of_lengths else 1.0) / span**order)
 
 
 def halves(

@@ -3,7 +3,9 @@
 A kernel takes what it needs of the following, in any order, by these names:
 
     model, j          the scene's arrays (`general.model`), and which of its responses it is; `model.response_par[j]`
-                      has the point in body coordinates, then `Response.numbers`, four at most
+                      has the point in body coordinates, where there is one, then `Response.numbers`, four at most; in
+                      space always three numbers for the point, then the others, vectors among them in the axes of
+                      arrays (`spatial_scene`)
     member_state, segment (`general.members`), the stretch of time between two breakpoints
     who               of a response of members the member that is looked at
     t, q, v, a, lam   a state whose balance has just been made: time, coordinates, velocities, accelerations (n,),
@@ -23,14 +25,16 @@ Function = Kernel | Callable[..., Any]
 
 @dataclass(frozen=True, kw_only=True)
 class VectorKernels:
-    """A response that is a component or the norm of a plane vector.
+    """A response that is a component or the norm of a vector.
 
-    across: the component perpendicular to the vector, a quarter turn ahead, with its slopes added, its direction held;
-    components (..., out): the vector itself into out (2,).
+    In a plane there are two more. across: the component perpendicular to the vector, a quarter turn ahead, with its
+    slopes added, its direction held; components (..., out): the vector itself into out (2,).
+    is_turn: whether it is measured in radians, not in metres.
     """
 
-    across: Function
-    components: Function
+    across: Function | None = None
+    components: Function | None = None
+    is_turn: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +46,7 @@ class ResponseKernels:
     needs_accelerations: whether it needs a, lam or the workspace; where not, its order (`ResponseKind`) says of how
     many derivatives of the motion it is. by_state: whether its rate is g_q v + g_v a where the motion has the
     derivatives that its order asks for; else the rate is differenced along the motion.
+    in_plane, in_space: whether there is such a response of bodies in a plane, and in space.
     """
 
     value: Function
@@ -49,3 +54,5 @@ class ResponseKernels:
     absolute: bool = False
     needs_accelerations: bool = True
     by_state: bool = False
+    in_plane: bool = True
+    in_space: bool = True

@@ -6,13 +6,16 @@ made from them.
 """
 
 import importlib
+from collections.abc import Callable
+from types import FunctionType
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
 from mdstopo.case.responses import RESPONSES, ResponseKind
 from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
-from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.jit import by_type, kernel, part
 from mdstopo.general.accelerations import gather_multipliers, solve_accelerations
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SCALE, SET, level_of
@@ -24,7 +27,6 @@ from mdstopo.general.model import (
     COUNT,
     GROUP,
     INERTER,
-    JOINT_CODE,
     KIND,
     OFFSET,
     ORDER,
@@ -36,24 +38,36 @@ from mdstopo.general.model import (
 )
 from mdstopo.general.response_kernels import ResponseKernels, VectorKernels
 from mdstopo.general.step_history import SEGMENT
-from mdstopo.general.strides import energy_column, is_turning, pair_freedoms, place_in_joint, place_in_pair, pull_column
-from mdstopo.mechanics.joints.table import ACROSS as ACROSS_FORCE
-from mdstopo.mechanics.joints.table import FORCE, MOMENT, joint_transmitted
+from mdstopo.general.strides import (
+    dimensions,
+    energy_column,
+    is_turning,
+    pair_freedoms,
+    place_in_joint,
+    place_in_pair,
+    pull_column,
+)
+from mdstopo.mechanics.kinematics.components import ACROSS, NORM, X, Y
 from mdstopo.mechanics.kinematics.kinematics_interface import (
+    ACROSS_FORCE,
+    FORCE,
+    MOMENT,
     add_pair_force,
     angle_motion,
-    joint_places,
+    kinematics_of,
     member_rows,
     most_rows,
-    place_joint_alone,
     point_motion,
     retract,
     stretch_between,
+    tilt_motion,
+    transmitted,
+    turn_motion,
     turn_of,
 )
-from mdstopo.mechanics.kinematics.planar_points import ACROSS as ACROSS_MOTION
-from mdstopo.mechanics.kinematics.planar_points import NORM, X, Y
 from mdstopo.mechanics.laws.table import law
+
+F = TypeVar("F", bound=Callable[..., Any])
 
 #: the kernels of responses by their code, column KIND of `GeneralModel.response`; `code_of` fills it
 LISTED: Listed[ResponseKernels] = Listed()
@@ -66,6 +80,27 @@ TIE = 1e-9
 APART = 3e-4
 
 
+def _chosen_of_bodies(pick: Callable[[ResponseKernels], Any]) -> Callable[[F], F]:
+    """`chosen` among the kinds that there are of the model's bodies, in a plane or in space; as a part.
+
+    A kernel of bodies in a plane is not compiled for others, which have not what it asks for.
+    """
+
+    def make(stub: F) -> F:
+        function = cast(FunctionType, stub)
+        def of(where: str) -> Any:
+            name = f"{function.__name__}_{where}"
+            named = FunctionType(function.__code__.replace(co_name=name), function.__globals__, name)
+            named.__doc__, named.__qualname__, named.__module__ = function.__doc__, name, function.__module__
+            return chosen(LISTED, lambda each: pick(each) if getattr(each, where) else None, part)(named)
+
+        in_plane, in_space = of("in_plane"), of("in_space")
+        by_type(function, "model", lambda model: in_plane if kinematics_of(model).rotations == 1 else in_space)
+        return stub
+
+    return make
+
+
 @chosen(LISTED, lambda each: each.absolute or None, part)
 def _is_absolute(kind):
     """Whether responses of a kind are absolute values, or the largest of several."""
@@ -74,7 +109,7 @@ def _is_absolute(kind):
 
 @chosen(LISTED, lambda each: True if each.vector else None, part)
 def _is_vector(kind):
-    """Whether responses of a kind are a component or the norm of a plane vector."""
+    """Whether responses of a kind are a component or the norm of a vector."""
     return False
 
 
@@ -255,7 +290,7 @@ def equal_forces(model, member_state, segment, t, group, q, v, a, largest, tied)
     return max(found, 1)
 
 
-@chosen(LISTED, lambda each: each.value, part)
+@_chosen_of_bodies(lambda each: each.value)
 def _value(kind, model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar):
     """Value of a response by its kind (`ResponseKernels.value`).
 
@@ -342,8 +377,8 @@ def members_value(model, member_state, segment, j, who, t, q, v, a, bars):
 
 
 @kernel
-def motion_value(model, j, q, v, a, bars):
-    """Component or norm of a point's motion, or an angle, its rate or second derivative, as response j asks.
+def point_value(model, j, q, v, a, bars):
+    """Component or norm of a point's motion, as response j asks.
 
     model: the compiled scene.
     j: the response.
@@ -354,12 +389,36 @@ def motion_value(model, j, q, v, a, bars):
 
 
 @kernel
+def angle_value(model, j, q, v, a, bars):
+    """In a plane: an angle, its rate or second derivative, as response j asks; arguments as of `point_value`."""
+    body = model.response[j, BODY]
+    return angle_motion(model, model.response[j, ORDER], body, model.response[j, REFERENCE], q, v, a, bars)
+
+
+@kernel
+def turn_value(model, j, q, v, a, bars):
+    """In space: how a body has turned, how fast it turns, or the rate of that; arguments as of `point_value`."""
+    body = model.response[j, BODY]
+    reference = model.response[j, REFERENCE]
+    component = model.response[j, COMPONENT]
+    return turn_motion(model, model.response[j, ORDER], component, body, reference, q, v, a, bars)
+
+
+@kernel
+def tilt_value(model, j, q, v, a, bars):
+    """In space: the angle by which an axis of a body has tilted; arguments as of `point_value`."""
+    first = dimensions(model)  # behind the place of a point
+    axis = model.response_par[j, first:]
+    return tilt_motion(model, axis, model.response[j, BODY], model.response[j, REFERENCE], q, v, a, bars)
+
+
+@kernel
 def joint_force_value(model, j, q, lam, bars, row_bar):
     """Norm of the force that a joint transmits (N).
 
     model: the compiled scene.
     j: the response, which says which joint.
-    q (n,): coordinates (m, rad).
+    q (n_q,): coordinates (m, rad).
     lam (n_row,): multipliers of the joints.
     bars (3, n): slopes by q are added to its first row.
     row_bar (n_row,): slopes by lam are written into it.
@@ -369,11 +428,11 @@ def joint_force_value(model, j, q, lam, bars, row_bar):
 
 @kernel
 def joint_moment_value(model, j, q, lam, bars, row_bar):
-    """Absolute value of the moment that a joint transmits (N m).
+    """Absolute value, in space the norm, of the moment that a joint transmits (N m).
 
     model: the compiled scene.
     j: the response, which says which joint.
-    q (n,): coordinates (m, rad).
+    q (n_q,): coordinates (m, rad).
     lam (n_row,): multipliers of the joints.
     bars (3, n): slopes by q are added to its first row.
     row_bar (n_row,): slopes by lam are written into it.
@@ -383,42 +442,38 @@ def joint_moment_value(model, j, q, lam, bars, row_bar):
 
 @kernel
 def _motion(model, j, component, q, v, a, bars):
-    """One component of the motion of the point, or of the angle, that response j is about.
+    """One component of the motion of the point that response j is about.
 
     model: the compiled scene.
     j: the response.
-    component: X, Y, NORM or ACROSS (`planar_points`); angles have none.
+    component: X, Y, Z, NORM or, in a plane, ACROSS (`components`).
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
     body = model.response[j, BODY]
     reference = model.response[j, REFERENCE]
     order = model.response[j, ORDER]
-    if _is_vector(model.response[j, KIND]):
-        return point_motion(model, order, component, model.response_par[j], body, reference, q, v, a, bars)
-    return angle_motion(model, order, body, reference, q, v, a, bars)
+    return point_motion(model, order, component, model.response_par[j], body, reference, q, v, a, bars)
 
 
 @kernel
 def _transmitted(model, j, which, q, lam, bars, row_bar):
-    """What the joint transmits that response j is about, with its slopes (`joint_transmitted`).
+    """What the joint transmits that response j is about, with its slopes (`transmitted`).
 
     model: the compiled scene.
     j: the response, which says which joint.
-    which: FORCE, MOMENT or ACROSS.
-    q (n,): coordinates (m, rad).
+    which: FORCE, MOMENT or ACROSS_FORCE.
+    q (n_q,): coordinates (m, rad).
     lam (n_row,): multipliers of the joints.
     bars (3, n): slopes by q are added to its first row.
     row_bar (n_row,): slopes by lam are written into it.
     """
     joint = model.response[j, SUBJECT]
-    w = np.empty(joint_places(model))
     mine = np.empty(most_rows(model))
     by_lam = np.empty(most_rows(model))
     by_q = np.empty(pair_freedoms(model))
-    place_joint_alone(model, joint, q, w)
     gather_multipliers(model, joint, lam, mine)
-    value = joint_transmitted(model.joint[joint, JOINT_CODE], model.joint_par[joint], w, mine, which, by_lam, by_q)
+    value = transmitted(model, joint, which, q, mine, by_lam, by_q)
     for r in range(most_rows(model)):
         if model.row[joint, r] >= 0:
             row_bar[model.row[joint, r]] = by_lam[r]
@@ -429,7 +484,7 @@ def _transmitted(model, j, which, q, lam, bars, row_bar):
 
 @kernel
 def is_norm(model, j):
-    """Whether response j is the Euclidean norm of a plane vector."""
+    """Whether response j is the Euclidean norm of a vector."""
     return _is_vector(model.response[j, KIND]) and model.response[j, COMPONENT] == NORM
 
 
@@ -443,9 +498,9 @@ def has_kinks(model: GeneralModel, j: int) -> bool:
     return LISTED[int(model.response[j, KIND])].absolute or has_norm(model, j)
 
 
-@chosen(LISTED, lambda each: each.vector and each.vector.across, part)
+@_chosen_of_bodies(lambda each: each.vector and each.vector.across)
 def _across(kind, model, j, q, v, a, lam, bars, row_bar):
-    """Slopes of the component perpendicular to a response's vector, by its kind (`VectorKernels.across`).
+    """In a plane: slopes of the component perpendicular to a response's vector (`VectorKernels.across`).
 
     kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
     model: the compiled scene.
@@ -459,7 +514,7 @@ def _across(kind, model, j, q, v, a, lam, bars, row_bar):
 
 @kernel
 def across_slopes(model, j, q, v, a, lam, bars, row_bar):
-    """Slopes of the component perpendicular to the vector whose norm response j is, with the direction held.
+    """In a plane: slopes of the component perpendicular to the vector whose norm response j is, its direction held.
 
     Constant:
       model: the compiled scene.
@@ -485,7 +540,7 @@ def motion_across(model, j, q, v, a, bars):
     q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     bars (3, n): slopes by q, v and a are added to it.
     """
-    return _motion(model, j, ACROSS_MOTION, q, v, a, bars)
+    return _motion(model, j, ACROSS, q, v, a, bars)
 
 
 @kernel
@@ -502,9 +557,9 @@ def joint_force_across(model, j, q, lam, bars, row_bar):
     return _transmitted(model, j, ACROSS_FORCE, q, lam, bars, row_bar)
 
 
-@chosen(LISTED, lambda each: each.vector and each.vector.components, part)
+@_chosen_of_bodies(lambda each: each.vector and each.vector.components)
 def _components(kind, model, j, q, v, a, lam, out):
-    """The vector whose norm response j is, in the frame where it is formed, by its kind (`VectorKernels.components`).
+    """In a plane: the vector whose norm response j is, in the frame where it is formed (`VectorKernels.components`).
 
     kind: code of the response, by which its kernel is chosen; the kernel takes of the others what it asks for.
     model: the compiled scene.
@@ -540,7 +595,7 @@ def joint_force_components(model, j, lam, out):
 
 @kernel
 def across_rate(tag, model, member_state, history, k, c, j, t, q, v, workspace, a, lam):
-    """Rate in time, at a state within a step, of the component of `across_slopes`; by differences, as in `rated`.
+    """In a plane: rate in time, within a step, of the component of `across_slopes`; by differences, as in `rated`.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -739,12 +794,12 @@ def rated(
 
 OF_ENERGY = ResponseKernels(value=energy_value, by_state=True)
 OF_POINT = ResponseKernels(
-    value=motion_value,
+    value=point_value,
     vector=VectorKernels(across=motion_across, components=motion_components),
     needs_accelerations=False,
     by_state=True,
 )
-OF_ANGLE = ResponseKernels(value=motion_value, needs_accelerations=False, by_state=True)
+OF_ANGLE = ResponseKernels(value=angle_value, needs_accelerations=False, by_state=True, in_space=False)
 OF_MEMBERS = ResponseKernels(value=members_value, absolute=True)
 OF_JOINT_FORCE = ResponseKernels(
     value=joint_force_value,
@@ -752,6 +807,11 @@ OF_JOINT_FORCE = ResponseKernels(
     absolute=True,
 )
 OF_JOINT_MOMENT = ResponseKernels(value=joint_moment_value, absolute=True)
+
+OF_TURN = ResponseKernels(
+    value=turn_value, vector=VectorKernels(is_turn=True), needs_accelerations=False, by_state=True, in_plane=False
+)
+OF_TILT = ResponseKernels(value=tilt_value, absolute=True, needs_accelerations=False, by_state=True, in_plane=False)
 
 #: of the responses that are known so far, by where their kernels are
 CODES: dict[str, int] = {}

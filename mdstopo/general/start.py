@@ -19,7 +19,8 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.general.model import COUNT, DESIGN, START
 from mdstopo.mechanics.joints.table import describe
-from mdstopo.mechanics.kinematics.planar import PLANAR
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
+from mdstopo.scene.bodies import distances
 from mdstopo.scene.model import FloatArray, IndexArray
 
 if TYPE_CHECKING:
@@ -122,7 +123,7 @@ class SettledStart:
             assemble(driver.ints, driver.floats, q, v, False, phi, rates)
             torn = np.abs(rates).max(axis=1)
             span = scene.load_case.end - scene.load_case.start
-            if torn.max() > FITS * max(speed_of(case, v), size_of(case) / span):
+            if torn.max() > FITS * max(speed_of(case, v, scene.kinematics), size_of(case) / span):
                 joint = case.joints[int(torn.argmax())]
                 problem = f"where the scene settles, the start velocities tear {describe(joint)} apart"
         if problem:
@@ -138,14 +139,14 @@ def size_of(case: Case) -> float:
     cloud = np.concatenate(points)
     for joint in case.joints:
         for name, at in zip(joint.bodies, (joint.at_first, joint.at_second), strict=True):
-            centre = np.zeros(2) if name == "ground" else np.array(case.body(name).position)
+            centre = np.zeros(len(at)) if name == "ground" else np.array(case.body(name).position)
             cloud = np.concatenate([cloud, [centre + np.array(at)]])
     low, high = cloud.min(axis=0), cloud.max(axis=0)
-    size = float(np.hypot(*(high - low)))
+    size = float(distances(high - low))
     return size if size > 0.0 else 1.0
 
 
-def speed_of(case: Case, v: FloatArray) -> float:
-    """The largest speed of a body's centre or of a point a scene's size away from it, m/s."""
-    bodies = v.reshape(-1, PLANAR.freedoms)
-    return float((np.hypot(bodies[:, 0], bodies[:, 1]) + size_of(case) * np.abs(bodies[:, 2])).max())
+def speed_of(case: Case, v: FloatArray, kinematics: Kinematics) -> float:
+    """The largest speed of a body's centre or of a point a scene's size away from it, at velocities v (n,), m/s."""
+    moves, turns = kinematics.shifts_and_turns(v)
+    return float((distances(moves) + size_of(case) * distances(turns)).max())

@@ -19,6 +19,12 @@ def pair_freedoms(model):
 
 
 @part
+def dimensions(model):
+    """D - T: components of a shift, and coordinates of a point."""
+    return freedoms(model) - rotations(model)
+
+
+@part
 def first_freedom(model, body):
     """The place of a body's first freedom among those of all bodies."""
     return freedoms(model) * body

@@ -69,7 +69,7 @@ def _run(driver: SceneDriver, alpha: FloatArray, step: float) -> _Run | None:
     try:
         if not driver.shapes:
             status, steps = driver.simulate(alpha)
-            return _Run(steps.t.copy(), steps.state[:, 0].copy(), ()) if status is Status.OK else None
+            return _Run(steps.t.copy(), steps.q.copy(), ()) if status is Status.OK else None
         looked = driver.evaluate(alpha, True)
         if looked.status is not Status.OK:
             return None

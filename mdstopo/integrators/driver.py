@@ -15,7 +15,7 @@ from mdstopo.compiler.fields import aligned
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.integrators.integrands import PATIENCE, ROUNDS, VAIN, landed, quadrature_breakpoints
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult
-from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, carve, room_for, status_of
+from mdstopo.integrators.steps import NEEDS_ROOM, OK, STEP_LIMIT, WORK, Q, V, carve, room_for, status_of
 from mdstopo.mechanics.active_members import ROOMY
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -269,9 +269,20 @@ class DenseSteps:
         self.state: FloatArray = arrays[1][: count + 1]
         self.index: IndexArray = arrays[2][: count + 1]
 
-    def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+    @property
+    def q(self) -> FloatArray:
+        """(count + 1, n) coordinates."""
+        return self.state[:, Q]
+
+    @property
+    def v(self) -> FloatArray:
+        """(count + 1, n) velocities."""
+        return self.state[:, V]
+
+    def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
         """`at`, and lam (T, 0): nothing is constrained."""
-        return self.at(times), np.zeros((len(times), 0))
+        q, v, a = self.at(times)
+        return (q, v, a), np.zeros((len(times), 0))
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
         """There are no joints."""

@@ -88,8 +88,8 @@ class Differentiated:
 class Scene(Protocol):
     """One load case as arrays; bodies: names in the order of the state; skipped: what was left out, and why.
 
-    n: coordinates of the bodies that move. degrees_of_freedom: those of them that are free, less the independent rows
-    of joints.
+    n: freedoms of the bodies that move. degrees_of_freedom: those of them that are free, less the independent rows
+    of joints. redundant: joints with rows that others imply.
     """
 
     @property
@@ -104,20 +104,29 @@ class Scene(Protocol):
     def n(self) -> int: ...
     @property
     def degrees_of_freedom(self) -> int: ...
+    @property
+    def redundant(self) -> tuple[str, ...]: ...
 
 
 class Steps(Protocol):
-    """The steps of one simulation in arrays of their own: t (count + 1,); state (count + 1, 2, n), q and v."""
+    """The steps of one simulation in arrays of their own: t (count + 1,); q (count + 1, n_q) and v (count + 1, n)."""
 
     count: int
     t: FloatArray
-    state: FloatArray
 
-    def balanced(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """q, v, a (3, T, n) and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
+    @property
+    def q(self) -> FloatArray: ...
+    @property
+    def v(self) -> FloatArray: ...
+
+    def balanced(self, times: FloatArray) -> tuple[tuple[FloatArray, FloatArray, FloatArray], FloatArray]:
+        """q (T, n_q) and v, a (T, n), and lam (T, n_rows) of joints and motions, at times (T,); right-continuous."""
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
-        """Joint name -> Fx, Fy, M (T, 3) on its first body, at states q (T, n) with lam (T, n_rows)."""
+        """Joint name -> force and moment (T, D) on its first body at the joint, global axes.
+
+        q (T, n_q), lam (T, n_rows): states.
+        """
 
 
 class SceneDriver(Protocol):
@@ -161,8 +170,10 @@ class SceneDriver(Protocol):
     def member(self, padded: int) -> str:
         """A member in words."""
 
-    def explain(self, alpha: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
-        """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
+    def explain(
+        self, alpha: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[Status, str]:
+        """The status of a run that ended at `time` at q (n_q,) and v (n,), and who is to blame, in words."""
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the design of the last run."""

@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mdstopo.integrators.scene_driver import Steps
-from mdstopo.integrators.steps import Q, V
+from mdstopo.scene.border import Border
 from mdstopo.scene.model import FloatArray
 from mdstopo.status import Status
 
 
 @dataclass(frozen=True)
 class States:
-    """States at T times: q, v, a (T, n) in m, rad and their time derivatives; lam (T, n_rows) in N, N m."""
+    """States at T times, with the columns of a `Trajectory`: q, v, a in m, rad and their time derivatives; lam
+    (T, n_rows) in N, N m."""
 
     q: FloatArray
     v: FloatArray
@@ -27,11 +28,12 @@ class Trajectory:
     """One simulated load case.
 
     t (T,): times of the accepted steps, start and end included; q, v, a (T, n): x, y, psi of each body as declared and
-    their derivatives, a by the equations of motion, right-continuous where a load jumps; lam (T, n_rows): Lagrange
-    multipliers (no rows without joints and motions). status: anything but OK means that it ends early, at t[-1], or
-    goes on without being right (ZERO_LENGTH, STEP_TOO_LARGE); message says why. work: counts by name. reactions: Fx,
-    Fy, M (T, 3) of each joint on its first body, at the joint, global axes. home (n,): where the bodies are by the case
-    when those of `steps` have not moved.
+    their derivatives; in space q (T, 7 n_bodies): x, y, z and the unit quaternion w, x, y, z, and v, a (T, 6 n_bodies):
+    of the centre of mass, then angular, global. a by the equations of motion, right-continuous where a load jumps; lam
+    (T, n_rows): Lagrange multipliers (no rows without joints and motions). status: anything but OK means that it ends
+    early, at t[-1], or goes on without being right (ZERO_LENGTH, STEP_TOO_LARGE); message says why. work: counts by
+    name. reactions: Fx, Fy, M (T, 3), in space Fx, Fy, Fz, Mx, My, Mz (T, 6), of each joint on its first body, at the
+    joint, global axes. border: what makes of states of `steps` those of the case.
     """
 
     load_case: str
@@ -45,7 +47,7 @@ class Trajectory:
     work: dict[str, int]
     steps: Steps = field(repr=False)
     reactions: Mapping[str, FloatArray] = field(default_factory=dict)
-    home: FloatArray = field(default_factory=lambda: np.zeros(0), repr=False)
+    border: Border | None = field(default=None, repr=False)
 
     @classmethod
     def of(
@@ -55,27 +57,25 @@ class Trajectory:
         status: Status,
         message: str,
         work: dict[str, int],
-        home: FloatArray,
+        border: Border,
     ) -> "Trajectory":
-        """The trajectory of steps, which tell what bodies have moved since home.
+        """The trajectory of steps.
 
         load_case: its name.
         steps: what the driver gave, with its dense output.
         status, message: how the simulation ended, and why.
         work: counts by name.
-        home (n,): places and angles (m, rad) of the coordinates that the trajectory has; it leaves out further ones of
-          the steps.
+        border: what makes of their states those of the case; it leaves out further bodies.
         """
-        t, n = steps.t.copy(), len(home)
-        q, v = steps.state[:, Q, :n].copy(), steps.state[:, V, :n].copy()
-        q += home
-        a, lam = np.zeros_like(q), np.zeros((len(t), 0))
+        t, lam = steps.t.copy(), np.zeros((len(steps.t), 0))
+        q, v = border.places(steps.q), border.rates(steps.q, steps.v)
+        a = np.zeros_like(v)
         reactions: Mapping[str, FloatArray] = {}
         if steps.count:
-            out, lam = steps.balanced(t)
-            a = out[2][:, :n].copy()
-            reactions = steps.reactions(out[0], lam)
-        return cls(load_case, status, message, t, q, v, a, lam, work, steps, reactions, home)
+            (own_q, _, own_a), lam = steps.balanced(t)
+            a = border.rates(own_q, own_a)
+            reactions = steps.reactions(own_q, lam)
+        return cls(load_case, status, message, t, q, v, a, lam, work, steps, reactions, border)
 
     def at(self, times: ArrayLike) -> States:
         """States at times (T,), from the integrator's own dense output.
@@ -85,8 +85,6 @@ class Trajectory:
         asked = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if asked.ndim != 1 or not np.all((asked >= self.t[0]) & (asked <= self.t[-1])):
             raise ValueError(f"times must be one-dimensional and lie within {self.t[0]:g} .. {self.t[-1]:g} s")
-        n = self.q.shape[1]
-        out, lam = self.steps.balanced(asked)
-        q, v, a = out[:, :, :n]
-        q += self.home
-        return States(q, v, a, lam)
+        assert self.border is not None
+        (q, v, a), lam = self.steps.balanced(asked)
+        return States(self.border.places(q), self.border.rates(q, v), self.border.rates(q, a), lam)

@@ -15,6 +15,7 @@ from mdstopo.limiting.program import ImpossibleError, Program
 from mdstopo.limiting.response import Limits, NoBoundError, limits_of, objective_row
 from mdstopo.limiting.solve import UnsolvedError
 from mdstopo.limiting.system import System
+from mdstopo.scene.bodies import is_spatial
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,8 @@ def bound(case: Case, objective: Objective) -> Bound:
     """The bound of one objective."""
     if case.uncertainty is not None:
         return Bound(None, "the case has uncertain values: a bound would hold for one sample alone")
+    if is_spatial(case):
+        return Bound(None, "bounds are known of bodies in a plane alone")
     load_case = case.load_case(objective.load_case)
     try:
         if case.solver.assemble and case.joints:

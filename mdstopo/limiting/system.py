@@ -32,6 +32,7 @@ from mdstopo.case.model import (
     Table,
 )
 from mdstopo.general.drives import drives, motion_times
+from mdstopo.general.planar_scene import PLANE
 from mdstopo.limiting.known import Cubics, Floats, with_second_derivative
 from mdstopo.scene.signals import breakpoints, segment_values
 
@@ -60,7 +61,7 @@ class System:
     ) -> None:
         self.case, self.load_case = case, load_case
         self.names = tuple(body.name for body in load_case.bodies)
-        self.times = breakpoints(load_case, [*motion_times(load_case), *more])
+        self.times = breakpoints(load_case, [*motion_times(load_case, PLANE), *more])
         self.start = np.array([value for body in load_case.bodies for value in body.position])
         self.rate = np.array([value for body in load_case.bodies for value in body.velocity])
         self.angles = _unturned(case, load_case)
@@ -81,7 +82,7 @@ class System:
 
     def mass(self, body: str) -> float:
         """The mass of a body (kg)."""
-        return self.case.body(body).mass
+        return float(self.case.body(body).mass)
 
     @cached_property
     def _solved(self) -> tuple[Cubics, Floats]:
@@ -167,7 +168,7 @@ class System:
     def _driven(self) -> Iterator[Row]:
         q0 = np.array([value for body in self.load_case.bodies for value in (*body.position, body.angle)])
         v0 = np.array([value for body in self.load_case.bodies for value in (*body.velocity, body.angular_velocity)])
-        indices, cubics = drives(self.load_case, self.times, q0, v0)
+        indices, cubics = drives(self.load_case, self.times, PLANE, q0, v0)
         cubics[:, :, 0] += q0[indices]
         for i, d in enumerate(indices.tolist()):
             if d % 3 < 2:

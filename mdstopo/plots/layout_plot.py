@@ -9,6 +9,7 @@ from mdstopo.plots.scenery import edge_at, ends_at, outline, sizes, start_state
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.style import COLOURS, MOST_NAMED, WIDTH
 from mdstopo.scene.points import points_at
+from mdstopo.store.store_errors import StoreError
 
 #: of the range of alpha: what is thinner is not drawn
 FAINT = 0.02
@@ -24,6 +25,8 @@ _CONTACT = "#222222"
 def draw(module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = ()) -> Any:
     """One panel a time, the start where none is given."""
     case = source.case
+    if case.dimension > 2:
+        raise StoreError(f"{source.view.path}: bodies in space are not drawn yet; other pictures of them are")
     panels: list[tuple[float | None, Floats]] = [(None, start_state(case))]
     if times:
         name = load_case or source.load_cases[0]

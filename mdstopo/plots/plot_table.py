@@ -42,7 +42,8 @@ def fitting(view: ResultView) -> list[str]:
     if "pareto/objectives" in paths:
         found.append("front")
     alphas = bool(np.any(view.arrays.get("members/design", True)))
-    if view.kind in ("run", "pareto") or "design/alpha" in paths:
+    motions = view.kind in ("run", "pareto") or "design/alpha" in paths
+    if motions:
         found += ["layout", "design"] if alphas else ["layout"]
     if "iterations/combined" in paths:
         found.insert(0, "convergence")
@@ -50,6 +51,8 @@ def fitting(view: ResultView) -> list[str]:
         found.append("sensitivities")
     if alphas and any("/history/" in path for path in paths):
         found.append("sensitivity-histories")
-    if "layout" in found and view.lines("objectives"):
+    if motions and view.lines("objectives"):
         found.append("histories")
+    if view.arrays.get("members/p", np.zeros((0, 2))).shape[1:] == (3,):
+        found = [name for name in found if name != "layout"]  # bodies in space are not drawn yet
     return found

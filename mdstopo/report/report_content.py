@@ -14,6 +14,7 @@ from mdstopo.plots.scenery import outline, sizes, start_state
 from mdstopo.plots.source import Source
 from mdstopo.plots.watch import response_history
 from mdstopo.scene.points import points_at
+from mdstopo.store.store_errors import StoreError
 from mdstopo.store.whole_front import whole_front
 
 Floats = NDArray[np.float64]
@@ -27,6 +28,8 @@ FAINT = 0.02
 def content(source: Source) -> dict[str, Any]:
     """The page's data; numbers are rounded to what a screen can show."""
     case, view = source.case, source.view
+    if case.dimension > 2:
+        raise StoreError(f"{view.path}: there is no page of bodies in space yet; `mdstopo plot` draws what it can")
     names = list(source.names)
     known = _bounds(source)
     kkts = view.arrays.get("iterations/kkt", np.zeros(0))

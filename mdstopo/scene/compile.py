@@ -54,6 +54,8 @@ class Scene:
     n_bodies: int
     damped: bool
     skipped: tuple[str, ...]
+    #: there are no joints, so none with rows that others imply
+    redundant: tuple[str, ...] = ()
 
     @cached_property
     def n(self) -> int:

@@ -33,13 +33,16 @@ class Diagnosis:
                 return member_in_words(group, i)
         raise IndexError(f"no member at {padded}")
 
-    def explain(self, design: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
-        """The status, and the member or body to blame in words, for a motion that ended at `time` in state (2, n)."""
+    def explain(
+        self, design: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[Status, str]:
+        """The status, and the member or body to blame in words, for a motion that ended at `time` in q, v (n,)."""
         where = f"at t = {time:.6g} s"
-        meeting = self._collapsed(design, state[0])
+        meeting = self._collapsed(design, q)
         if meeting >= 0 and status in (Status.STEP_TOO_SMALL, Status.STEP_LIMIT, Status.NEWTON_FAILED):
             return Status.ZERO_LENGTH, f"{self.member(meeting)}, {where}"
-        return status, f"{where}; the fastest body is {fastest_body(self.scene.bodies, state[1, : self.scene.n])}"
+        fastest = fastest_body(self.scene.bodies, v[: self.scene.n].reshape(-1, 3))
+        return status, f"{where}; the fastest body is {fastest}"
 
     def _collapsed(self, design: FloatArray, q: FloatArray) -> int:
         """Padded index of the member that has shrunk to nothing while it carries a force, or -1."""
@@ -71,15 +74,22 @@ def member_in_words(group: MemberGroup, i: int) -> str:
     """Member i of a group, by its ends."""
     p, q = group.p_world[i], group.q_world[i]
     return (
-        f"member {i} of group {group.name}, from ({p[0]:g}, {p[1]:g}) on {group.body_from} to "
-        f"({q[0]:g}, {q[1]:g}) on {group.body_to}"
+        f"member {i} of group {group.name}, from ({_numbers(p)}) on {group.body_from} to "
+        f"({_numbers(q)}) on {group.body_to}"
     )
 
 
+def _numbers(point: FloatArray) -> str:
+    return ", ".join(f"{value:g}" for value in point.tolist())
+
+
 def fastest_body(bodies: Sequence[str], v: FloatArray) -> str:
-    """The name of the body that moves fastest at velocities v (3 n_bodies,), or of one whose speed is no number."""
+    """The name of the body that moves fastest, or of one whose speed is no number.
+
+    v (n_bodies, D): velocities, in the order of `bodies`, which may have ground behind them.
+    """
     if not len(v):
         return GROUND
-    speed = np.abs(v).reshape(-1, 3).max(axis=1)
+    speed = np.abs(v).max(axis=1)
     wild = np.flatnonzero(~np.isfinite(speed))
     return bodies[int(wild[0]) if wild.size else int(speed.argmax())]

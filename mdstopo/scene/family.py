@@ -9,6 +9,8 @@ _REDUCTIONS = frozenset({"max", "min", "mean", "integral", "final"})
 
 def beyond_springs(case: Case) -> str:
     """What in the case only the general kernels compute, in words; empty where nothing is."""
+    if case.dimension > 2:
+        return "bodies in space"
     if case.joints:
         return "joints"
     if case.solver.settle:

@@ -27,33 +27,35 @@ from mdstopo.case.model import (
     MemberGroup,
     Motion,
     Objective,
-    Pair,
     Prescribed,
     ResponseRow,
     Table,
 )
+from mdstopo.scene.bodies import distances, placed
 from mdstopo.scene.model import FloatArray
 
 #: the grid of origins is at least so many times as wide as half the scene
 WIDER = 4.0
 
+#: a point, x and y in a plane, x, y and z in space
+Point = tuple[float, ...]
+
 _Row = TypeVar("_Row", Objective, ResponseRow)
 _Tie = TypeVar("_Tie", Joint, Bushing)
 
 
-def origin_of(case: Case) -> Pair:
-    """The point that the scene is computed from, in the file's coordinates; (0, 0) for scenes about the origin."""
+def origin_of(case: Case) -> Point:
+    """The point that the scene is computed from, in the file's coordinates; zeros for scenes about the origin."""
     low, high = _corners(case)
     half = 0.5 * float((high - low).max())
     if half == 0.0:
-        return 0.0, 0.0  # one body that nothing is tied to
+        return (0.0,) * len(low)  # one body that nothing is tied to
     grid = 2.0 ** math.ceil(math.log2(WIDER * half))
-    x, y = (grid * round(middle / grid) for middle in (0.5 * low + 0.5 * high).tolist())
-    return x, y
+    return tuple(grid * round(middle / grid) for middle in (0.5 * low + 0.5 * high).tolist())
 
 
 def extent_of(case: Case) -> float:
-    """The larger side of the box around bodies and what ties them, m."""
+    """The largest side of the box around bodies and what ties them, m."""
     low, high = _corners(case)
     return float((high - low).max())
 
@@ -64,7 +66,7 @@ def _corners(case: Case) -> tuple[FloatArray, FloatArray]:
 
 
 def ends_of(group: MemberGroup, as_stated: bool = False) -> tuple[str, str, FloatArray, FloatArray]:
-    """First and second body of a group, and its members' ends (M, 2) on each, in body coordinates; ground comes first.
+    """First and second body of a group, and its members' ends (M, d) on each, in body coordinates; ground comes first.
 
     Poses are told in the first body's frame: from a body that turns, a far point of ground moves fast, and the square
     of its distance stands in what has to cancel. as_stated: keep the ends as they are (members in rows of a grid).
@@ -75,7 +77,7 @@ def ends_of(group: MemberGroup, as_stated: bool = False) -> tuple[str, str, Floa
 
 
 def _places(case: Case) -> Iterator[FloatArray]:
-    """Where bodies and what ties them are at the start, (any, 2) each."""
+    """Where bodies and what ties them are at the start, (any, d) each."""
     yield np.array([body.position for body in case.bodies])
     for group in case.members:
         yield group.from_world
@@ -92,12 +94,12 @@ def _places(case: Case) -> Iterator[FloatArray]:
             yield contact.points
 
 
-def seen_from(case: Case, origin: Pair) -> Case:
-    """The same scene in coordinates from `origin`; the case itself where that is (0, 0).
+def seen_from(case: Case, origin: Point) -> Case:
+    """The same scene in coordinates from `origin`; the case itself where that is zero.
 
     What only words are made of (`from_world`, `points`) stays as in the file.
     """
-    if origin == (0.0, 0.0):
+    if not any(origin):
         return case
     bodies = _bodies(case.bodies, origin)
     stands = {body.name: body for body in bodies}
@@ -114,15 +116,15 @@ def seen_from(case: Case, origin: Pair) -> Case:
     )
 
 
-def _from(at: Pair, origin: Pair) -> Pair:
-    return at[0] - origin[0], at[1] - origin[1]
+def _from(at: Point, origin: Point) -> Any:
+    return tuple(along - zero for along, zero in zip(at, origin, strict=True))
 
 
-def _bodies(bodies: tuple[Body, ...], origin: Pair) -> tuple[Body, ...]:
+def _bodies(bodies: tuple[Body, ...], origin: Point) -> tuple[Body, ...]:
     return tuple(replace(body, position=_from(body.position, origin)) for body in bodies)
 
 
-def _tie(tie: _Tie, origin: Pair) -> _Tie:
+def _tie(tie: _Tie, origin: Point) -> _Tie:
     """A joint or bushing; its end on ground, where it has one, from `origin`."""
     first, second = tie.bodies
     if first == GROUND:
@@ -132,7 +134,7 @@ def _tie(tie: _Tie, origin: Pair) -> _Tie:
     return tie
 
 
-def _group(group: MemberGroup, stands: dict[str, Body], origin: Pair) -> MemberGroup:
+def _group(group: MemberGroup, stands: dict[str, Body], origin: Point) -> MemberGroup:
     """A group with ends on ground from `origin`, and with lengths that its own coordinates have."""
     ends: dict[str, Any] = {}
     places = []
@@ -141,15 +143,13 @@ def _group(group: MemberGroup, stands: dict[str, Body], origin: Pair) -> MemberG
         if name == GROUND:
             ends[f"{side}_local"] = place = local - np.array(origin)
         else:
-            body = stands[name]
-            c, s = math.cos(body.angle), math.sin(body.angle)
-            place = local @ np.array([[c, s], [-s, c]]) + np.array(body.position)
+            place = placed(stands[name], local)
         places.append(place)
     d = places[1][group.to_index] - places[0][group.from_index]
-    return replace(group, **ends, length=np.hypot(d[:, 0], d[:, 1]))
+    return replace(group, **ends, length=distances(d))
 
 
-def _contact(contact: Contact, origin: Pair) -> Contact:
+def _contact(contact: Contact, origin: Point) -> Contact:
     if contact.edge_body == GROUND:
         edge_from, edge_to = _from(contact.edge_from, origin), _from(contact.edge_to, origin)
         contact = replace(contact, edge_from=edge_from, edge_to=edge_to)
@@ -158,7 +158,7 @@ def _contact(contact: Contact, origin: Pair) -> Contact:
     return contact
 
 
-def _looked(row: _Row, origin: Pair) -> _Row:
+def _looked(row: _Row, origin: Point) -> _Row:
     """An objective or constraint; a point on ground that is looked at, from `origin`."""
     seen = row.response
     if seen.body != GROUND or seen.at_local is None:
@@ -166,14 +166,16 @@ def _looked(row: _Row, origin: Pair) -> _Row:
     return replace(row, response=replace(seen, at_local=_from(seen.at_local, origin)))
 
 
-def _load_case(load_case: LoadCase, origin: Pair) -> LoadCase:
+def _load_case(load_case: LoadCase, origin: Point) -> LoadCase:
     motions = tuple(_motion(motion, origin) for motion in load_case.motions)
     return replace(load_case, bodies=_bodies(load_case.bodies, origin), motions=motions)
 
 
-def _motion(motion: Motion, origin: Pair) -> Motion:
+def _motion(motion: Motion, origin: Point) -> Motion:
     """A motion whose positions, where it prescribes such, are from `origin`."""
-    return replace(motion, x=_along(motion.x, origin[0]), y=_along(motion.y, origin[1]))
+    axes = zip(("x", "y", "z"), origin, strict=False)
+    moved: dict[str, Any] = {axis: _along(getattr(motion, axis), along) for axis, along in axes}
+    return replace(motion, **moved)
 
 
 def _along(part: Prescribed | None, along: float) -> Prescribed | None:

@@ -12,19 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from mdstopo.case.model import Case, MemberGroup, Pair
+from mdstopo.case.model import Case, MemberGroup
 from mdstopo.scene.model import FloatArray
-from mdstopo.scene.origin import seen_from
+from mdstopo.scene.origin import Point, seen_from
 
 #: the other point is so far away, of the scene's size: coordinates stay as large as they are
 APART = 0.05, 0.2
 
 
-def rounded_otherwise(case: Case, origin: Pair, size: float, sample: int) -> Case:
+def rounded_otherwise(case: Case, origin: Point, size: float, sample: int) -> Case:
     """The case in coordinates from a point near `origin`, with neighbours of its numbers; sample: which, from 1."""
     random = np.random.default_rng(sample)
-    x, y = (size * random.uniform(*APART, 2)).tolist()
-    moved = seen_from(case, (origin[0] + x, origin[1] + y))
+    apart = (size * random.uniform(*APART, len(origin))).tolist()
+    moved = seen_from(case, tuple(zero + away for zero, away in zip(origin, apart, strict=True)))
     return replace(moved, members=tuple(_nudged(group, random) for group in moved.members))
 
 

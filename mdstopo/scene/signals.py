@@ -1,10 +1,10 @@
 """Piecewise linear signals of time, cut into segments at whose ends the integrators land."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from mdstopo.case.model import LoadCase, Signal, Table
+from mdstopo.case.model import Load, LoadCase, Signal, Table
 from mdstopo.scene.model import FloatArray
 
 
@@ -15,7 +15,7 @@ def breakpoints(load_case: LoadCase, more: Iterable[float] = ()) -> FloatArray:
     """
     inside: set[float] = set(more)
     for load in load_case.loads:
-        for signal in (*load.force, load.moment):
+        for signal in signals_of(load):
             if isinstance(signal, Table):
                 inside.update(signal.times.tolist())
     near = _nearness(load_case.start, load_case.end)
@@ -24,6 +24,16 @@ def breakpoints(load_case: LoadCase, more: Iterable[float] = ()) -> FloatArray:
         if t - times[-1] > near and load_case.end - t > near:
             times.append(t)
     return np.array([*times, load_case.end])
+
+
+def signals_of(load: Load) -> Iterator[Signal]:
+    """All signals of a load: one a component, in a plane as in space."""
+    yield from load.force
+    for several in (load.moment, load.angular_acceleration):
+        if isinstance(several, tuple):
+            yield from several
+        elif several is not None:
+            yield several
 
 
 def _nearness(start: float, end: float) -> float:

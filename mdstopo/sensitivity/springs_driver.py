@@ -57,9 +57,11 @@ class SpringsDriver(Driver):
         """A member in words, from its place in the padded arrays."""
         return self._diagnosis.member(padded)
 
-    def explain(self, alpha: FloatArray, status: Status, time: float, state: FloatArray) -> tuple[Status, str]:
+    def explain(
+        self, alpha: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray
+    ) -> tuple[Status, str]:
         """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
-        return self._diagnosis.explain(alpha, status, time, state)
+        return self._diagnosis.explain(alpha, status, time, q, v)
 
     def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
         """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""

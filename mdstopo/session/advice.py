@@ -5,8 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, Objective, ResponseRow, VolumeRow
+from mdstopo.case.model import GROUND, Case, FloatArray, Objective, ResponseRow, VolumeRow
 from mdstopo.case.responses import kind_of
+from mdstopo.scene.points import seats_at
 from mdstopo.starts.evaluator_interface import Evaluation
 from mdstopo.store.contents import Motion
 
@@ -110,12 +111,19 @@ def relative_motion(case: Case, motion: Motion) -> float:
     for one, other in sorted(pairs):
         if one == GROUND:
             one, other = other, one
-        first = motion.q[:, 3 * index[one] : 3 * index[one] + 3]
-        second = np.zeros((1, 3))
-        if other != GROUND:
-            second = motion.q[:, 3 * index[other] : 3 * index[other] + 3]
-        dx, dy = second[:, 0] - first[:, 0], second[:, 1] - first[:, 1]
-        c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
-        seen = np.stack([c * dx + s * dy, c * dy - s * dx], axis=1)
+        seen = _seen(case, motion.q, index[one], -1 if other == GROUND else index[other])
         largest = max(largest, float(np.sqrt(((seen - seen[0]) ** 2).sum(axis=1)).max(initial=0.0)))
     return largest
+
+
+def _seen(case: Case, q: FloatArray, one: int, other: int) -> FloatArray:
+    """(T, d): where a body's centre of mass is in another one's axes at states q; numbers of the bodies, -1: ground."""
+    if case.dimension > 2:
+        place, turned = seats_at(q, one)
+        away = (seats_at(q, other)[0] if other >= 0 else np.zeros((1, 3))) - place
+        return np.asarray(np.einsum("tji,tj->ti", turned, away))
+    first = q[:, 3 * one : 3 * one + 3]
+    second = q[:, 3 * other : 3 * other + 3] if other >= 0 else np.zeros((1, 3))
+    dx, dy = second[:, 0] - first[:, 0], second[:, 1] - first[:, 1]
+    c, s = np.cos(first[:, 2]), np.sin(first[:, 2])
+    return np.stack([c * dx + s * dy, c * dy - s * dx], axis=1)

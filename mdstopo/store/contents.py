@@ -23,8 +23,8 @@ Datasets = dict[str, Value]
 
 
 class Motion(Protocol):
-    """The steps of a trajectory: t (T,), q, v, a (T, 3 n_bodies), lam (T, n_rows), reactions (T, 3) by joint; how it
-    ended."""
+    """The steps of a trajectory: t (T,), q, v, a (T, columns of all bodies), lam (T, n_rows), reactions (T, 3 or 6) by
+    joint; how it ended."""
 
     @property
     def t(self) -> Floats: ...
@@ -49,8 +49,8 @@ def case_part(case: Case) -> Datasets:
     pieces: Datasets = {
         "case": case.text,
         "resume/case": describe(case),
-        "members/p": _rows([group.p_world for group in groups]),
-        "members/q": _rows([group.q_world for group in groups]),
+        "members/p": _rows([group.p_world for group in groups], case.dimension),
+        "members/q": _rows([group.q_world for group in groups], case.dimension),
         "members/group": np.repeat(texts([group.name for group in groups]), counts),
         "objectives": [objective.name for objective in case.objectives],
         "members/design": np.repeat(np.array([group.design for group in groups], dtype=np.bool_), counts),
@@ -141,5 +141,5 @@ def result_image(
     return encode(attributes, {**whole, **marked.extra}, marked.scales)
 
 
-def _rows(blocks: list[Floats]) -> Floats:
-    return np.concatenate(blocks) if blocks else np.zeros((0, 2))
+def _rows(blocks: list[Floats], width: int) -> Floats:
+    return np.concatenate(blocks) if blocks else np.zeros((0, width))

@@ -9,18 +9,17 @@ from typing import Any
 
 import numpy as np
 
+from mdstopo.case.columns import point_columns, reaction_columns, state_columns
 from mdstopo.case.model import Case
 from mdstopo.store.result_reader import ResultView
 from mdstopo.store.whole_front import whole_front
 
 Table = tuple[list[str], list[Sequence[Any]]]
 
-_AXES = ("x", "y", "psi")
-
 
 def tables(view: ResultView, case: Case) -> dict[str, Table]:
     """Header and rows by name: members, iterations, front, sweep, samples, each load case's trajectory."""
-    found: dict[str, Table] = {"members": _members(view)}
+    found: dict[str, Table] = {"members": _members(view, case)}
     names = view.lines("objectives")
     iterations = view.under("iterations")
     if "combined" in iterations:
@@ -48,9 +47,10 @@ def tables(view: ResultView, case: Case) -> dict[str, Table]:
     return found
 
 
-def _members(view: ResultView) -> Table:
+def _members(view: ResultView, case: Case) -> Table:
     p, q, design = (view.array(f"members/{name}") for name in ("p", "q", "design"))
-    header = ["member", "group", "from_x_m", "from_y_m", "to_x_m", "to_y_m", "design"]
+    ends = [f"{end}_{axis}_m" for end in ("from", "to") for axis in point_columns(case)]
+    header = ["member", "group", *ends, "design"]
     columns: list[Any] = [
         range(len(p)), view.lines("members/group"), *p.T.tolist(), *q.T.tolist(), design.astype(int).tolist(),
     ]  # fmt: skip
@@ -87,11 +87,11 @@ def _trajectory(case: Case, motion: Mapping[str, Any]) -> Table:
     header, columns = ["t_s"], [motion["t"]]
     for name in ("q", "v", "a"):
         if name in motion:
-            header += [f"{name} {body.name}.{axis}" for body in case.bodies for axis in _AXES]
+            header += [f"{name} {column}" for column in state_columns(case, name)]
             columns += list(motion[name].T)
     for name, array in motion.items():
         if name.startswith("reactions/"):
-            header += [f"{name.removeprefix('reactions/')}.{part}" for part in ("Fx", "Fy", "M")]
+            header += [f"{name.removeprefix('reactions/')}.{part}" for part in reaction_columns(case)]
             columns += list(array.T)
     return header, [list(row) for row in zip(*(column.tolist() for column in columns), strict=True)]
 

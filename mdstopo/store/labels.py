@@ -9,14 +9,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from mdstopo.case.columns import reaction_columns, state_columns, state_units
 from mdstopo.case.model import Case
 from mdstopo.case.units import unit_of_value
 from mdstopo.store.image import Value
 
 Datasets = dict[str, Value]
-
-_KINEMATIC = {"t": "s", "q": "m, rad", "v": "m/s, rad/s", "a": "m/s^2, rad/s^2", "lambda": "N, N m"}
-_AXES = ("x", "y", "psi")
 
 
 @dataclass
@@ -70,7 +68,7 @@ def labels(case: Case, datasets: Mapping[str, Value]) -> Labels:
 
 
 def _trajectory(case: Case, group: str, datasets: Mapping[str, Value], found: Labels) -> None:
-    for name, unit in _KINEMATIC.items():
+    for name, unit in state_units(case).items():
         path = f"{group}/{name}"
         if path in datasets:
             found.units[path] = unit
@@ -78,8 +76,9 @@ def _trajectory(case: Case, group: str, datasets: Mapping[str, Value], found: La
                 found.scales[path] = (f"{group}/t", _second(case, group, name, datasets[path], found))
     for path in datasets:
         if path.startswith(f"{group}/reactions/"):
-            found.units[path] = "N, N, N m"
-            found.extra[f"{group}/component"] = ["Fx", "Fy", "M"]
+            columns = reaction_columns(case)
+            found.units[path] = ", ".join("N" if column[0] == "F" else "N m" for column in columns)
+            found.extra[f"{group}/component"] = columns
             found.scales[path] = (f"{group}/t", f"{group}/component")
 
 
@@ -110,10 +109,12 @@ def _second(case: Case, group: str, name: str, value: Value, found: Labels) -> s
     """The scale of a second dimension, made where it is first needed."""
     assert isinstance(value, np.ndarray)
     scale = _SECOND.get(name, f"{name}_column")
+    if scale == "coordinate" and len(state_columns(case, name)) != len(state_columns(case, "q")):
+        scale = "freedom"
     path = f"{group}/{scale}"
     if path not in found.extra:
-        if scale == "coordinate":
-            found.extra[path] = [f"{body.name}.{axis}" for body in case.bodies for axis in _AXES]
+        if scale in ("coordinate", "freedom"):
+            found.extra[path] = state_columns(case, name)
         elif scale == "objective":
             found.extra[path] = [objective.name for objective in case.objectives]
         else:

@@ -18,11 +18,10 @@ from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.joints.kernels import FITTED, AtHome, JointKernels
 from mdstopo.mechanics.joints.revolute import arms
+from mdstopo.mechanics.kinematics.kinematics_interface import ACROSS_FORCE, FORCE, MOMENT
 from mdstopo.scene.model import HOME_ANGLE, HOME_COS, HOME_X, HOME_Y, FloatArray
 
 WIDTH = 12
-#: what a joint transmits (`joint_transmitted`)
-FORCE, MOMENT, ACROSS = range(3)
 
 LISTED: Listed[JointKernels] = Listed()
 #: of the joints that are known so far, by their word
@@ -200,8 +199,8 @@ def joint_transmitted(code, par, w, lam, which, by_lam, by_q):
       par (WIDTH,): its parameters.
       w (PLACES,): where both bodies are (`revolute.place_joint`).
       lam (3,): multipliers (N, N m).
-      which: FORCE or MOMENT; ACROSS: the norm of the force, with the slopes of the component perpendicular to it, a
-        quarter turn ahead, in global axes; these are zero where the force has one direction.
+      which: FORCE or MOMENT; ACROSS_FORCE: the norm of the force, with the slopes of the component perpendicular to
+        it, a quarter turn ahead, in global axes; these are zero where the force has one direction.
     Out:
       by_lam (3,), by_q (6,): slopes; zero where the norm is zero.
     """
@@ -226,7 +225,7 @@ def joint_transmitted(code, par, w, lam, which, by_lam, by_q):
     if size > 0.0 and which == FORCE:
         by_lam[0] = lam[0] / size
         by_lam[1] = lam[1] / size
-    elif size > 0.0:
+    elif size > 0.0 and which == ACROSS_FORCE:
         by_lam[0] = -lam[1] / size
         by_lam[1] = lam[0] / size
     return size

@@ -14,6 +14,7 @@ first body, then of its second. A relative pose xi has D components that change 
 coordinates calls `retract` (or what stands beside it), and whoever subtracts some calls `difference`.
 """
 
+import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -26,6 +27,9 @@ from mdstopo.compiler.fields import FloatArray
 from mdstopo.compiler.jit import by_type
 from mdstopo.compiler.kernel import Kernel
 
+#: what a joint transmits (`transmitted`)
+FORCE, MOMENT, ACROSS_FORCE = range(3)
+
 #: by the name of the model's type
 _MOVED_BY: dict[str, "Kinematics"] = {}
 #: what a structure's type is called beside its maker (`general.structures`)
@@ -36,8 +40,9 @@ _ENDING = "Structure"
 class Kinematics:
     """How the bodies of one kind of model move.
 
-    coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. kernels: a
-    function for each of this module. entries: the module of those that Python calls (`planar_entry`).
+    coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. at_home (N): the
+    coordinates of a body that has not moved. kernels: a function for each of this module, without those that only
+    bodies of another kind have (`OPTIONAL`). entries: the module of those that Python calls (`planar_entry`).
     """
 
     coordinates: int
@@ -45,8 +50,14 @@ class Kinematics:
     rotations: int
     attitude: int
     rows: int
+    at_home: tuple[float, ...]
     kernels: Mapping[str, Kernel]
     entries: str
+
+    def of_python(self, name: str) -> Callable[..., Any]:
+        """A compiled function that Python calls, `slopes_of` or `reactions`."""
+        found: Callable[..., Any] = getattr(importlib.import_module(self.entries), name)
+        return found
 
     def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:
         """`retract` in Python: coordinates (n_q,) from others and a shift (n,)."""
@@ -785,6 +796,24 @@ def add_contact_curvature(model, j, q, rows, n, t, k):
     raise NotImplementedError
 
 
+def transmitted(model, j, which, q, lam, by_lam, by_q):
+    """Norm of the force or of the moment that a joint transmits, at the first body's joint point.
+
+    In:
+      model: the compiled scene.
+      j: the joint.
+      which: FORCE or MOMENT; in a plane ACROSS_FORCE: the norm of the force, with the slopes of the component
+        perpendicular to it, a quarter turn ahead, in global axes; these are zero where the force has one direction.
+      q (n_q,): coordinates.
+      lam (rows,): its multipliers.
+    Out:
+      by_lam (rows,), by_q (2 D,): slopes; zero where the norm is zero.
+
+    Returns it (N or N m).
+    """
+    raise NotImplementedError
+
+
 # Motion of points
 
 
@@ -794,37 +823,8 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
     In:
       model: the compiled scene.
       order: of the derivative by time, 0 to 2.
-      component: `planar_points.X`, Y, NORM or ACROSS.
-      at (2 or more,): the point in the frame of b (m).
-      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
-    Out:
-      bars (3, n): slopes by q, v, a, added to.
-    """
-    raise NotImplementedError
-
-
-def turn_motion(model, order, component, b, r, q, v, a, bars):
-    """The turn of body b since home as body r sees it, as a rotation vector, or its rate, or that one's derivative.
-
-    In:
-      model: the compiled scene.
-      order: 0: the rotation vector; 1: the relative turning rate in the axes of r; 2: its derivative by time.
-      component: `spatial_points.X`, Y, Z, NORM, ACROSS or ACROSS_TWO.
-      b, r: the bodies.
-      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
-    Out:
-      bars (3, n): slopes by q, v, a, added to.
-    """
-    raise NotImplementedError
-
-
-def tilt_motion(model, at, b, r, q, v, a, bars):
-    """The angle between an axis of body b as body r sees it now and at home.
-
-    In:
-      model: the compiled scene.
-      at (3 or more,): the axis, of length 1, in the frame of b.
-      b, r: the bodies.
+      component: `components.X`, Y, NORM or ACROSS; in space X, Y, Z or NORM.
+      at (D - T or more,): the point in the frame of b (m).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
     Out:
       bars (3, n): slopes by q, v, a, added to.
@@ -833,7 +833,7 @@ def tilt_motion(model, at, b, r, q, v, a, bars):
 
 
 def angle_motion(model, order, b, r, q, v, a, bars):
-    """The angle of body b as seen from body r, or its first or second derivative.
+    """In a plane: the angle of body b as seen from body r, or its first or second derivative.
 
     In:
       model: the compiled scene.
@@ -846,6 +846,41 @@ def angle_motion(model, order, b, r, q, v, a, bars):
     raise NotImplementedError
 
 
+def turn_motion(model, order, component, b, r, q, v, a, bars):
+    """In space: how body b has turned since the start as seen from body r, or how fast it turns.
+
+    Of order 0 it is the rotation vector of S(t) S(start)^T, S = R_r^T R_b; of order 1 the angular velocity
+    omega_b - omega_r, of order 2 the derivatives of its components by time: all in the axes of r.
+
+    In:
+      model: the compiled scene.
+      order: 0 to 2.
+      component: `components.X`, Y, Z or NORM.
+      b, r: the bodies.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      bars (3, n): slopes by q, v, a, added to.
+    """
+    raise NotImplementedError
+
+
+def tilt_motion(model, at, b, r, q, v, a, bars):
+    """In space: the angle between an axis of body b now and at the start, as seen from body r.
+
+    In:
+      model: the compiled scene.
+      at (3 or more,): the axis, a unit vector in the frame of b.
+      b, r: the bodies.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      bars (3, n): slopes by q, v, a, added to.
+    """
+    raise NotImplementedError
+
+
+#: functions that only one kind of bodies has: an angle is a number in a plane, a turn has three components in space
+OPTIONAL = frozenset({"angle_motion", "turn_motion", "tilt_motion"})
+
 #: all of the functions above, by name
 INTERFACE: dict[str, Callable[..., Any]] = {
     name: each for name, each in globals().items() if isinstance(each, FunctionType) and each.__module__ == __name__
@@ -857,8 +892,13 @@ def move_by(maker: type, kinematics: Kinematics) -> None:
     _MOVED_BY[maker.__name__] = kinematics
 
 
+def kinematics_of(model: Any) -> Kinematics:
+    """How the bodies of a model move, from its type in a kernel that is compiled."""
+    return _MOVED_BY[type(model).__name__.removesuffix(_ENDING)]
+
+
 def _of(name: str, model: Any) -> Any:
-    return _MOVED_BY[type(model).__name__.removesuffix(_ENDING)].kernels[name]
+    return kinematics_of(model).kernels[name]
 
 
 for _name, _stub in INTERFACE.items():

@@ -21,6 +21,7 @@ from mdstopo.mechanics.joints.table import joint_is_point as is_point_by_code
 from mdstopo.mechanics.joints.table import joint_rows as rows_by_code
 from mdstopo.mechanics.joints.table import joint_stiffness as stiffness_by_code
 from mdstopo.mechanics.joints.table import joint_velocity_slope as velocity_slope_by_code
+from mdstopo.mechanics.joints.table import joint_transmitted
 from mdstopo.mechanics.kinematics import (
     planar_bushings,
     planar_contacts,
@@ -379,6 +380,14 @@ def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
     bar_v[two] -= rate_second
 
 
+@part
+def transmitted(model, j, which, q, lam, by_lam, by_q):
+    """See `joints.table.joint_transmitted`; see `kinematics_interface.transmitted`."""
+    w = np.empty(PLACES)
+    place_joint_of_bodies(model.home, model.joint[j, 1], model.joint[j, 2], q, w)
+    return joint_transmitted(model.joint[j, 0], model.joint_par[j], w, lam, which, by_lam, by_q)
+
+
 _KERNELS = (
     coordinates, freedoms, rotations, load_slopes, attitude, most_rows, pose_size, joint_places,
     retract, difference, retract_vjp, retract_jvp, planar_steps.advance_coordinates, moved_most,
@@ -395,8 +404,9 @@ _KERNELS = (
     planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums, planar_members.member_designs,
     planar_members.spring_designs, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
     place_joint, place_joint_alone, joint_rows, joint_gamma, joint_velocity_slope, joint_acceleration_slopes,
-    joint_stiffness, joint_is_point, point_joint_vjp, planar_bushings.add_bushings, planar_contacts.contact_rows,
-    planar_contacts.add_contact_curvature, planar_points.point_motion, planar_points.angle_motion,
+    joint_stiffness, joint_is_point, point_joint_vjp, transmitted, planar_bushings.add_bushings,
+    planar_contacts.contact_rows, planar_contacts.add_contact_curvature, planar_points.point_motion,
+    planar_points.angle_motion,
 )  # fmt: skip
 
 #: how bodies in a plane move
@@ -406,6 +416,7 @@ PLANAR = Kinematics(
     rotations=ROTATIONS,
     attitude=ATTITUDE,
     rows=ROWS,
+    at_home=(0.0,) * COORDINATES,
     entries="mdstopo.mechanics.kinematics.planar_entry",
     kernels={each.__name__: cast(Kernel, each) for each in _KERNELS},
 )

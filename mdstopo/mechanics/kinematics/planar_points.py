@@ -15,10 +15,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.angles import small_turn
-
-#: ACROSS: the component perpendicular to the vector as it is, whose own value is 0
-X, Y, NORM, ACROSS = range(4)
-DISPLACEMENT, VELOCITY, ACCELERATION = range(3)
+from mdstopo.mechanics.kinematics.components import ACCELERATION, ACROSS, DISPLACEMENT, VELOCITY, X, Y
 
 
 @kernel

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.kinematics.planar_points import ACROSS, X, Y
+from mdstopo.mechanics.kinematics.components import ACROSS, X, Y, Z
 from mdstopo.mechanics.kinematics.rotations import inverse, logarithm, product, quaternion_at, vector_rate
 from mdstopo.mechanics.kinematics.spatial_poses import (
     ATTITUDE,
@@ -39,8 +39,8 @@ from mdstopo.mechanics.kinematics.vectors import (
     vector_at,
 )
 
-#: more components: along z, and the second one perpendicular to the vector as it is (`planar_points.ACROSS`)
-Z, ACROSS_TWO = 4, 5
+#: the second of two components that are perpendicular to the vector as it is (`components.ACROSS`)
+ACROSS_TWO = 5
 
 
 @part

@@ -1,0 +1,97 @@
+"""A case in a plane as arrays of a general scene: what is planar about them (`dimension`)."""
+
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.model import Case, Joint, LoadCase, Response
+from mdstopo.general.contact_compile import contact_rows
+from mdstopo.general.dimension import Dimension, Frames, Pairs
+from mdstopo.mechanics.contact import PX, PY
+from mdstopo.mechanics.joints import table as joints
+from mdstopo.mechanics.kinematics.planar import PLANAR
+from mdstopo.scene.compile import home_of
+from mdstopo.scene.loads import Loads, generalised_loads
+from mdstopo.scene.model import HOME_COS, FloatArray, IndexArray
+
+#: numbers of a response
+RESPONSE_PAR = 4
+#: numbers of a bushing (`GeneralModel.bushing`)
+BUSHING = 12
+
+
+def _masses(body: Any) -> list[float]:
+    return [body.mass, body.mass, body.inertia]
+
+
+def _velocities(body: Any, home: FloatArray) -> list[float]:
+    del home
+    return [*body.velocity, body.angular_velocity]
+
+
+def _stated(home: FloatArray) -> FloatArray:
+    """x, y, psi of all bodies: an angle is stated as a whole."""
+    return home[:, : PLANAR.coordinates].ravel()
+
+
+def _places(home: FloatArray, body: int, points: FloatArray) -> FloatArray:
+    x, y, _, c, s = home[body]
+    return np.asarray(np.array([x, y]) + points @ np.array([[c, s], [-s, c]]))
+
+
+def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames) -> Loads:
+    del frames
+    return generalised_loads(load_case, index, times)
+
+
+def _bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """The pair (n_bushing,) and the parameters (n_bushing, BUSHING) of each bushing (`GeneralModel.bushing`)."""
+    where, rows = [], []
+    for bushing in case.bushings:
+        a, b = (index[name] for name in bushing.bodies)
+        where.append(pairs.setdefault((a, b), len(pairs)))
+        apart = joints.apart_at_home(home, a, b, bushing.at_first, bushing.at_second)
+        c, s = home[a, HOME_COS:]
+        x, y = c * apart[0] + s * apart[1], c * apart[1] - s * apart[0]
+        rows.append([*bushing.at_first, *bushing.at_second, x, y, *bushing.stiffness, *bushing.damping])
+    return np.array(where, dtype=np.int64), np.array(rows, dtype=np.float64).reshape(-1, BUSHING)
+
+
+def _reaches(contact: FloatArray) -> FloatArray:
+    return np.asarray(np.hypot(contact[:, PX], contact[:, PY]))
+
+
+def _joint_row(joint: Joint, home: FloatArray, first: int, second: int, frames: Frames) -> list[float]:
+    del frames
+    return joints.parameters(joint, home, first, second)
+
+
+def _response_row(response: Response, frames: Frames) -> list[float]:
+    """The point, if it has one, and then the response's own numbers."""
+    del frames
+    row = [*(response.at_local or ()), *response.numbers]
+    return row + [0.0] * (RESPONSE_PAR - len(row))
+
+
+PLANE = Dimension(
+    kinematics=PLANAR,
+    point=2,
+    axes=("x", "y", "angle"),
+    components={"x": 0, "y": 1, "norm": 2},
+    response_par=RESPONSE_PAR,
+    home=home_of,
+    frames=lambda load_case: {},
+    masses=_masses,
+    velocities=_velocities,
+    stated=_stated,
+    places=_places,
+    loads=_loads,
+    bushings=_bushings,
+    contacts=contact_rows,
+    reaches=_reaches,
+    joint_code=joints.code_of,
+    joint_kernels=joints.kernels_of,
+    has_norm=lambda kind: joints.kernels_of(kind).force_rows > 1,
+    joint_row=_joint_row,
+    response_row=_response_row,
+)

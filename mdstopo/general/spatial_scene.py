@@ -1,0 +1,223 @@
+"""A case in space as arrays of a general scene: what is spatial about them (`dimension`).
+
+Arrays have points and axes of a body in its principal axes: there the masses are a diagonal. At home these stand as
+R_home = R P, with the body's own axes R and the principal ones P among them (`scene.rotations.principal`).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, Signal
+from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
+from mdstopo.mechanics.contact import CONTACT
+from mdstopo.mechanics.joints.kernels import FITTED
+from mdstopo.mechanics.kinematics.spatial import SPATIAL
+from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
+from mdstopo.mechanics.kinematics.spatial_joints import (
+    ACROSS,
+    CYLINDRICAL,
+    DISTANCE,
+    FIXED,
+    PLANAR,
+    PRISMATIC,
+    REVOLUTE,
+    ROWS_OF,
+    SPHERICAL,
+    UNIVERSAL,
+    row_of_joint,
+)
+from mdstopo.mechanics.kinematics.spatial_poses import HOME
+from mdstopo.scene.loads import Loads
+from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.rotations import principal
+from mdstopo.scene.signals import segment_values
+
+#: columns of `GeneralModel.home`: a body's place, then R_home by rows, then P by rows
+PLACE, TURN, AXES = slice(0, 3), slice(3, 12), slice(12, 21)
+#: columns of `GeneralModel.response_par`: the point, then a response's own numbers
+AT, NUMBERS, RESPONSE_PAR = slice(0, 3), slice(3, 8), 8
+#: columns of `GeneralModel.joint_par`: the points on both bodies, the axes on both by rows, the vector from the first
+#: point to the second at home (global), of a distance joint its length
+AT_FIRST, AT_SECOND, AXES_FIRST, AXES_SECOND = slice(0, 3), slice(3, 6), slice(6, 15), slice(15, 24)
+APART, LENGTH, JOINT_PAR = slice(24, 27), 27, 30
+#: `GeneralModel.load_follows`: a force and a moment in global axes; both turn with the body; a force and an angular
+#: acceleration in global axes
+STAYS, FOLLOWS, ACCELERATES = range(3)
+#: the codes of joints by their words
+JOINTS = {
+    "spherical": SPHERICAL,
+    "revolute": REVOLUTE,
+    "universal": UNIVERSAL,
+    "prismatic": PRISMATIC,
+    "cylindrical": CYLINDRICAL,
+    "planar": PLANAR,
+    "fixed": FIXED,
+    "distance": DISTANCE,
+}
+#: numbers of a bushing (`GeneralModel.bushing`), of which there is none yet
+BUSHING = 12
+
+
+def _home(load_case: LoadCase, count: int) -> FloatArray:
+    home = np.zeros((count, HOME))
+    home[:, TURN] = home[:, AXES] = np.eye(3).ravel()
+    for row, body in zip(home, load_case.bodies, strict=False):
+        axes = principal(np.asarray(body.inertia))[1]
+        row[PLACE], row[AXES] = body.position, axes.ravel()
+        row[TURN] = (np.asarray(body.rotation) @ axes).ravel()
+    return home
+
+
+def _frames(load_case: LoadCase) -> Frames:
+    return {body.name: principal(np.asarray(body.inertia))[1] for body in load_case.bodies}
+
+
+def _masses(body: Any) -> list[float]:
+    moments: list[float] = principal(np.asarray(body.inertia))[0].tolist()
+    return [body.mass, body.mass, body.mass, *moments]
+
+
+def _velocities(body: Any, home: FloatArray) -> list[float]:
+    """Of the centre of mass, global, and the angular one in principal axes."""
+    return [*body.velocity, *(home[TURN].reshape(3, 3).T @ np.array(body.angular_velocity)).tolist()]
+
+
+def _stated(home: FloatArray) -> FloatArray:
+    """x, y, z of all bodies; turns are not driven."""
+    out = np.zeros((len(home), SPATIAL.freedoms))
+    out[:, PLACE] = home[:, PLACE]
+    return out.ravel()
+
+
+def _places(home: FloatArray, body: int, points: FloatArray) -> FloatArray:
+    return np.asarray(home[body, PLACE] + points @ home[body, TURN].reshape(3, 3).T)
+
+
+def _three(given: Any, times: FloatArray) -> FloatArray:
+    """(n_seg, 3, 2): value and slope of three signals in segments of time; of nothing zeros."""
+    if not isinstance(given, tuple):
+        return np.zeros((len(times) - 1, 3, 2))
+    signals: tuple[Signal, ...] = given
+    return np.stack([segment_values(signal, times) for signal in signals], axis=1)
+
+
+def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames: Frames) -> Loads:
+    """Gravity and forces through centres of mass by freedoms; apart from them what depends on a body's turn.
+
+    Moments are components in principal axes by freedoms, which a global one has not while the body turns.
+    """
+    force = np.zeros((len(times) - 1, len(index), SPATIAL.freedoms, 2))
+    for i, body in enumerate(load_case.bodies):
+        force[:, i, PLACE, 0] += body.mass * np.array(load_case.gravity)
+    turning: list[tuple[Load, int, FloatArray]] = []
+    for load in load_case.loads:
+        if load.body == GROUND:
+            continue
+        b = index[load.body]
+        own, moment = _three(load.force, times), _three(load.moment, times)
+        turned = in_frame(frames, load.body, np.eye(3))
+        if load.frame == "body":
+            # (P^T f) of each segment's values and slopes
+            own, moment = (np.einsum("ji,sjk->sik", turned, each) for each in (own, moment))
+            force[:, b, 3:] += moment
+            if np.any(own):
+                turning.append((load, FOLLOWS, np.concatenate([own, np.zeros_like(moment)], axis=1)))
+            continue
+        if not any(load.at_local):
+            force[:, b, PLACE] += own
+            own = np.zeros_like(own)
+        for follows, part, couple in (
+            (STAYS, own, moment),
+            (ACCELERATES, np.zeros_like(own), _three(load.angular_acceleration, times)),
+        ):
+            if np.any(part) or np.any(couple):
+                turning.append((load, follows, np.concatenate([part, couple], axis=1)))
+    arms = [in_frame(frames, load.body, np.array(load.at_local, dtype=np.float64)) for load, _, _ in turning]
+    values = [value for _, _, value in turning]
+    return Loads(
+        force.reshape(len(times) - 1, -1, 2),
+        np.array([index[load.body] for load, _, _ in turning], dtype=np.int64),
+        np.array([follows for _, follows, _ in turning], dtype=np.int64),
+        np.array(arms, dtype=np.float64).reshape(-1, 3),
+        np.stack(values, axis=1) if values else np.zeros((len(times) - 1, 0, SPATIAL.freedoms, 2)),
+    )
+
+
+def _no_bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray) -> tuple[IndexArray, FloatArray]:
+    del case, index, pairs, home
+    return np.zeros(0, dtype=np.int64), np.zeros((0, BUSHING))
+
+
+def _no_contacts(case: Case, index: dict[str, int], pairs: Pairs) -> tuple[IndexArray, FloatArray, tuple[str, ...]]:
+    del case, index, pairs
+    return np.zeros(0, dtype=np.int64), np.zeros((0, CONTACT)), ()
+
+
+class JointRows(NamedTuple):
+    """What is asked of a joint when a case is compiled (`dimension.JointRecord`)."""
+
+    rows: int
+    steady: tuple[tuple[int, ...], ...]
+
+
+def _joint_kernels(joint: type[Joint]) -> JointRows:
+    """Rows that put points together have constant slopes by shifts, and such that hold directions have none."""
+    code = JOINTS[joint.type]
+    kinds = [row_of_joint.py_func(code, r)[0] for r in range(ROWS_OF[code])]
+    shifts = tuple(range(SPATIAL.freedoms - SPATIAL.rotations))
+    return JointRows(len(kinds), tuple(shifts if kind in (MEETS, ACROSS) else () for kind in kinds))
+
+
+def _joint_row(joint: Any, home: FloatArray, first: int, second: int, frames: Frames) -> list[float]:
+    """See `JOINT_PAR`."""
+    row = np.zeros(JOINT_PAR)
+    ends, size = [], 0.0
+    for name, body, at, axes, point, own in (
+        (joint.bodies[0], first, AT_FIRST, AXES_FIRST, joint.at_first, joint.axes_first),
+        (joint.bodies[1], second, AT_SECOND, AXES_SECOND, joint.at_second, joint.axes_second),
+    ):
+        row[at] = in_frame(frames, name, np.array(point, dtype=np.float64))
+        row[axes] = in_frame(frames, name, np.asarray(own)).ravel()
+        ends.append(_places(home, body, row[at]))
+        size += float(np.abs(row[at]).sum() + np.abs(home[body, PLACE]).sum())
+    apart = ends[1] - ends[0]
+    row[APART] = np.where(np.abs(apart) > FITTED * size, apart, 0.0)
+    row[LENGTH] = getattr(joint, "length", 0.0)
+    return [float(value) for value in row]
+
+
+def _response_row(response: Response, frames: Frames) -> list[float]:
+    """The point, zeros where it has none, then the response's own numbers; of a tilt these are an axis."""
+    row, body = np.zeros(RESPONSE_PAR), response.body or GROUND
+    if response.at_local is not None:
+        row[AT] = in_frame(frames, body, np.array(response.at_local, dtype=np.float64))
+    numbers = np.array(response.numbers, dtype=np.float64)
+    if response.kind == "tilt":
+        numbers = in_frame(frames, body, numbers)
+    row[NUMBERS][: len(numbers)] = numbers
+    return [float(value) for value in row]
+
+
+SPACE = Dimension(
+    kinematics=SPATIAL,
+    point=3,
+    axes=("x", "y", "z"),
+    components={"x": 0, "y": 1, "norm": 2, "z": 4},
+    response_par=RESPONSE_PAR,
+    home=_home,
+    frames=_frames,
+    masses=_masses,
+    velocities=_velocities,
+    stated=_stated,
+    places=_places,
+    loads=_loads,
+    bushings=_no_bushings,
+    contacts=_no_contacts,
+    reaches=lambda contact: np.zeros(len(contact)),
+    joint_code=lambda kind: JOINTS[kind.type],
+    joint_kernels=_joint_kernels,
+    has_norm=lambda kind: True,
+    joint_row=_joint_row,
+    response_row=_response_row,
+)
