@@ -20,7 +20,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.forces import add_inerters, add_tangents_of_inerters, general_forces
 from mdstopo.general.joint_matrix import SINGULAR, factor_joints, inverse_masses, solve_joints, spread_masses
-from mdstopo.general.model import JOINT_CODE, JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
+from mdstopo.general.model import JOINT_FIRST, JOINT_PAIR, JOINT_SECOND
 from mdstopo.general.strides import (
     first_freedom,
     pair_freedoms,
@@ -32,19 +32,20 @@ from mdstopo.general.strides import (
 from mdstopo.general.structures import bundle
 from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
 from mdstopo.integrators.banded import factorise, solve
-from mdstopo.mechanics.joints.table import (
-    joint_acceleration_slopes,
-    joint_gamma,
-    joint_is_point,
-    joint_rows,
-    joint_stiffness,
-)
+from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     attitude,
+    coordinates,
     drive_acceleration,
     drive_state,
     freedoms,
+    joint_acceleration_slopes,
+    joint_gamma,
+    joint_is_point,
     joint_places,
+    joint_rows,
+    joint_stiffness,
+    load_slopes,
     most_rows,
     pair_matrix_vjp,
     place_joint,
@@ -58,10 +59,10 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 #: right side and the scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix
 #: the inverse masses, by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own
 #: coordinates, their derivatives and multipliers; the known accelerations of what is driven; which pairs carry more
-#: than joints, and the switches (`switches`)
+#: than joints, and the switches (`switches`); what kinematics keep of the stages of a step (`stage_state`)
 FIELDS = (
     "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
-    "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "known", "carries", "switches",
+    "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "known", "carries", "switches", "slopes",
 )  # fmt: skip
 
 
@@ -90,7 +91,7 @@ def make_workspace(model):
         np.zeros(n),
         np.zeros((n_pair, both, both)),
         np.zeros((n_pair, both, both)),
-        np.zeros((n, rotations(model))),
+        np.zeros((n, load_slopes(model))),
         np.zeros((n_pair, both, both)),
         np.zeros((n_joint, rows)),
         np.zeros((n_joint, rows, both)),
@@ -110,6 +111,7 @@ def make_workspace(model):
         np.zeros(n),
         carriers(model),
         switches_of(model),
+        np.zeros((max(STAGES) if coordinates(model) != freedoms(model) else 0, n)),
     )
 
 
@@ -140,8 +142,8 @@ def joint_state(model, q, v, workspace):
     for j in range(model.joint.shape[0]):
         place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
-        joint_rows(model.joint[j, JOINT_CODE], model.joint_par[j], w, workspace.phi[j], workspace.jac[j])
-        joint_gamma(model.joint[j, JOINT_CODE], model.joint_par[j], w, wd, workspace.gamma[j])
+        joint_rows(model, j, w, workspace.phi[j], workspace.jac[j])
+        joint_gamma(model, j, w, wd, workspace.gamma[j])
 
 
 @kernel
@@ -164,10 +166,8 @@ def joint_slopes(model, q, v, a, lam, workspace):
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
-        code = model.joint[j, JOINT_CODE]
-        par = model.joint_par[j]
-        joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
-        joint_stiffness(code, par, w, mine, workspace.k[model.joint[j, JOINT_PAIR]])
+        joint_acceleration_slopes(model, j, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
+        joint_stiffness(model, j, w, mine, workspace.k[model.joint[j, JOINT_PAIR]])
 
 
 @kernel
@@ -177,7 +177,7 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
     Constant:
       model: the compiled scene.
       k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance; read where a weight is not zero, as turn is.
-      turn (n, T): slopes of the turning loads by the turns of their bodies.
+      turn (n, `load_slopes`): slopes of the turning loads by the turns of their bodies.
       mass (n_pair, 2 D, 2 D): mass of the inerters (kg, kg m, kg m^2).
       w_q, w_v: weights of K with G_q (s^2), and of C with G_v (s).
       transposed: whether the transpose is meant.
@@ -226,6 +226,10 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
                 angle = place_of_turn(model, d, r)
                 if model.free[angle] != 0 and turn[d, r] != 0.0:
                     put(band, half, scale, p, model.place[angle], -w_q * turn[d, r], transposed)
+            for r in range(rotations(model), load_slopes(model)):
+                angle = place_of_turn(model, d, r - rotations(model))
+                if model.free[angle] != 0 and turn[d, r] != 0.0:
+                    put(band, half, scale, p, model.place[angle], -w_v * turn[d, r], transposed)
     for p in range(model.pair.shape[0]):
         for i in range(pair_freedoms(model)):
             row = place_in_pair(model, p, i)
@@ -331,7 +335,7 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
 
     Returns the place of the unknown at which the joints are singular, or -1.
     """
-    n = q.shape[0]
+    n = v.shape[0]
     drive_state(model, segment, t, q, v)
     general_forces(model, member_state, segment, t, q, v, tangent, workspace)
     if workspace.switches[DIAGONAL] == 0:
@@ -386,7 +390,7 @@ def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
     Constant:
       model: the compiled scene.
       workspace: the workspace, with G_q and G_v.
-      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, T): slopes of the turning loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, `load_slopes`): slopes of the turning loads.
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
     Out:
@@ -397,7 +401,7 @@ def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
     matrices_vjp(model, k, z, bar_q)
     if workspace.switches[DAMPED] != 0:
         matrices_vjp(model, c, z, bar_v)
-    turns_vjp(model, turn, z, bar_q)
+    turns_vjp(model, turn, z, bar_q, bar_v)
     by_q = workspace.by_q
     by_v = workspace.by_v
     row = model.row
@@ -433,11 +437,13 @@ def subtract_matrices(model, k, x, out):
 
 
 @kernel
-def turns_vjp(model, turn, z, bar):
-    """bar (n,) += (slope of the turning loads)^T z, turn (n, T)."""
+def turns_vjp(model, turn, z, bar_q, bar_v):
+    """bar_q, bar_v (n,) += (slopes of the loads)^T z, turn (n, `load_slopes`) by turns, then by turning rates."""
     for d in range(z.shape[0]):
         for r in range(rotations(model)):
-            bar[place_of_turn(model, d, r)] += turn[d, r] * z[d]
+            bar_q[place_of_turn(model, d, r)] += turn[d, r] * z[d]
+        for r in range(rotations(model), load_slopes(model)):
+            bar_v[place_of_turn(model, d, r - rotations(model))] += turn[d, r] * z[d]
 
 
 @kernel
@@ -448,7 +454,7 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
       model: the compiled scene.
       workspace: the workspace (`carries`, `switches`).
       k, c (n_pair, 2 D, 2 D): stiffness and damping of these pairs, without the joints'.
-      turn (n, T): slopes of the turning loads.
+      turn (n, `load_slopes`): slopes of the turning loads.
       z (n,): virtual displacements; driven parts are 0.
     Out:
       bar_q, bar_v (n,): cotangents of coordinates and velocities, added to.
@@ -459,7 +465,7 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
             pair_matrix_vjp(model, p, k[p], z, bar_q)
             if damped:
                 pair_matrix_vjp(model, p, c[p], z, bar_v)
-    turns_vjp(model, turn, z, bar_q)
+    turns_vjp(model, turn, z, bar_q, bar_v)
 
 
 @kernel
@@ -484,19 +490,17 @@ def joints_vjp(model, workspace, q, v, a, lam, z, y, bar_q, bar_v):
     mine = workspace.own[3]
     row = model.row
     for j in range(model.joint.shape[0]):
-        code = model.joint[j, JOINT_CODE]
-        par = model.joint_par[j]
         place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather(model, j, a, wdd)
         gather_multipliers(model, j, lam, mine)
-        if joint_is_point(code):
+        if joint_is_point(model, j):
             point_joint_vjp(model, j, w, wd, wdd, mine, z, y, bar_q, bar_v)
             continue
         stiffness = workspace.k[model.joint[j, JOINT_PAIR]]
         stiffness[:] = 0.0
-        joint_acceleration_slopes(code, par, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
-        joint_stiffness(code, par, w, mine, stiffness)
+        joint_acceleration_slopes(model, j, w, wd, wdd, workspace.by_q[j], workspace.by_v[j])
+        joint_stiffness(model, j, w, mine, stiffness)
         pair_matrix_vjp(model, model.joint[j, JOINT_PAIR], stiffness, z, bar_q)
         for r in range(most_rows(model)):
             if row[j, r] >= 0:
@@ -516,7 +520,7 @@ def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
     Constant:
       model: the compiled scene.
       workspace: the workspace, with G_q and G_v.
-      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, T): slopes of the turning loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, `load_slopes`): slopes of the turning loads.
       dq, dv (n,): changes of coordinates and velocities.
     Out:
       force (n,), row (n_row,): changes of the right side, added to.
@@ -534,6 +538,8 @@ def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
     for d in range(dq.shape[0]):
         for r in range(rotations(model)):
             force[d] += turn[d, r] * dq[place_of_turn(model, d, r)]
+        for r in range(rotations(model), load_slopes(model)):
+            force[d] += turn[d, r] * dv[place_of_turn(model, d, r - rotations(model))]
     for j in range(model.joint.shape[0]):
         for r in range(most_rows(model)):
             own = model.row[j, r]

@@ -124,7 +124,7 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
     general_sums(model, segment, t, member_state, rel, tangent, sums)
     add_bushings(model, rel, q, tangent, sums)
     f[:] = 0.0
-    add_loads(model, segment, t, q, f)
+    add_loads(model, segment, t, q, v, f)
     for p in range(pair.shape[0]):
         if carries[p] != 0:
             add_pair_force(model, rel, p, sums[p], FORCE, f)
@@ -138,6 +138,6 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
             elif workspace.switches[APART] == 0:
                 none = k[p]
                 none[:] = 0.0
-        load_tangent(model, segment, t, q, workspace.turn)
+        load_tangent(model, segment, t, q, v, workspace.turn)
     if model.contact_pair.shape[0] > 0:
         add_contacts(model, member_state, q, v, tangent, f, workspace.k, workspace.c)

@@ -68,7 +68,7 @@ class GeneralDriver:
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
-        self._packed = self.ints, self.floats = pack_general(model)
+        self._packed = self.ints, self.floats = pack_general(model, scene.kinematics)
         self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS])
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
@@ -575,9 +575,8 @@ class GeneralSteps:
             if model.row[j, r] >= 0:
                 lam[:, i] = solved[:, model.row[j, r]]
         if n_row < len(places):
-            from mdstopo.general.start_entry import slopes_of
-
             each = self._driver.scene.kinematics.freedoms
+            slopes_of = self._driver.scene.kinematics.of_python("slopes_of")
             phi, jac = np.zeros(model.row.shape), np.zeros((*model.row.shape, 2 * each))
             for k in range(len(q)):
                 slopes_of(model.joint, model.joint_par, model.home, q[k].copy(), phi, jac)
@@ -591,8 +590,6 @@ class GeneralSteps:
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
         """Joint name -> force and moment (T, D) on its first body, at states q (T, n_q) with lam (T, n_rows)."""
-        from mdstopo.general.start_entry import reactions
-
         model = self._driver.scene.model
         row = np.full(model.row.shape, -1, dtype=np.int64)
         i = 0
@@ -603,7 +600,8 @@ class GeneralSteps:
         full = np.zeros((len(q), len(model.q0)))
         full[:, : q.shape[1]] = q
         out = np.zeros((len(q), len(model.joint), self._driver.scene.kinematics.freedoms))
-        reactions(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
+        of_all = self._driver.scene.kinematics.of_python("reactions")
+        of_all(model.joint, model.joint_par, model.home, row, full, np.ascontiguousarray(lam), out)
         return {joint.name: out[:, j].copy() for j, joint in enumerate(self._driver.case.joints)}
 
 

@@ -115,11 +115,9 @@ def arrange(
 
 def _slopes(joint: IndexArray, joint_par: FloatArray, home: FloatArray, bodies: Kinematics) -> FloatArray:
     """(n_joint, rows, 2 D): Phi_q of the joints at home."""
-    from mdstopo.general.start_entry import slopes_of
-
     jac = np.zeros((len(joint), bodies.rows, 2 * bodies.freedoms))
     q = np.tile(bodies.at_home, len(home))
-    slopes_of(joint, joint_par, home, q, np.zeros((len(joint), bodies.rows)), jac)
+    bodies.of_python("slopes_of")(joint, joint_par, home, q, np.zeros((len(joint), bodies.rows)), jac)
     return jac
 
 

@@ -9,10 +9,11 @@ solved together with the accelerations (`solve_accelerations`); rows that others
 from typing import Annotated, Any, NamedTuple
 
 from mdstopo.compiler.fields import Field, Fields, views_of
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import by_type, kernel
 from mdstopo.general.structures import bundle
-from mdstopo.mechanics.kinematics.kinematics_interface import move_by
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics, move_by
 from mdstopo.mechanics.kinematics.planar import PLANAR
+from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.scene.model import (
     FloatArray,
     Force,
@@ -68,7 +69,7 @@ class GeneralModel(NamedTuple):
     power: Power
     member: Annotated[
         FloatArray,
-        Field("6, padded", "P, Q in body frames (m); free length l0 (m); L² - l0² of the length L at home (m²)"),
+        Field("n_end, padded", "P, Q in body frames (m); free length l0 (m); L² - l0² of the length L at home (m²)"),
     ]
     curves: Annotated[FloatArray, Field("n_curve", "what `curve` laws read")]
     times: Annotated[FloatArray, Field("n_seg + 1", "start, everything that has a kink in time, end (s)")]
@@ -78,13 +79,13 @@ class GeneralModel(NamedTuple):
     load_arm: LoadArm
     load_force: LoadForce
     bushing_pair: Annotated[IndexArray, Field("n_bushing", "the pair that a bushing connects")]
-    bushing: Annotated[FloatArray, Field("n_bushing, 12", "P, Q, its stretch at home, stiffness, damping")]
+    bushing: Annotated[FloatArray, Field("n_bushing, n_elastic", "P, Q, its stretch at home, stiffness, damping")]
     driven: Annotated[IndexArray, Field("n_driven", "coordinates that are driven")]
     drive: Annotated[
         FloatArray, Field("n_seg, n_driven, 4", "where they are in a segment: powers of the time since its start")
     ]
     joint: Annotated[IndexArray, Field("n_joint, 5", "code, first and second body, pair, rows")]
-    joint_par: Annotated[FloatArray, Field("n_joint, 12", "the joint's parameters (`mechanics.joints.table`)")]
+    joint_par: Annotated[FloatArray, Field("n_joint, n_par", "the joint's parameters (`mechanics.joints.table`, `spatial_joints`)")]
     row: Annotated[IndexArray, Field("n_joint, rows", "the place of each of its rows among the solved ones, or -1")]
     place: Annotated[
         IndexArray, Field("n_place", "where each coordinate, then each solved row, stands in the banded matrix")
@@ -94,7 +95,7 @@ class GeneralModel(NamedTuple):
         Field(
             "6",
             "solved rows; half width of the band; whether anything depends on velocity; entries of the joints' own "
-            "matrix; components of a turn; numbers of an attitude",
+            "matrix; slopes of the loads on a body; numbers of an attitude",
         ),
     ]
     line: Annotated[
@@ -125,7 +126,7 @@ class GeneralModel(NamedTuple):
     response: Annotated[
         IndexArray, Field("n_response, 6", "kind, body, reference, component, order in time, group or joint")
     ]
-    response_par: Annotated[FloatArray, Field("n_response, 4", "point of the body, point of the reference (m)")]
+    response_par: Annotated[FloatArray, Field("n_response, n_place", "a point or axis of the body, then numbers of its own")]
     contact_pair: Annotated[IndexArray, Field("n_contact", "the pair of edge and point")]
     contact: Annotated[FloatArray, Field("n_contact, 11", "see `mechanics.contact`")]
     varied: Annotated[
@@ -138,22 +139,53 @@ class GeneralModel(NamedTuple):
     ]
 
 
-class ModelView:
-    """A `GeneralModel` inside kernels, made by `unpack_general`."""
+class PlanarView:
+    """A `GeneralModel` of bodies in a plane inside kernels, made by `unpack_general`."""
+
+    def __init__(self, *_arrays: Any) -> None: ...
+
+
+class SpatialView:
+    """A `GeneralModel` of bodies in space inside kernels, made by `unpack_general`."""
 
     def __init__(self, *_arrays: Any) -> None: ...
 
 
 FIELDS = Fields(GeneralModel)
-bundle(ModelView, FIELDS.names)
-move_by(ModelView, PLANAR)
+bundle(PlanarView, FIELDS.names)
+bundle(SpatialView, FIELDS.names)
+move_by(PlanarView, PLANAR)
+move_by(SpatialView, SPATIAL)
 
 
-def pack_general(model: GeneralModel) -> tuple[IndexArray, FloatArray]:
-    """Flat integers (sizes first) and flat floats."""
-    return FIELDS.packed(model)
+def pack_general(model: GeneralModel, kinematics: Kinematics = PLANAR) -> tuple[IndexArray, FloatArray]:
+    """Flat integers (sizes first), as one row of a matrix where bodies are in space, and flat floats.
+
+    The number of axes of the integers is what tells compiled functions how bodies move (`unpack_general`).
+    """
+    ints, floats = FIELDS.packed(model)
+    return (ints if kinematics is PLANAR else ints.reshape(1, -1)), floats
 
 
-@views_of(FIELDS, ModelView, kernel)
-def unpack_general(ints, floats):
+@views_of(FIELDS, PlanarView, kernel)
+def _planar(ints, floats):
     """The `GeneralModel` whose arrays are views of the packed ones."""
+
+
+@views_of(FIELDS, SpatialView, kernel)
+def _spatial(ints, floats):
+    """The `GeneralModel` whose arrays are views of the packed ones."""
+
+
+@kernel
+def _spatial_row(ints, floats):
+    """`_spatial` of integers that stand in one row."""
+    return _spatial(ints.reshape(ints.size), floats)
+
+
+def unpack_general(ints, floats):
+    """The `GeneralModel` whose arrays are views of the packed ones (`pack_general`)."""
+    raise NotImplementedError
+
+
+by_type(unpack_general, "ints", lambda kind: (_planar, _spatial_row)[kind.ndim - 1])

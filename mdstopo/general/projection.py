@@ -17,18 +17,19 @@ from mdstopo.general.accelerations import (
     matrices_vjp,
     solve_unknowns,
 )
-from mdstopo.general.model import JOINT_CODE, JOINT_PAIR, JOINT_ROWS
+from mdstopo.general.model import JOINT_PAIR, JOINT_ROWS
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.switches import DIAGONAL
-from mdstopo.mechanics.joints.table import joint_stiffness, joint_velocity_slope
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     difference,
     joint_places,
+    joint_stiffness,
+    joint_velocity_slope,
+    load_slopes,
     most_rows,
     moved_most,
     place_joint,
     retract,
-    rotations,
     turn_bodies,
 )
 
@@ -145,15 +146,13 @@ def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope):
     h_mu[:] = 0.0
     h_nu[:] = 0.0
     for j in range(model.joint.shape[0]):
-        code = model.joint[j, JOINT_CODE]
-        par = model.joint_par[j]
         place_joint(model, j, q, workspace.turned, w)
         gather(model, j, v, wd)
         gather_multipliers(model, j, mu, mine)
-        joint_stiffness(code, par, w, mine, h_mu[model.joint[j, JOINT_PAIR]])
+        joint_stiffness(model, j, w, mine, h_mu[model.joint[j, JOINT_PAIR]])
         gather_multipliers(model, j, nu, mine)
-        joint_stiffness(code, par, w, mine, h_nu[model.joint[j, JOINT_PAIR]])
-        joint_velocity_slope(code, par, w, wd, slope[j])
+        joint_stiffness(model, j, w, mine, h_nu[model.joint[j, JOINT_PAIR]])
+        joint_velocity_slope(model, j, w, wd, slope[j])
 
 
 @kernel
@@ -242,7 +241,7 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
     if left > 0:
         workspace.by_q[:] = 0.0
         workspace.by_v[:] = 0.0
-        factor_matrix(model, workspace, h_mu, none, np.zeros((n, rotations(model))), none, 1.0, 0.0, np.bool_(True))
+        factor_matrix(model, workspace, h_mu, none, np.zeros((n, load_slopes(model))), none, 1.0, 0.0, np.bool_(True))
         for i in range(left):
             y[:] = 0.0
             solve_unknowns(model, workspace, bar_q[unsettled[i]], y)
@@ -275,7 +274,7 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
     slope = np.zeros((model.joint.shape[0], most_rows(model), pair_freedoms(model)))
     y = np.zeros(mu.shape[0])
     none = np.zeros((n_pair, pair_freedoms(model), pair_freedoms(model)))
-    turn = np.zeros((n, rotations(model)))
+    turn = np.zeros((n, load_slopes(model)))
     turn_bodies(model, q, workspace.turned)
     joint_state(model, q, v, workspace)
     _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)

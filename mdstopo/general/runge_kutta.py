@@ -157,7 +157,7 @@ def advance(
     workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
     workspace.switches[APART] = 1 if has_factors(history) else 0
     for i in range(s):
-        stage_state(model, table, h, i, q0, v0, q, v, a)
+        stage_state(model, table, h, i, q0, v0, q, v, a, workspace.slopes)
         time = t + h * vectors[0, i]
         singular = solve_accelerations(model, member_state, segment, time, q[i], v[i], tangent, workspace, a[i], lam)
         work[FORCES] += 1
@@ -171,7 +171,7 @@ def advance(
     workspace.switches[APART] = 0
     if tangent:
         work[TANGENTS] += s
-    end_state(model, table, s, h, q0, v0, q, v, a, end_q, end_v)
+    end_state(model, table, s, h, q0, v0, q, v, a, workspace.slopes, end_q, end_v)
     drive_state(model, segment, t + h, end_q, end_v)
     return project(model, size, end_q, end_v, workspace, push[0], push[1])
 

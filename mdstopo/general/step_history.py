@@ -26,7 +26,7 @@ SIZES = {
     "n_q": "model.q0.shape[0]",
     "n_body": "model.home.shape[0]",
     "both": "2 * (n // n_body)",
-    "rotations": "model.size[4]",
+    "load_slopes": "model.size[4]",
     "attitude": "model.size[5]",
     "rows": "model.row.shape[1]",
     "n_pair": "model.pair.shape[0]",
@@ -67,7 +67,7 @@ class StepHistory:
         ),
     ]
     C: Annotated[FloatArray, Field("stages, n_pair, both, both", "-dF/dv, likewise")]
-    turn: Annotated[FloatArray, Field("stages, n, rotations", "slopes of the turning loads")]
+    turn: Annotated[FloatArray, Field("stages, n, load_slopes", "slopes of the loads by their bodies' turns and turning rates")]
     turned: Annotated[FloatArray, Field("factored, n_body, attitude", "attitudes of the bodies")]
     pull: Annotated[
         FloatArray,

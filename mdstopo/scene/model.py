@@ -54,8 +54,11 @@ Force = Annotated[
 ]
 LoadBody = Annotated[IndexArray, Field("n_load", "of loads whose effect depends on a body's rotation: the body")]
 LoadFollows = Annotated[IndexArray, Field("n_load", "1 where the load turns with it, else 0")]
-LoadArm = Annotated[FloatArray, Field("n_load, 2", "point of attack in the body's frame (m)")]
-LoadForce = Annotated[FloatArray, Field("n_seg, n_load, 2, 2", "two components, value and slope (N)")]
+LoadArm = Annotated[FloatArray, Field("n_load, n_arm", "point of attack in the body's frame (m)")]
+LoadForce = Annotated[
+    FloatArray,
+    Field("n_seg, n_load, n_push, 2", "components of the force, in space of the moment too: value and slope (N, N m)"),
+]
 
 
 class Springs(NamedTuple):

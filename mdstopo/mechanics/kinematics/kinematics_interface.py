@@ -6,7 +6,7 @@ the model's type tells (`move_by`); `planar.PLANAR` has those of bodies in a pla
     N  coordinates q           3 in a plane: x, y, psi            in space 7: x, y, z, unit quaternion
     D  velocities v            3: their derivatives               in space 6: velocity, angular velocity
     T  components of a turn    1                                  in space 3
-    A  numbers of an attitude  2: cos - 1 and sin since home
+    A  numbers of an attitude  2: cos - 1 and sin since home       18: a matrix, and its change since home
 
 Velocities, accelerations, forces, cotangents, changes and virtual displacements have D numbers a body, n in all; only
 coordinates have N, n_q in all. Of the D numbers the last T are about turning. A pair of bodies has 2 D: those of its
@@ -14,6 +14,7 @@ first body, then of its second. A relative pose xi has D components that change 
 coordinates calls `retract` (or what stands beside it), and whoever subtracts some calls `difference`.
 """
 
+import importlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -41,7 +42,7 @@ class Kinematics:
 
     coordinates, freedoms, rotations, attitude: N, D, T, A of a body. rows: the most rows of a joint. at_home (N): the
     coordinates of a body that has not moved. kernels: a function for each of this module, without those that only
-    bodies of another kind have (`OPTIONAL`).
+    bodies of another kind have (`OPTIONAL`). entries: the module of those that Python calls (`planar_entry`).
     """
 
     coordinates: int
@@ -51,6 +52,12 @@ class Kinematics:
     rows: int
     at_home: tuple[float, ...]
     kernels: Mapping[str, Kernel]
+    entries: str
+
+    def of_python(self, name: str) -> Callable[..., Any]:
+        """A compiled function that Python calls, `slopes_of` or `reactions`."""
+        found: Callable[..., Any] = getattr(importlib.import_module(self.entries), name)
+        return found
 
     def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:
         """`retract` in Python: coordinates (n_q,) from others and a shift (n,)."""
@@ -85,6 +92,11 @@ def freedoms(model):
 
 def rotations(model):
     """T: how many of them, the last ones, are about turning."""
+    raise NotImplementedError
+
+
+def load_slopes(model):
+    """How many slopes of its loads a body has: by the T components of its turn, then of its turning rate."""
     raise NotImplementedError
 
 
@@ -175,7 +187,7 @@ def moved_most(model, q, size):
 # Steps
 
 
-def stage_state(model, table, h, i, q0, v0, q, v, a):
+def stage_state(model, table, h, i, q0, v0, q, v, a, slopes):
     """Coordinates and velocities of a stage of an explicit Runge-Kutta step.
 
     In:
@@ -187,11 +199,12 @@ def stage_state(model, table, h, i, q0, v0, q, v, a):
       a (s, n): accelerations of the stages before it.
     In and out:
       q (s, n_q), v (s, n): of all stages; those before i are read, those of i written.
+      slopes (s, n): what a kinematics keeps of each stage for those behind it; no rows where it keeps nothing.
     """
     raise NotImplementedError
 
 
-def end_state(model, table, s, h, q0, v0, q, v, a, q_end, v_end):
+def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
     """Coordinates and velocities at the end of an explicit Runge-Kutta step.
 
     In:
@@ -200,6 +213,7 @@ def end_state(model, table, s, h, q0, v0, q, v, a, q_end, v_end):
       h: length of the step (s).
       q0 (n_q,), v0 (n,): coordinates and velocities at its start.
       q (s, n_q), v, a (s, n): those of its stages, and their accelerations.
+      slopes (s, n): of `stage_state`.
     Out:
       q_end (n_q,), v_end (n,): coordinates and velocities at its end.
     """
@@ -215,7 +229,9 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
       j: number of the stage.
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
       lam_q, lam_v (n,): cotangents of the end's coordinates and velocities.
-      u, g (s, n): cotangents of the coordinates and velocities of later stages.
+    In and out:
+      u, g (s, n): cotangents of the coordinates and velocities of later stages; stages come one after the other from
+        the last on, and what is left of the one behind j is what `start_vjp` needs.
     Out:
       z (n,): the cotangent.
     """
@@ -229,7 +245,7 @@ def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
       model: the compiled scene.
       table (3, 17, 17), s, h: coefficients of the method, number of stages, length of the step (s).
       q (s, n_q), v (s, n): coordinates and velocities of the stages.
-      u, g (s, n): cotangents of these.
+      u, g (s, n): what `stage_vjp` has left of cotangents of these; overwritten.
     In and out:
       lam_q, lam_v (n,): cotangents of the end's coordinates and velocities, then of the start's.
     """
@@ -419,13 +435,13 @@ def turning_rate(model, rel, p):
 # Loads
 
 
-def add_loads(model, segment, t, q, f):
-    """f (n,) += the applied loads of a segment at time t and coordinates q (n_q,)."""
+def add_loads(model, segment, t, q, v, f):
+    """f (n,) += loads, and what inertia has of forces, in a segment at time t, at q (n_q,) and velocities v (n,)."""
     raise NotImplementedError
 
 
-def load_tangent(model, segment, t, q, turn):
-    """turn (n, T): derivative of each body's applied loads by its own turn, at time t and coordinates q (n_q,)."""
+def load_tangent(model, segment, t, q, v, turn):
+    """turn (n, `load_slopes`): slopes of what `add_loads` adds, by the body's own turn and its turning rate."""
     raise NotImplementedError
 
 
@@ -685,6 +701,44 @@ def place_joint(model, j, q, turned, w):
 
 def place_joint_alone(model, j, q, w):
     """`place_joint` where no attitudes are known."""
+    raise NotImplementedError
+
+
+def joint_rows(model, j, w, phi, jac):
+    """Phi (rows,) and jac (rows, 2 D) = Phi_q of joint j at w (PLACES,); rows that it has not are left as they are."""
+    raise NotImplementedError
+
+
+def joint_gamma(model, j, w, wd, gamma):
+    """gamma (rows,) of Phi_q a + gamma = 0 of joint j at w (PLACES,) and velocities wd (2 D,) of its bodies."""
+    raise NotImplementedError
+
+
+def joint_velocity_slope(model, j, w, wd, out):
+    """out (rows, 2 D) = d(Phi_q v)/dq of joint j at w (PLACES,) and velocities wd (2 D,) of its bodies."""
+    raise NotImplementedError
+
+
+def joint_acceleration_slopes(model, j, w, wd, wdd, by_q, by_v):
+    """Slopes of Phi_q a + gamma of a joint at fixed a.
+
+    In:
+      model: the compiled scene.
+      j: the joint.
+      w (PLACES,), wd, wdd (2 D,): where its bodies are, their velocities and accelerations.
+    Out:
+      by_q, by_v (rows, 2 D): d(Phi_q a + gamma)/dq and d(gamma)/dv, in the rows that it has.
+    """
+    raise NotImplementedError
+
+
+def joint_stiffness(model, j, w, lam, k):
+    """k (2 D, 2 D) += d(Phi_q^T lam)/dq of joint j at w (PLACES,), lam (rows,) its multipliers."""
+    raise NotImplementedError
+
+
+def joint_is_point(model, j):
+    """Whether `point_joint_vjp` serves joint j."""
     raise NotImplementedError
 
 

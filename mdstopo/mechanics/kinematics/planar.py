@@ -15,6 +15,12 @@ from mdstopo.compiler.kernel import Kernel
 from mdstopo.mechanics.angles import small_turn
 from mdstopo.mechanics.joints.revolute import PLACES, place_turned, revolute_vjp
 from mdstopo.mechanics.joints.revolute import place_joint as place_joint_of_bodies
+from mdstopo.mechanics.joints.table import joint_acceleration_slopes as acceleration_slopes_by_code
+from mdstopo.mechanics.joints.table import joint_gamma as gamma_by_code
+from mdstopo.mechanics.joints.table import joint_is_point as is_point_by_code
+from mdstopo.mechanics.joints.table import joint_rows as rows_by_code
+from mdstopo.mechanics.joints.table import joint_stiffness as stiffness_by_code
+from mdstopo.mechanics.joints.table import joint_velocity_slope as velocity_slope_by_code
 from mdstopo.mechanics.joints.table import joint_transmitted
 from mdstopo.mechanics.kinematics import (
     planar_bushings,
@@ -26,7 +32,7 @@ from mdstopo.mechanics.kinematics import (
     planar_steps,
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
-from mdstopo.mechanics.kinematics.planar_forces import add_loads
+from mdstopo.mechanics.kinematics.planar_forces import add_loads as add_applied_loads
 from mdstopo.mechanics.kinematics.planar_forces import load_tangent as tangent_of_loads
 from mdstopo.mechanics.kinematics.planar_forces import pair_tangent as tangent_of_pair
 from mdstopo.mechanics.kinematics.planar_poses import (
@@ -95,6 +101,12 @@ def freedoms(model):
 @part
 def rotations(model):
     """One angle."""
+    return ROTATIONS
+
+
+@part
+def load_slopes(model):
+    """Loads change with the angle of their body."""
     return ROTATIONS
 
 
@@ -246,7 +258,13 @@ def turning_rate(model, rel, p):
 
 
 @part
-def load_tangent(model, segment, t, q, turn):
+def add_loads(model, segment, t, q, v, f):
+    """See `planar_forces`: inertia in a plane has no forces of its own; see `kinematics_interface.add_loads`."""
+    add_applied_loads(model, segment, t, q, f)
+
+
+@part
+def load_tangent(model, segment, t, q, v, turn):
     """See `planar_forces`: each body has one angle; see `kinematics_interface.load_tangent`."""
     tangent_of_loads(model, segment, t, q, turn.reshape(turn.size))
 
@@ -312,6 +330,42 @@ def place_joint_alone(model, j, q, w):
 
 
 @part
+def joint_rows(model, j, w, phi, jac):
+    """See `joints.table`; see `kinematics_interface.joint_rows`."""
+    rows_by_code(model.joint[j, 0], model.joint_par[j], w, phi, jac)
+
+
+@part
+def joint_gamma(model, j, w, wd, gamma):
+    """See `joints.table`; see `kinematics_interface.joint_gamma`."""
+    gamma_by_code(model.joint[j, 0], model.joint_par[j], w, wd, gamma)
+
+
+@part
+def joint_velocity_slope(model, j, w, wd, out):
+    """See `joints.table`; see `kinematics_interface.joint_velocity_slope`."""
+    velocity_slope_by_code(model.joint[j, 0], model.joint_par[j], w, wd, out)
+
+
+@part
+def joint_acceleration_slopes(model, j, w, wd, wdd, by_q, by_v):
+    """See `joints.table`; see `kinematics_interface.joint_acceleration_slopes`."""
+    acceleration_slopes_by_code(model.joint[j, 0], model.joint_par[j], w, wd, wdd, by_q, by_v)
+
+
+@part
+def joint_stiffness(model, j, w, lam, k):
+    """See `joints.table`; see `kinematics_interface.joint_stiffness`."""
+    stiffness_by_code(model.joint[j, 0], model.joint_par[j], w, lam, k)
+
+
+@part
+def joint_is_point(model, j):
+    """See `joints.table`; see `kinematics_interface.joint_is_point`."""
+    return is_point_by_code(model.joint[j, 0])
+
+
+@part
 def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
     """The angles' part; see `kinematics_interface.point_joint_vjp`. Rows behind the first two have constant slopes."""
     row = model.row
@@ -335,7 +389,7 @@ def transmitted(model, j, which, q, lam, by_lam, by_q):
 
 
 _KERNELS = (
-    coordinates, freedoms, rotations, attitude, most_rows, pose_size, joint_places,
+    coordinates, freedoms, rotations, load_slopes, attitude, most_rows, pose_size, joint_places,
     retract, difference, retract_vjp, retract_jvp, planar_steps.advance_coordinates, moved_most,
     planar_steps.stage_state, planar_steps.end_state, planar_steps.stage_vjp, planar_steps.start_vjp,
     planar_steps.stage_jvp, planar_steps.end_jvp, planar_steps.cubic, planar_steps.cubic_vjp, planar_steps.cubic_jvp,
@@ -349,7 +403,8 @@ _KERNELS = (
     planar_inerters.inerter_row, planar_inerters.add_inerter_tangents, planar_members.keep_apart,
     planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums, planar_members.member_designs,
     planar_members.spring_designs, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
-    place_joint, place_joint_alone, point_joint_vjp, transmitted, planar_bushings.add_bushings,
+    place_joint, place_joint_alone, joint_rows, joint_gamma, joint_velocity_slope, joint_acceleration_slopes,
+    joint_stiffness, joint_is_point, point_joint_vjp, transmitted, planar_bushings.add_bushings,
     planar_contacts.contact_rows, planar_contacts.add_contact_curvature, planar_points.point_motion,
     planar_points.angle_motion,
 )  # fmt: skip
@@ -362,5 +417,6 @@ PLANAR = Kinematics(
     attitude=ATTITUDE,
     rows=ROWS,
     at_home=(0.0,) * COORDINATES,
+    entries="mdstopo.mechanics.kinematics.planar_entry",
     kernels={each.__name__: cast(Kernel, each) for each in _KERNELS},
 )

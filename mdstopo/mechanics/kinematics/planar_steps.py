@@ -15,7 +15,7 @@ NODES, END, END_RATE = range(3)
 
 
 @part
-def stage_state(model, table, h, i, q0, v0, q, v, a):
+def stage_state(model, table, h, i, q0, v0, q, v, a, slopes):
     """Coordinates and velocities of stage i; see `kinematics_interface.stage_state`."""
     ahead = h * table[VECTORS, NODES, i]
     for d in range(q0.shape[0]):
@@ -33,7 +33,7 @@ def stage_state(model, table, h, i, q0, v0, q, v, a):
 
 
 @part
-def end_state(model, table, s, h, q0, v0, q, v, a, q_end, v_end):
+def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
     """Coordinates and velocities at the end of a step; see `kinematics_interface.end_state`."""
     for d in range(q0.shape[0]):
         position = q0[d] + h * v0[d]

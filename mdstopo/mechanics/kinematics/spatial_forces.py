@@ -1,0 +1,249 @@
+"""Applied and gyroscopic forces on bodies in space, and tangents of these and of what acts between two bodies.
+
+Moments on a body are in its principal axes: its turning rate follows J omega' + omega x J omega = moment.
+"""
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.kinematics.spatial_poses import (
+    ATTITUDE,
+    D,
+    D_RATE,
+    FREEDOMS,
+    OMEGA_A,
+    POSE,
+    ROTATIONS,
+    S,
+    TURN,
+    TURN_A,
+    W,
+    fill_attitude,
+)
+from mdstopo.mechanics.kinematics.vectors import (
+    add,
+    cross,
+    minus,
+    plus,
+    turned,
+    turned_back,
+    vector_at,
+)
+
+#: values of `GeneralModel.load_follows`: force and moment are global; turn with the body; the moment stands for an
+#: angular acceleration, global
+GLOBAL, FOLLOWS, ACCELERATES = range(3)
+#: where forces and tangents begin in sums over the members of a pair (`strides.sums_size`)
+K, C = 2 * FREEDOMS + 1, 2 * FREEDOMS + 1 + FREEDOMS * FREEDOMS
+
+
+@part
+def _load(model, segment, k, first, tau):
+    """Three numbers of load k from component `first` on, at time tau of a segment."""
+    f = model.load_force[segment, k]
+    return (
+        f[first, 0] + tau * f[first, 1],
+        f[first + 1, 0] + tau * f[first + 1, 1],
+        f[first + 2, 0] + tau * f[first + 2, 1],
+    )
+
+
+@part
+def _inertia_times(model, d, a):
+    """J a for the body whose first freedom is d."""
+    return model.mass[d + 3] * a[0], model.mass[d + 4] * a[1], model.mass[d + 5] * a[2]
+
+
+@kernel
+def add_loads(model, segment, t, q, v, f):
+    """Loads, gravity and gyroscopic moments; see `kinematics_interface.add_loads`."""
+    tau = t - model.times[segment]
+    force = model.force
+    for i in range(force.shape[1]):
+        f[i] += force[segment, i, 0] + tau * force[segment, i, 1]
+    for body in range(model.home.shape[0]):
+        d = FREEDOMS * body
+        omega = vector_at(v, d + 3)
+        add(f, d + 3, cross(_inertia_times(model, d, omega), omega))
+    if model.load_body.shape[0] == 0:
+        return
+    attitude = np.empty(ATTITUDE)
+    for k in range(model.load_body.shape[0]):
+        body = model.load_body[k]
+        d = FREEDOMS * body
+        fill_attitude(model.home, body, q, attitude, 0)
+        push = _load(model, segment, k, 0, tau)
+        moment = _load(model, segment, k, 3, tau)
+        arm = vector_at(model.load_arm[k], 0)
+        if model.load_follows[k] == FOLLOWS:
+            add(f, d, turned(attitude, TURN, push))
+        else:
+            add(f, d, push)
+            push = turned_back(attitude, TURN, push)
+            moment = turned_back(attitude, TURN, moment)
+            if model.load_follows[k] == ACCELERATES:
+                moment = _inertia_times(model, d, moment)
+        add(f, d + 3, plus(cross(arm, push), moment))
+
+
+@kernel
+def load_tangent(model, segment, t, q, v, turn):
+    """Slopes of the loads and gyroscopic moments; see `kinematics_interface.load_tangent`.
+
+    A global vector seen from the body changes by a x dtheta; -omega x J omega by J omega x d - omega x J d.
+    """
+    turn[:] = 0.0
+    tau = t - model.times[segment]
+    for body in range(model.home.shape[0]):
+        d = FREEDOMS * body
+        omega = vector_at(v, d + 3)
+        spin = _inertia_times(model, d, omega)
+        for c in range(3):
+            e = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+            slope = minus(cross(spin, e), cross(omega, _inertia_times(model, d, e)))
+            for i in range(3):
+                turn[d + 3 + i, ROTATIONS + c] = slope[i]
+    if model.load_body.shape[0] == 0:
+        return
+    attitude = np.empty(ATTITUDE)
+    for k in range(model.load_body.shape[0]):
+        body = model.load_body[k]
+        d = FREEDOMS * body
+        fill_attitude(model.home, body, q, attitude, 0)
+        push = _load(model, segment, k, 0, tau)
+        moment = _load(model, segment, k, 3, tau)
+        arm = vector_at(model.load_arm[k], 0)
+        follows = model.load_follows[k]
+        if follows != FOLLOWS:
+            push = turned_back(attitude, TURN, push)
+            moment = turned_back(attitude, TURN, moment)
+        for c in range(3):
+            e = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+            if follows == FOLLOWS:
+                slope = turned(attitude, TURN, cross(e, push))
+                for i in range(3):
+                    turn[d + i, c] += slope[i]
+                continue
+            slope = cross(moment, e)
+            if follows == ACCELERATES:
+                slope = _inertia_times(model, d, slope)
+            slope = plus(slope, cross(arm, cross(push, e)))
+            for i in range(3):
+                turn[d + 3 + i, c] += slope[i]
+
+
+@kernel
+def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
+    """The tangents of a pair; see `kinematics_interface.pair_tangent`.
+
+    With dxi = T dq and, at given velocities, dxi' = N dq,  K = T^T (K_xi T + C_xi N) - d(T^T Q)/dq,  C = T^T C_xi T:
+
+        d(d') = (d' + omega_A x d) x dtheta_A - omega_A x dd,      dw = dphi x (w + omega_A)
+    """
+    r = rel[p]
+    o = sums[p]
+    t = np.empty((FREEDOMS, 2 * FREEDOMS))
+    _slopes_of_pose(r, t)
+    inner = np.zeros((FREEDOMS, 2 * FREEDOMS))
+    for i in range(FREEDOMS):
+        for m in range(FREEDOMS):
+            value = o[K + FREEDOMS * i + m]
+            if value != 0.0:
+                for j in range(2 * FREEDOMS):
+                    inner[i, j] += value * t[m, j]
+    if damped:
+        n = np.empty((FREEDOMS, 2 * FREEDOMS))
+        _slopes_of_rates(r, t, n)
+        by_rate = np.zeros((FREEDOMS, 2 * FREEDOMS))
+        for i in range(FREEDOMS):
+            for m in range(FREEDOMS):
+                low = min(i, m)
+                high = max(i, m)
+                value = o[C + high * (high + 1) // 2 + low]
+                if value != 0.0:
+                    for j in range(2 * FREEDOMS):
+                        inner[i, j] += value * n[m, j]
+                        by_rate[i, j] += value * t[m, j]
+        _pull_back(t, by_rate, c_out[p])
+    k = k_out[p]
+    _pull_back(t, inner, k)
+    # the change of the force's direction and arm at fixed Q: - d(T^T Q)/dq
+    push = vector_at(o, 0)
+    moment = vector_at(o, 3)
+    for c in range(2 * FREEDOMS):
+        dd = (t[0, c], t[1, c], t[2, c])
+        dphi = (t[3, c], t[4, c], t[5, c])
+        first = cross(push, dd)
+        second = turned_back(r, S, cross(moment, dphi))
+        force = (0.0, 0.0, 0.0)
+        if c >= 3 and c < 6:
+            e = (1.0 if c == 3 else 0.0, 1.0 if c == 4 else 0.0, 1.0 if c == 5 else 0.0)
+            force = turned(r, TURN_A, cross(e, push))
+        for i in range(3):
+            k[i, c] += force[i]
+            k[3 + i, c] -= first[i]
+            k[6 + i, c] -= force[i]
+            k[9 + i, c] -= second[i]
+
+
+@part
+def _slopes_of_pose(r, t):
+    """T (D, 2 D) = dxi/dq of the pose r (POSE,)."""
+    t[:] = 0.0
+    d = vector_at(r, D)
+    for c in range(3):
+        e = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+        arm = cross(d, e)
+        for i in range(3):
+            t[i, c] = -r[TURN_A + 3 * c + i]
+            t[i, 6 + c] = r[TURN_A + 3 * c + i]
+            t[i, 3 + c] = arm[i]
+            t[3 + i, 3 + c] = -e[i]
+            t[3 + i, 9 + c] = r[S + 3 * i + c]
+
+
+@part
+def _slopes_of_rates(r, t, n):
+    """N (D, 2 D) = dxi'/dq at given velocities, from the pose r (POSE,) and its slopes t (D, 2 D)."""
+    omega = vector_at(r, OMEGA_A)
+    speed = plus(vector_at(r, D_RATE), cross(omega, vector_at(r, D)))
+    spin = plus(vector_at(r, W), omega)
+    for c in range(2 * FREEDOMS):
+        move = cross((t[0, c], t[1, c], t[2, c]), omega)
+        turn = cross((t[3, c], t[4, c], t[5, c]), spin)
+        if c >= 3 and c < 6:
+            e = (1.0 if c == 3 else 0.0, 1.0 if c == 4 else 0.0, 1.0 if c == 5 else 0.0)
+            move = plus(move, cross(speed, e))
+        for i in range(3):
+            n[i, c] = move[i]
+            n[3 + i, c] = turn[i]
+
+
+@part
+def _pull_back(t, inner, out):
+    """out (2 D, 2 D) = T^T inner, both (D, 2 D)."""
+    for i in range(2 * FREEDOMS):
+        for j in range(2 * FREEDOMS):
+            out[i, j] = 0.0
+        for m in range(FREEDOMS):
+            value = t[m, i]
+            if value != 0.0:
+                for j in range(2 * FREEDOMS):
+                    out[i, j] += value * inner[m, j]
+
+
+@part
+def pair_matrix_vjp(model, p, m, z, bar):
+    """bar -= m^T z; see `kinematics_interface.pair_matrix_vjp`."""
+    for i in range(2 * FREEDOMS):
+        body = model.pair[p, i // FREEDOMS]
+        value = z[FREEDOMS * body + i % FREEDOMS]
+        if value != 0.0:
+            for j in range(2 * FREEDOMS):
+                bar[FREEDOMS * model.pair[p, j // FREEDOMS] + j % FREEDOMS] -= m[i, j] * value
+
+
+@part
+def pair_stiffness(model, sums, p):
+    """The trace of the stiffness against displacements."""
+    return sums[p, K] + sums[p, K + FREEDOMS + 1] + sums[p, K + 2 * (FREEDOMS + 1)]

@@ -1,0 +1,385 @@
+"""A member between two bodies in space, and sums over the members of a block.
+
+With r = d + a - p, a = S q, L = |r|, e = r/L and the relative rates xi' = (d', w),
+
+    b = dL/dxi = (e, a x e),   Delta = L - l0,   dDelta/dt = b . xi' = e . r',   r' = d' + w x a
+
+b changes along dxi = (dd, dphi) by B2 dxi; with dr = dd + dphi x a, de = (dr - (e . dr) e)/L it is
+(de, a x de + (dphi x a) x e), and (B2^T xi') = (e', a x (e' + e x w)), e' = (r' - (e . r') e)/L. A law
+f(Delta, dDelta/dt, t) with its partials gives Q = -sum s f b, K = sum s (b (f_D b + f_Dd B2^T xi')^T + f B2),
+C = sum s f_Dd b b^T, E = sum s V, E_xi = sum s V' b, where s = alpha^mu.
+"""
+
+import math
+
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.kinematics.spatial_forces import C, K
+from mdstopo.mechanics.kinematics.spatial_lines import (
+    NO_LENGTH,
+    add_line_stiffness,
+    line_between,
+    line_bias,
+    line_rate_slopes,
+    line_row,
+    line_slopes,
+    line_speed,
+)
+from mdstopo.mechanics.kinematics.spatial_poses import (
+    ATTITUDE,
+    COORDINATES,
+    D,
+    D_RATE,
+    D_SINCE,
+    FREEDOMS,
+    HOME_PLACE,
+    S,
+    S_SINCE,
+    TURN,
+    TURN_SINCE,
+    W,
+    fill_attitude,
+)
+from mdstopo.mechanics.kinematics.vectors import (
+    add,
+    cross,
+    dot,
+    minus,
+    plus,
+    times,
+    turned,
+    vector_at,
+)
+from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
+from mdstopo.mechanics.laws.table import SPRING, law
+
+#: rows of `GeneralModel.member`: the ends P and Q in body frames, l0, and L^2 - l0^2 at home
+P, Q, L0, EXCESS = 0, 3, 6, 7
+#: columns of sums over members: the energy, and its slopes
+ENERGY, PULL = FREEDOMS, FREEDOMS + 1
+
+
+@part
+def end_of(member, first, i):
+    """An end of member i in its body's frame, whose coordinates stand from row `first` on."""
+    return member[first, i], member[first + 1, i], member[first + 2, i]
+
+
+@part
+def elongation_of(x, length, u, free, excess):
+    """Delta = L - l0 of a member (m), with all digits of what its vector has changed by.
+
+    x, length: its vector and length (m). u: what the vector has changed by since home (m).
+    free: l0 (m). excess: L0^2 - l0^2 (m^2).
+    """
+    if dot(u, u) < length * length:
+        return (excess + dot(u, minus(plus(x, x), u))) / (length + free)
+    return length - free
+
+
+@part
+def vector_of(model, i, r):
+    """The vector of member i at the pose r (POSE,), its arm a (m), its length (m), and 1/L (0 where it has none)."""
+    arm = turned(r, S, end_of(model.member, Q, i))
+    x = plus(vector_at(r, D), minus(arm, end_of(model.member, P, i)))
+    square = dot(x, x)
+    y = 1.0 / math.sqrt(square) if square > ZERO_LENGTH_SQUARED else 0.0
+    return x, arm, square * y, y
+
+
+@part
+def stretched(model, i, r, x, length):
+    """Elongation of member i (m), whose vector at the pose r (POSE,) is x."""
+    u = plus(vector_at(r, D_SINCE), turned(r, S_SINCE, end_of(model.member, Q, i)))
+    return elongation_of(x, length, u, model.member[L0, i], model.member[EXCESS, i])
+
+
+@part
+def stretch_of(model, i, r):
+    """Elongation and its rate of member i; see `kinematics_interface.stretch_of`."""
+    x, arm, length, y = vector_of(model, i, r)
+    rate = y * dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
+    return stretched(model, i, r, x, length), rate
+
+
+@part
+def member_motion(model, i, r):
+    """Length, elongation and its rate of member i; see `kinematics_interface.member_motion`."""
+    x, arm, length, y = vector_of(model, i, r)
+    rate = y * dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
+    return length, stretched(model, i, r, x, length), rate
+
+
+@part
+def motion_of_ends(model, i, r):
+    """Elongation and its rate of member i from its ends; see `kinematics_interface.motion_of_ends`."""
+    x, arm, _, _ = vector_of(model, i, r)
+    length = math.sqrt(dot(x, x))
+    speed = dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
+    return stretched(model, i, r, x, length), speed / length if length > 0.0 else 0.0
+
+
+@part
+def member_work(model, i, r, u):
+    """Length, elongation and b . u of member i; see `kinematics_interface.member_work`."""
+    x, arm, length, y = vector_of(model, i, r)
+    along = y * dot(x, plus(vector_at(u, 0), cross(vector_at(u, 3), arm)))
+    return length, stretched(model, i, r, x, length), along
+
+
+@part
+def second_rate(model, i, r, acc):
+    """d2Delta/dt2 = b . xi'' + (|r'|^2 - L'^2)/L + e . (w x (w x a)); see `kinematics_interface.second_rate`."""
+    x, arm, _, y = vector_of(model, i, r)
+    w = vector_at(r, W)
+    turning = cross(w, arm)
+    speed = plus(vector_at(r, D_RATE), turning)
+    rate = y * dot(x, speed)
+    push = plus(vector_at(acc, 0), plus(cross(vector_at(acc, 3), arm), cross(w, turning)))
+    return y * (dot(x, push) + dot(speed, speed) - rate * rate)
+
+
+@kernel
+def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, tangent, o):
+    """Forces, energy and tangents of members of one law; see `kinematics_interface.member_sums`."""
+    w = vector_at(r, W)
+    speed_of_origin = vector_at(r, D_RATE)
+    for i in range(lo, lo + count):
+        x, arm, length, y = vector_of(model, i, r)
+        if length == 0.0:  # not y == 0.0: that is so infinitely far away, too
+            continue
+        e = times(y, x)
+        lever = cross(arm, e)
+        speed = plus(speed_of_origin, cross(w, arm))
+        rate = dot(e, speed)
+        scale = member_state[0, i]
+        stretch = stretched(model, i, r, x, length) - member_state[2, i]
+        f, fd, fr, energy, pull = law(code, p, stretch, rate, int(member_state[1, i]), t, value, model.curves)
+        f *= scale
+        add(o, 0, times(-f, e))
+        add(o, 3, times(-f, lever))
+        if counted:
+            o[ENERGY] += scale * energy
+            add(o, PULL, times(scale * pull, e))
+            add(o, PULL + 3, times(scale * pull, lever))
+        if tangent:
+            _add_tangent(e, arm, lever, y, speed, rate, w, f, scale * fd, scale * fr, o)
+
+
+@part
+def _add_tangent(e, arm, lever, y, speed, rate, w, f, fd, fr, o):
+    """Add K and C of one member to the sums o (SUMS,).
+
+    e, arm, lever: its direction, its arm a (m) and a x e (m). y: 1/L (1/m).
+    speed, rate, w: r' (m/s), e . r' (m/s) and the relative turning rate (rad/s).
+    f, fd, fr: the force (N) and its slopes by elongation and rate.
+    """
+    turning = times(y, minus(speed, times(rate, e)))
+    by_turn = cross(arm, plus(turning, cross(e, w)))
+    for j in range(FREEDOMS):
+        c = j % 3
+        unit = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+        along = e[c] if j < 3 else lever[c]
+        by = fd * along + fr * (turning[c] if j < 3 else by_turn[c])
+        moved = unit if j < 3 else cross(unit, arm)
+        de = times(f * y, minus(moved, times(dot(e, moved), e)))
+        dl = cross(arm, de)
+        if j >= 3:
+            dl = plus(dl, times(f, cross(moved, e)))
+        for i in range(3):
+            o[K + FREEDOMS * i + j] += e[i] * by + de[i]
+            o[K + FREEDOMS * (3 + i) + j] += lever[i] * by + dl[i]
+        if fr != 0.0:
+            for i in range(j + 1):
+                o[C + j * (j + 1) // 2 + i] += fr * along * (e[i] if i < 3 else lever[i - 3])
+
+
+@kernel
+def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
+    """Forces, energy and tangents of springs; see `kinematics_interface.spring_sums`."""
+    member_sums(model, SPRING, p, start, count, counted, 0.0, 0.0, member_state, r, tangent, o)
+
+
+@kernel
+def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, r, u, weight, out):
+    """What members of one law add to a derivative by alpha^mu; see `kinematics_interface.member_designs`."""
+    move = vector_at(u, 0)
+    turn = vector_at(u, 3)
+    for i in range(lo, lo + count):
+        x, arm, length, y = vector_of(model, i, r)
+        if length == 0.0:
+            continue
+        rate = y * dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
+        stretch = stretched(model, i, r, x, length)
+        if code != SPRING:
+            stretch -= member_state[2, i]
+        mode = int(modes_of[i]) if code != SPRING else 0
+        f, _, _, energy, _ = law(code, p, stretch, rate, mode, t, value, model.curves)
+        out[i] += f * (y * dot(x, plus(move, cross(turn, arm)))) + weight * energy
+
+
+@part
+def spring_designs(model, p, lo, count, rel, u, pair, out):
+    """`member_designs` of springs at many poses; see `kinematics_interface.spring_designs`."""
+    for s in range(rel.shape[0]):
+        r = rel[s, pair]
+        move = vector_at(u[s, pair], 0)
+        turn = vector_at(u[s, pair], 3)
+        for i in range(lo, lo + count):
+            x, arm, length, y = vector_of(model, i, r)
+            stretch = stretched(model, i, r, x, length)
+            out[i] += p[0] * stretch * (y * dot(x, plus(move, cross(turn, arm))))
+
+
+@part
+def spring_designs_of_rows(model, p, lo, count, rel, u, pair, room, out):
+    """`spring_designs` for many rows; see `kinematics_interface.spring_designs_of_rows`."""
+    for s in range(rel.shape[0]):
+        r = rel[s, pair]
+        for i in range(lo, lo + count):
+            x, arm, length, y = vector_of(model, i, r)
+            rate = y * dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
+            f = p[0] * stretched(model, i, r, x, length) + p[1] * rate + p[2]
+            e = times(f * y, x)
+            lever = cross(arm, e)
+            for m in range(out.shape[0]):
+                out[m, i] += dot(e, vector_at(u[m, s, pair], 0)) + dot(lever, vector_at(u[m, s, pair], 3))
+
+
+@part
+def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r, u, j, pair, seen, out):
+    """`member_designs` for many rows; see `kinematics_interface.member_designs_of_rows`."""
+    for i in range(lo, lo + count):
+        x, arm, length, y = vector_of(model, i, r)
+        if length == 0.0:
+            continue
+        rate = y * dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
+        stretch = stretched(model, i, r, x, length) - member_state[2, i]
+        f, _, _, _, _ = law(code, p, stretch, rate, int(member_state[1, i]), t, value, model.curves)
+        e = times(f * y, x)
+        lever = cross(arm, e)
+        for m in range(out.shape[0]):
+            out[m, i] += dot(e, vector_at(u[m, j, pair], 0)) + dot(lever, vector_at(u[m, j, pair], 3))
+
+
+@part
+def keep_apart(model, lo, count, before, after):
+    """Whether no member's ends can meet between two poses; see `kinematics_interface.keep_apart`."""
+    for i in range(lo, lo + count):
+        x, _, length, _ = vector_of(model, i, before)
+        moved = minus(vector_of(model, i, after)[0], x)
+        if not dot(moved, moved) < length * length:
+            return False
+    return True
+
+
+@part
+def ends_meet(model, i, r, w):
+    """Whether the ends of member i meet between two poses; see `kinematics_interface.ends_meet`."""
+    x, _, _, _ = vector_of(model, i, r)
+    u = minus(vector_of(model, i, w)[0], x)
+    square = dot(u, u)
+    along = -dot(x, u)
+    across = cross(x, u)
+    met = square > 0.0 and along >= 0.0 and along <= square and dot(across, across) <= 1e-18 * square * square
+    return met or not dot(x, x) > ZERO_LENGTH_SQUARED
+
+
+@part
+def turn_of(model, body, q):
+    """The attitude of one body, (ATTITUDE,); see `kinematics_interface.turn_of`."""
+    attitude = np.empty(ATTITUDE)
+    fill_attitude(model.home, body, q, attitude, 0)
+    return attitude
+
+
+@part
+def line_of(model, p, i, turn_one, turn_two, q):
+    """The line along member i of pair p as its bodies' attitudes (ATTITUDE,) place it.
+
+    Returns its direction, its length, and the elongation (m).
+    """
+    one = model.pair[p, 0]
+    two = model.pair[p, 1]
+    at_home = minus(vector_at(model.home[two], HOME_PLACE), vector_at(model.home[one], HOME_PLACE))
+    moved = minus(vector_at(q, COORDINATES * two), vector_at(q, COORDINATES * one))
+    first = end_of(model.member, P, i)
+    second = end_of(model.member, Q, i)
+    x, e, length = line_between(turn_one, TURN, turn_two, TURN, first, second, plus(at_home, moved))
+    u = plus(moved, minus(turned(turn_two, TURN_SINCE, second), turned(turn_one, TURN_SINCE, first)))
+    return e, length, elongation_of(x, length, u, model.member[L0, i], model.member[EXCESS, i])
+
+
+@part
+def stretch_between(model, p, i, turn_one, turn_two, q, v):
+    """Elongation and its rate of member i from turned bodies; see `kinematics_interface.stretch_between`."""
+    e, _, stretch = line_of(model, p, i, turn_one, turn_two, q)
+    one = FREEDOMS * model.pair[p, 0]
+    two = FREEDOMS * model.pair[p, 1]
+    first = end_of(model.member, P, i)
+    second = end_of(model.member, Q, i)
+    return stretch, dot(e, line_speed(turn_one, TURN, turn_two, TURN, first, second, v, one, two))
+
+
+@kernel
+def member_rows(model, p, i, q, v, row, row_rate):
+    """Elongation, its rate and the row B of a member; see `kinematics_interface.member_rows`."""
+    one = FREEDOMS * model.pair[p, 0]
+    two = FREEDOMS * model.pair[p, 1]
+    turn_one = turn_of(model, model.pair[p, 0], q)
+    turn_two = turn_of(model, model.pair[p, 1], q)
+    e, length, stretch = line_of(model, p, i, turn_one, turn_two, q)
+    first = end_of(model.member, P, i)
+    second = end_of(model.member, Q, i)
+    line_row(turn_one, TURN, turn_two, TURN, first, second, e, row, 0)
+    line_rate_slopes(turn_one, TURN, turn_two, TURN, first, second, e, length, v, one, two, row_rate)
+    return stretch, dot(e, line_speed(turn_one, TURN, turn_two, TURN, first, second, v, one, two))
+
+
+@kernel
+def inerter_row(model, q, v, i, p, row, row_rate):
+    """B of a member as a row over its two bodies; see `kinematics_interface.inerter_row`."""
+    one = FREEDOMS * model.pair[p, 0]
+    two = FREEDOMS * model.pair[p, 1]
+    turn_one = turn_of(model, model.pair[p, 0], q)
+    turn_two = turn_of(model, model.pair[p, 1], q)
+    e, length, _ = line_of(model, p, i, turn_one, turn_two, q)
+    first = end_of(model.member, P, i)
+    second = end_of(model.member, Q, i)
+    line_row(turn_one, TURN, turn_two, TURN, first, second, e, row, 0)
+    row_rate[0] = line_bias(turn_one, TURN, turn_two, TURN, first, second, e, length, v, one, two)
+    if length <= NO_LENGTH:
+        row_rate[0] = 0.0
+        return 0.0
+    return length
+
+
+@kernel
+def add_inerter_tangents(model, pair, lo, count, inertance, member_state, q, v, a, k_out, c_out):
+    """Slopes of the inerters' forces at fixed a; see `kinematics_interface.add_inerter_tangents`."""
+    one = FREEDOMS * model.pair[pair, 0]
+    two = FREEDOMS * model.pair[pair, 1]
+    turn_one = turn_of(model, model.pair[pair, 0], q)
+    turn_two = turn_of(model, model.pair[pair, 1], q)
+    row = np.empty(2 * FREEDOMS)
+    by_q = np.empty(2 * FREEDOMS)
+    by_v = np.empty(2 * FREEDOMS)
+    for i in range(lo, lo + count):
+        e, length, _ = line_of(model, pair, i, turn_one, turn_two, q)
+        if length <= NO_LENGTH:
+            continue
+        first = end_of(model.member, P, i)
+        second = end_of(model.member, Q, i)
+        line_row(turn_one, TURN, turn_two, TURN, first, second, e, row, 0)
+        second_rate_now = line_slopes(
+            turn_one, TURN, turn_two, TURN, first, second, e, length, v, a, one, two, by_q, by_v
+        )
+        w = member_state[0, i] * inertance
+        for r in range(2 * FREEDOMS):
+            for c in range(2 * FREEDOMS):
+                k_out[pair, r, c] += w * row[r] * by_q[c]
+                c_out[pair, r, c] += w * row[r] * by_v[c]
+        add_line_stiffness(
+            turn_one, TURN, turn_two, TURN, first, second, e, length, w * second_rate_now, k_out[pair]
+        )

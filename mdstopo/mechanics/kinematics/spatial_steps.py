@@ -1,0 +1,379 @@
+"""The state of bodies in space at the stages and at the end of a step, between steps, and how these change.
+
+Centres of mass move as in a plane. Turns are followed by the rotation vector t from the start of a step, with
+t' = J(t)^-1 omega (`rotations`): a Runge-Kutta method of order p keeps its order, and a body that turns evenly is
+followed exactly. With t_i = h sum_j a_ij k_j and k_j = J(t_j)^-1 omega_j, coordinates are q_0 exp(t_i).
+
+Backwards, with u_i the cotangent of the turn of stage i, g_i that of its turning rate, and t_i -> k_i:
+
+    bar t_i = J(t_i)^T u_i + (dk_i/dt_i)^T bar k_i,    bar k_i = h sum_{l > i} a_li bar t_l + h b_i bar t_end
+    bar omega_i = g_i + J(t_i)^-T bar k_i
+"""
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS
+from mdstopo.mechanics.kinematics.rotations import (
+    exponential,
+    inverse,
+    product,
+    quaternion_at,
+    turn_between,
+    turn_by,
+    turn_rate,
+    vector_rate,
+    vector_rate_jvp,
+    vector_rate_vjp,
+)
+from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS
+from mdstopo.mechanics.kinematics.vectors import add, dot, minus, plus, put, times, vector_at
+
+
+@part
+def put_quaternion(q, i, e):
+    """q[i : i + 4] = e."""
+    q[i] = e[0]
+    q[i + 1] = e[1]
+    q[i + 2] = e[2]
+    q[i + 3] = e[3]
+
+
+@part
+def back_turned(t, a):
+    """A small turn a of a body, as seen behind a further turn by t: exp(-t) a exp(t)."""
+    e = exponential(t)
+    x = product(product(inverse(e), (0.0, a[0], a[1], a[2])), e)
+    return x[1], x[2], x[3]
+
+
+@kernel
+def retract(model, q, shift, out):
+    """Bodies move by the first three of a shift, and turn by the others; see `kinematics_interface.retract`."""
+    for body in range(shift.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        put(out, i, plus(vector_at(q, i), vector_at(shift, d)))
+        put_quaternion(out, i + 3, turn_by(quaternion_at(q, i + 3), vector_at(shift, d + 3)))
+
+
+@kernel
+def difference(model, after, before, out):
+    """See `kinematics_interface.difference`; turns of half a turn at most."""
+    for body in range(out.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        put(out, d, minus(vector_at(after, i), vector_at(before, i)))
+        put(out, d + 3, turn_between(quaternion_at(before, i + 3), quaternion_at(after, i + 3)))
+
+
+@kernel
+def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
+    """The cotangents of both: exp(-t) takes a turn before it along, and J(t) gives its own change."""
+    for body in range(bar.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        t = turn_between(quaternion_at(q, i + 3), quaternion_at(moved, i + 3))
+        place = vector_at(bar, d)
+        turn = vector_at(bar, d + 3)
+        put(bar_q, d, place)
+        put(bar_shift, d, place)
+        put(bar_q, d + 3, back_turned(times(-1.0, t), turn))
+        put(bar_shift, d + 3, turn_rate(times(-1.0, t), turn))
+
+
+@kernel
+def retract_jvp(model, q, moved, dq, dshift, out):
+    """The changes of both; see `kinematics_interface.retract_jvp`."""
+    for body in range(out.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        t = turn_between(quaternion_at(q, i + 3), quaternion_at(moved, i + 3))
+        put(out, d, plus(vector_at(dq, d), vector_at(dshift, d)))
+        put(out, d + 3, plus(back_turned(t, vector_at(dq, d + 3)), turn_rate(t, vector_at(dshift, d + 3))))
+
+
+@kernel
+def advance_coordinates(model, q, v, a, e, out):
+    """A parabola of places, and of rotation vectors from here; see `kinematics_interface.advance_coordinates`."""
+    for body in range(v.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        move = times(e, plus(vector_at(v, d), times(0.5 * e, vector_at(a, d))))
+        turn = times(e, plus(vector_at(v, d + 3), times(0.5 * e, vector_at(a, d + 3))))
+        put(out, i, plus(vector_at(q, i), move))
+        put_quaternion(out, i + 3, turn_by(quaternion_at(q, i + 3), turn))
+
+
+@kernel
+def stage_state(model, table, h, i, q0, v0, q, v, a, slopes):
+    """Coordinates and velocities of stage i; see `kinematics_interface.stage_state`.
+
+    slopes (s, n): of each stage k_i in the places of its turns.
+    """
+    ahead = h * table[VECTORS, NODES, i]
+    stage = q[i]
+    for body in range(v0.shape[0] // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        place = plus(vector_at(q0, c), times(ahead, vector_at(v0, d)))
+        velocity = vector_at(v0, d)
+        omega = vector_at(v0, d + 3)
+        turn = (0.0, 0.0, 0.0)
+        for j in range(i):
+            w = h * h * table[BY_STAGE, i, j]
+            u = h * table[BY_RATE, i, j]
+            if w != 0.0:
+                place = plus(place, times(w, vector_at(a[j], d)))
+            if u != 0.0:
+                velocity = plus(velocity, times(u, vector_at(a[j], d)))
+                omega = plus(omega, times(u, vector_at(a[j], d + 3)))
+                turn = plus(turn, times(u, vector_at(slopes[j], d + 3)))
+        put(stage, c, place)
+        put_quaternion(stage, c + 3, turn_by(quaternion_at(q0, c + 3), turn))
+        put(v[i], d, velocity)
+        put(v[i], d + 3, omega)
+        put(slopes[i], d + 3, vector_rate(turn, omega))
+
+
+@kernel
+def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
+    """Coordinates and velocities at the end of a step; see `kinematics_interface.end_state`."""
+    for body in range(v0.shape[0] // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        place = plus(vector_at(q0, c), times(h, vector_at(v0, d)))
+        velocity = vector_at(v0, d)
+        omega = vector_at(v0, d + 3)
+        turn = (0.0, 0.0, 0.0)
+        for j in range(s):
+            w = h * table[VECTORS, END_RATE, j]
+            place = plus(place, times(h * h * table[VECTORS, END, j], vector_at(a[j], d)))
+            velocity = plus(velocity, times(w, vector_at(a[j], d)))
+            omega = plus(omega, times(w, vector_at(a[j], d + 3)))
+            turn = plus(turn, times(w, vector_at(slopes[j], d + 3)))
+        put(q_end, c, place)
+        put_quaternion(q_end, c + 3, turn_by(quaternion_at(q0, c + 3), turn))
+        put(v_end, d, velocity)
+        put(v_end, d + 3, omega)
+
+
+@part
+def _end_turn(table, s, h, q, v, c, d):
+    """The rotation vector of the end of a step, from its stages q (s, n_q), v (s, n); c, d: the body's places."""
+    turn = (0.0, 0.0, 0.0)
+    start = quaternion_at(q[0], c + 3)
+    for j in range(s):
+        t = turn_between(start, quaternion_at(q[j], c + 3))
+        turn = plus(turn, times(h * table[VECTORS, END_RATE, j], vector_rate(t, vector_at(v[j], d + 3))))
+    return turn
+
+
+@part
+def _slope_bar(table, s, h, i, u, d, end_bar):
+    """bar k_i from bar t of the later stages, which stand in u, and that of the end."""
+    bar = times(h * table[VECTORS, END_RATE, i], end_bar)
+    for m in range(i + 1, s):
+        w = h * table[BY_RATE, m, i]
+        if w != 0.0:
+            bar = plus(bar, times(w, vector_at(u[m], d + 3)))
+    return bar
+
+
+@kernel
+def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
+    """The cotangent of the accelerations of stage j; see `kinematics_interface.stage_vjp`.
+
+    The turning parts of u and g of the stage behind j, which nobody reads any more, become bar t and bar omega.
+    """
+    s, n = u.shape
+    by_end = h * h * table[VECTORS, END, j]
+    by_end_rate = h * table[VECTORS, END_RATE, j]
+    for body in range(n // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        if j + 1 < s:
+            end_turn = _end_turn(table, s, h, q, v, c, d)
+            end_bar = turn_rate(times(-1.0, end_turn), vector_at(lam_q, d + 3))
+            _stage_bars(table, h, j + 1, q, v, end_bar, u, g, c, d)
+        place = plus(times(by_end, vector_at(lam_q, d)), times(by_end_rate, vector_at(lam_v, d)))
+        turn = times(by_end_rate, vector_at(lam_v, d + 3))
+        for i in range(j + 1, s):
+            by_stage = h * h * table[BY_STAGE, i, j]
+            by_rate = h * table[BY_RATE, i, j]
+            if by_stage != 0.0 or by_rate != 0.0:
+                place = plus(place, plus(times(by_stage, vector_at(u[i], d)), times(by_rate, vector_at(g[i], d))))
+                turn = plus(turn, times(by_rate, vector_at(g[i], d + 3)))
+        put(z, d, place)
+        put(z, d + 3, turn)
+
+
+@part
+def _stage_bars(table, h, i, q, v, end_bar, u, g, c, d):
+    """u, g (s, n) of stage i of the body at c, d: cotangents of its turn and turning rate become bar t, bar omega."""
+    t = turn_between(quaternion_at(q[0], c + 3), quaternion_at(q[i], c + 3))
+    bar = _slope_bar(table, u.shape[0], h, i, u, d, end_bar)
+    own = plus(turn_rate(times(-1.0, t), vector_at(u[i], d + 3)), vector_rate_vjp(t, vector_at(v[i], d + 3), bar))
+    put(u[i], d + 3, own)
+    add(g[i], d + 3, vector_rate(times(-1.0, t), bar))
+
+
+@kernel
+def start_vjp(model, table, s, h, q, v, u, g, lam_q, lam_v):
+    """The cotangents of the start of a step; see `kinematics_interface.start_vjp`.
+
+    A turn of the start is seen behind each stage's turn, and behind the end's. Of u the turning parts of the stages
+    behind the first are bar t by now (`stage_vjp`): J(t)^T u_i is what is left of them without k_i's part.
+    """
+    for body in range(lam_q.shape[0] // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        start = quaternion_at(q[0], c + 3)
+        end_turn = _end_turn(table, s, h, q, v, c, d)
+        seen = vector_at(lam_q, d + 3)
+        end_bar = turn_rate(times(-1.0, end_turn), seen)
+        _stage_bars(table, h, 0, q, v, end_bar, u, g, c, d)
+        turn = back_turned(times(-1.0, end_turn), seen)
+        place = vector_at(lam_q, d)
+        velocity = plus(vector_at(lam_v, d), times(h, place))
+        omega = vector_at(lam_v, d + 3)
+        for i in range(s):
+            ahead = h * table[VECTORS, NODES, i]
+            move = vector_at(u[i], d)
+            place = plus(place, move)
+            velocity = plus(velocity, plus(times(ahead, move), vector_at(g[i], d)))
+            omega = plus(omega, vector_at(g[i], d + 3))
+            t = turn_between(start, quaternion_at(q[i], c + 3))
+            bar = _slope_bar(table, s, h, i, u, d, end_bar)
+            own = minus(vector_at(u[i], d + 3), vector_rate_vjp(t, vector_at(v[i], d + 3), bar))
+            # own = J(t)^T u_i; u_i seen before the turn is exp(t) u_i = exp(t) J(t)^-T own = J(t)^-1 own
+            turn = plus(turn, vector_rate(t, own))
+        put(lam_q, d, place)
+        put(lam_v, d, velocity)
+        put(lam_q, d + 3, turn)
+        put(lam_v, d + 3, omega)
+
+
+@kernel
+def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
+    """Changes of coordinates and velocities of stage i; see `kinematics_interface.stage_jvp`."""
+    for body in range(dq.shape[0] // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        start = quaternion_at(q[0], c + 3)
+        place = plus(vector_at(dq, d), times(h * table[VECTORS, NODES, i], vector_at(dv, d)))
+        velocity = vector_at(dv, d)
+        omega = vector_at(dv, d + 3)
+        turn = (0.0, 0.0, 0.0)
+        for j in range(i):
+            w = h * table[BY_RATE, i, j]
+            acceleration = changes[j, 2]
+            place = plus(place, times(h * h * table[BY_STAGE, i, j], vector_at(acceleration, d)))
+            if w != 0.0:
+                velocity = plus(velocity, times(w, vector_at(acceleration, d)))
+                omega = plus(omega, times(w, vector_at(acceleration, d + 3)))
+                turn = plus(turn, times(w, _slope_change(start, q[j], v[j], dq, changes[j], c, d)))
+        t = turn_between(start, quaternion_at(q[i], c + 3))
+        put(changes[i, 0], d, place)
+        put(changes[i, 0], d + 3, plus(back_turned(t, vector_at(dq, d + 3)), turn_rate(t, turn)))
+        put(changes[i, 1], d, velocity)
+        put(changes[i, 1], d + 3, omega)
+
+
+@part
+def _slope_change(start, q, v, dq, change, c, d):
+    """The change of k = J(t)^-1 omega of a stage, from changes (3, n) of its state and dq (n,) of the start's.
+
+    The change of its turn is that of t, by J(t), and the start's, seen behind the turn: what J(t)^-1 makes of the rest.
+    """
+    t = turn_between(start, quaternion_at(q, c + 3))
+    rest = minus(vector_at(change[0], d + 3), back_turned(t, vector_at(dq, d + 3)))
+    dt = vector_rate(t, rest)
+    return plus(vector_rate_jvp(t, vector_at(v, d + 3), dt), vector_rate(t, vector_at(change[1], d + 3)))
+
+
+@kernel
+def end_jvp(model, table, s, h, q, v, changes, dq, dv):
+    """Changes of the end of a step; see `kinematics_interface.end_jvp`."""
+    for body in range(dq.shape[0] // FREEDOMS):
+        c = COORDINATES * body
+        d = FREEDOMS * body
+        start = quaternion_at(q[0], c + 3)
+        turn = (0.0, 0.0, 0.0)
+        place = plus(vector_at(dq, d), times(h, vector_at(dv, d)))
+        velocity = vector_at(dv, d)
+        omega = vector_at(dv, d + 3)
+        for j in range(s):
+            w = h * table[VECTORS, END_RATE, j]
+            acceleration = changes[j, 2]
+            place = plus(place, times(h * h * table[VECTORS, END, j], vector_at(acceleration, d)))
+            velocity = plus(velocity, times(w, vector_at(acceleration, d)))
+            omega = plus(omega, times(w, vector_at(acceleration, d + 3)))
+            turn = plus(turn, times(w, _slope_change(start, q[j], v[j], dq, changes[j], c, d)))
+        t = _end_turn(table, s, h, q, v, c, d)
+        seen = plus(back_turned(t, vector_at(dq, d + 3)), turn_rate(t, turn))
+        put(dq, d, place)
+        put(dq, d + 3, seen)
+        put(dv, d, velocity)
+        put(dv, d + 3, omega)
+
+
+@kernel
+def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
+    """The quintic through both ends of a step; see `kinematics_interface.quintic`.
+
+    Turns follow the quintic of the rotation vector from the start, whose rates at the end are J(t)^-1 omega and the
+    derivative of that.
+    """
+    for body in range(v.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        for turning in range(2):
+            k = d + 3 * turning
+            speed = vector_at(v0, k)
+            push = vector_at(a0, k)
+            end_speed = vector_at(v1, k)
+            end_push = vector_at(a1, k)
+            way = (0.0, 0.0, 0.0)
+            if turning == 0:
+                way = minus(vector_at(q1, i), vector_at(q0, i))
+            else:
+                way = turn_between(quaternion_at(q0, i + 3), quaternion_at(q1, i + 3))
+                omega = end_speed
+                end_speed = vector_rate(way, omega)
+                end_push = plus(vector_rate(way, end_push), vector_rate_jvp(way, omega, end_speed))
+            along, rate = _quintic(c, h, speed, push, way, end_speed, end_push)
+            if turning == 0:
+                put(q, i, plus(vector_at(q0, i), along))
+                put(v, k, rate)
+            else:
+                put_quaternion(q, i + 3, turn_by(quaternion_at(q0, i + 3), along))
+                put(v, k, turn_rate(along, rate))
+
+
+@part
+def _quintic(c, h, v0, a0, way, v1, a1):
+    """How far a quintic has come at fraction c of a step, and its derivative.
+
+    h: length of the step (s). v0, a0, v1, a1: velocity and acceleration at both ends. way: how far it comes.
+    """
+    j = minus(way, times(h, plus(v0, times(0.5 * h, a0))))
+    w = times(h, minus(minus(v1, v0), times(h, a0)))
+    b = times(h * h, minus(a1, a0))
+    x3 = plus(plus(times(10.0, j), times(-4.0, w)), times(0.5, b))
+    x4 = minus(plus(times(-15.0, j), times(7.0, w)), b)
+    x5 = plus(plus(times(6.0, j), times(-3.0, w)), times(0.5, b))
+    inner = plus(x3, times(c, plus(x4, times(c, x5))))
+    along = times(c, plus(times(h, v0), times(c, plus(times(0.5 * h * h, a0), times(c, inner)))))
+    inner = plus(times(3.0, x3), times(c, plus(times(4.0, x4), times(5.0 * c, x5))))
+    rate = plus(v0, times(c / h, plus(times(h * h, a0), times(c, inner))))
+    return along, rate
+
+
+@part
+def turned_by(q, other):
+    """The largest angle (rad) between the attitudes of a body in two states."""
+    largest = 0.0
+    for body in range(q.shape[0] // COORDINATES):
+        i = COORDINATES * body + 3
+        t = turn_between(quaternion_at(q, i), quaternion_at(other, i))
+        largest = max(largest, dot(t, t) ** 0.5)
+    return largest
