@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.model import GROUND, Body, Case, MemberGroup, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.number_rows import rows_in
 from mdstopo.case.overrides import apply_overrides
-from mdstopo.case.start_geometry import Frames
+from mdstopo.case.start_geometry import Frames, frames_of
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.scaled_laws import sized as sized_law
 from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
@@ -135,7 +135,7 @@ def _names(
 def _members(
     content: Plain, case: Case, names: Sequence[str], fixed: Mapping[str, list[str]], design: FloatArray
 ) -> Plain:
-    frames = Frames({GROUND: Body(GROUND, 1.0, 1.0, (0.0, 0.0)), **{body.name: body for body in case.bodies}})
+    frames = frames_of(case)
     values = design[case.n_design :]
     members: Plain = {}
     first = 0
