@@ -33,11 +33,10 @@ from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 ZERO = (0.0, 0.0, 0.0)
 
 
-def with_keys(record: Record, *new: Key, gone: tuple[str, ...] = (), **changes: object) -> Record:
-    """A record with other keys in the place of those of their names, those that are new behind them."""
-    known = {key.name: key for key in record.keys if key.name not in gone}
-    keys = tuple((known | {key.name: key for key in new}).values())
-    return replace(record, keys=keys, **changes)
+def with_keys(record: Record, *new: Key) -> Record:
+    """A record with other keys in the place of those of their names."""
+    known = {key.name: key for key in record.keys}
+    return replace(record, keys=tuple((known | {key.name: key for key in new}).values()))
 
 
 def with_kind(record: Record, name: str, kind: Kind) -> Key:

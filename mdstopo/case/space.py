@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray, Table, Triple, VectorSignal
+from mdstopo.case.arrays import FloatArray, Triple, VectorSignal
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
 from mdstopo.case.loading import largest, scaled
@@ -15,6 +15,7 @@ from mdstopo.case.model import GROUND, Load, SpatialBody
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
+from mdstopo.case.signals import combined
 from mdstopo.case.spatial_grids import check_grid, grid_count, grid_points
 from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 from mdstopo.case.start_geometry import in_range
@@ -24,18 +25,23 @@ UNIT = 1e-6
 """How far quaternions and matrices may be from norm 1; they are normalised."""
 ROD = 1e-9
 """By which share of the others' sum a principal moment may be above it: that of a rod is equal to it."""
-SYMMETRIC = 1e-12
+SYMMETRIC = 1e-9
 """By which share of its largest number a tensor may differ from its transpose."""
 
 
 def _to_local(body: SpatialBody, world: FloatArray) -> FloatArray:
-    local: FloatArray = (world - np.array(body.position)) @ body.rotation
-    return local
+    return _turned(world - np.array(body.position), body.rotation)
 
 
 def _to_world(body: SpatialBody, local: FloatArray) -> FloatArray:
-    world: FloatArray = local @ body.rotation.T + np.array(body.position)
-    return world
+    return np.asarray(_turned(local, body.rotation.T) + np.array(body.position))
+
+
+def _turned(points: FloatArray, axes: FloatArray) -> FloatArray:
+    """points (n, 3) @ axes (3, 3), each row by itself: a point has the same bits whatever stands beside it."""
+    x, y, z = points[:, :1], points[:, 1:2], points[:, 2:]
+    turned: FloatArray = x * axes[0] + y * axes[1] + z * axes[2]
+    return turned
 
 
 def _build_body(name: str, fields: Any, path: str, angle: float | None, reading: Reading) -> SpatialBody | None:
@@ -145,36 +151,7 @@ def _weighed(signals: VectorSignal, tensor: FloatArray, path: str, reading: Read
     if not all(math.isfinite(largest(signal) * float(np.abs(tensor).max()) * 3.0) for signal in signals):
         reading.mistake(path, "times the moments of inertia it is too large for a number")
         return BAD
-    tables = [signal for signal in signals if isinstance(signal, Table)]
-    if not tables:
-        return tuple((tensor @ np.array(signals)).tolist())
-    times = _common_times(tables)
-    values = np.stack([_sampled(signal, times) for signal in signals], axis=1) @ tensor
-    return tuple(Table(times, values[:, i : i + 1]) for i in range(3))
-
-
-def _common_times(tables: list[Table]) -> FloatArray:
-    """The rows' times of all tables, a time twice where any of them jumps."""
-    times = np.unique(np.concatenate([table.times for table in tables]))
-    jumps = [np.flatnonzero(np.diff(table.times) == 0.0) for table in tables]
-    repeated = np.unique(np.concatenate([table.times[i] for table, i in zip(tables, jumps, strict=True)]))
-    return np.sort(np.concatenate([times, repeated]))
-
-
-def _sampled(signal: Any, times: FloatArray) -> FloatArray:
-    """A signal at `times`: of a time that is there twice the limit from the left first."""
-    if not isinstance(signal, Table):
-        return np.full(len(times), signal)
-    t, x = signal.times, signal.values[:, 0]
-    second = np.concatenate([[False], np.diff(times) == 0.0])
-    last = np.searchsorted(t, times, side="right") - 1
-    first = np.clip(np.searchsorted(t, times, side="left"), 0, len(t) - 1)
-    found = np.interp(times, t, x)
-    on_row = (last >= 0) & (t[np.clip(last, 0, None)] == times)
-    repeated = np.concatenate([np.diff(times) == 0.0, [False]])
-    # Where only this table does not jump both limits are the same row.
-    found = np.where(on_row, x[np.clip(last, 0, None)], found)
-    return np.asarray(np.where(on_row & repeated & ~second, x[first], found))
+    return combined(tensor, signals)
 
 
 def _least(body: SpatialBody) -> float:

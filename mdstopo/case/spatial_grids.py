@@ -44,7 +44,7 @@ def check_grid(kind: str, grid: Any, reading: Reading) -> bool:
         wrong = "start", "is along the normal, allowed is a direction from the centre to a point of the circle"
     elif kind == "rectangle" and abs(float(np.dot(*map(unit, grid["axes"])))) > PERPENDICULAR:
         wrong = "axes", "the two axes are not perpendicular"
-    elif kind == "plane" and parallel(*map(unit, grid["edges"])):
+    elif kind == "plane" and parallel(unit(grid["edges"][0]), unit(grid["edges"][1])):
         wrong = "edges", "the two edges are parallel, allowed are two sides of a parallelogram"
     elif kind == "cylinder" and grid["from"] == grid["to"]:
         wrong = "to", "is where the cylinder begins, allowed is another point of its axis"
