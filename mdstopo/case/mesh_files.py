@@ -39,11 +39,16 @@ class MeshFile(FileName):
             return BAD
 
 
+def is_mesh(name: str) -> bool:
+    """Whether a file's name says that it is a mesh."""
+    return name.lower().endswith((".stl", ".obj"))
+
+
 def vertices(name: str, data: bytes) -> FloatArray:
     """The vertices (n, 3) in the order of a file, each once. Raises MeshError where it is none that can be read."""
-    ending = name.lower().rpartition(".")[2]
-    if ending not in ("stl", "obj"):
+    if not is_mesh(name):
         raise MeshError(f"found {shown(name)}, allowed is a file that ends in .stl or .obj")
+    ending = name.lower().rpartition(".")[2]
     points = _binary(data) if ending == "stl" else None
     if points is None:
         points = _text(name, data, "vertex" if ending == "stl" else "v")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.mesh_files import is_mesh
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.number_rows import rows_in
@@ -98,6 +99,8 @@ def _files(case: Case) -> Plain:
     folder = Path() if case.path is None else case.path.parent
     found: Plain = {}
     for name, digest in case.files.items():
+        if is_mesh(name):
+            continue  # it stays a file
         try:
             data = (folder / name).read_bytes()
         except OSError as error:
