@@ -13,6 +13,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from mdstopo.case.responses import RESPONSES, ResponseKind
+from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import by_type, kernel, part
@@ -845,7 +846,7 @@ def code_of(kind: ResponseKind) -> int:
     return CODES[kind.kernels]
 
 
-for _kind in RESPONSES.values():
+for _kind in (*RESPONSES.values(), *SPATIAL_RESPONSES.values()):
     if _kind.kernels.startswith("mdstopo."):
         code_of(_kind)
 LISTED.is_filled = True

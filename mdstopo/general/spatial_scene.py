@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case, Load, LoadCase, Response, Signal
+from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints.kernels import FITTED
