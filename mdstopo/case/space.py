@@ -122,6 +122,8 @@ def _rotation(stated: Any, path: str, reading: Reading) -> FloatArray | None:
             reading.mistake(inside(path, "matrix"), "the columns are left-handed, allowed is a rotation")
             return None
         return orthonormal(matrix)
+    if stated["angle"] is None:  # an axis alone, which is noted
+        return None
     return about_axis(stated["axis"], stated["angle"])
 
 

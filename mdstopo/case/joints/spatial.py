@@ -156,7 +156,7 @@ class SpatialDistanceJoint(SpatialJoint):
         if not length > 0.0:
             reading.mistake(inside(stated.fields.path, "at"), "the two points coincide; a link needs a length")
             return None
-        axes = super().own_values(stated, reading)
+        axes = super(SpatialDistanceJoint, cls).own_values(stated, reading)
         return None if axes is None else {**axes, "length": length}
 
 
