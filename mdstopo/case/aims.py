@@ -21,7 +21,8 @@ class Response(Value):
 
     kind: the word of its record (`case.responses`). Fields that a kind does not use are None.
     at_local is in body coordinates of `body`; component: x | y | norm, in space also z. numbers: up to four of
-    its own for its kernels; of a tilt: its axis, a unit vector in body coordinates.
+    its own for its kernels; of a tilt: its axis, a unit vector in body coordinates. dimension: of the
+    case, whose responses have records of their own.
     """
 
     kind: str
@@ -32,6 +33,7 @@ class Response(Value):
     group: str | None = None
     joint: str | None = None
     numbers: tuple[float, ...] = ()
+    dimension: int = 2
 
 
 @frozen

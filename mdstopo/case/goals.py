@@ -13,7 +13,6 @@ from mdstopo.case.design_variables import prices
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.responses import RESPONSES
 from mdstopo.case.schema_case import SENSES
 from mdstopo.case.stages import check_powers, lowest, powers_of
 from mdstopo.case.start_geometry import Frames
@@ -129,15 +128,15 @@ def build_response(fields: Fields, frames: Frames, reading: Reading) -> Response
     """What an objective or a constraint looks at."""
     stated = fields["response"]
     if isinstance(stated, str):
-        return Response(stated)
+        return Response(stated, dimension=frames.geometry.number)
     if not isinstance(stated, Fields) or len(stated.stated) != 1:
         return None
     (word,) = stated.stated
     keys = stated[word]
     if keys is BAD or not keys.good():
         return None
-    made = RESPONSES[word].made
-    return made(word, keys, frames, reading) if made is not None else Response(word)
+    made = frames.geometry.responses[word].made
+    return made(word, keys, frames, reading) if made is not None else Response(word, dimension=frames.geometry.number)
 
 
 def build_constraints(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -118,11 +119,11 @@ def _build_group(
     if pairs is None:
         return None
     if pairs.zero:
-        p, q = (first.world[pairs.first_zero[0]], second.world[pairs.first_zero[1]])
+        at = ", ".join(f"{value:g}" for value in first.world[pairs.first_zero[0]])
         reading.mistake(
             path,
             f"{count_text(pairs.zero)} of the members would have zero length, the first from P "
-            f"{pairs.first_zero[0]} to Q {pairs.first_zero[1]} at [{p[0]:g}, {q[1]:g}]; "
+            f"{pairs.first_zero[0]} to Q {pairs.first_zero[1]} at [{at}]; "
             "move the points or set min_length",
         )
         return None
@@ -237,8 +238,7 @@ def _chunks(n_p: int, n_q: int, connect: str) -> Any:
 
 
 def _lengths(p: FloatArray, q: FloatArray) -> FloatArray:
-    d = q - p
-    lengths: FloatArray = np.hypot(d[:, 0], d[:, 1])
+    lengths: FloatArray = reduce(np.hypot, (q - p).T)
     return lengths
 
 
@@ -266,7 +266,7 @@ def _in_range(
     reading: takes the mistakes.
     """
     longest = max(float(length.max()), 1.0)
-    masses = [min(b.mass, b.inertia) for n in bodies if n != GROUND for b in [frames.bodies[n]]]
+    masses = [frames.geometry.least(frames.bodies[name]) for name in bodies if name != GROUND]
     worst = len(length) * longest * longest / min([1.0, *masses])
     good = True
     for index, law in enumerate(laws):

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from mdstopo.case.nodes import SCALAR, Node
+from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.reading import BAD, Reading, Reference, found
 from mdstopo.case.scalars import to_float
 from mdstopo.case.value import Value, frozen
@@ -99,6 +99,19 @@ class Number(Value):
         }
         kind = "integer" if self.whole else "number"
         return {"type": kind, **{word: limit for word, limit in limits.items() if limit is not None}}
+
+
+@frozen
+class ScalarInPlane(Number):
+    """A number that is a vector or a tensor in space."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """float or BAD."""
+        if node.kind == SEQUENCE:
+            words = "; a list is for a case with `dimension: 3`"
+            reading.mistake(path, f"found {found(node)}, allowed is {self.allowed()}{words}", node)
+            return BAD
+        return Number(self.minimum, self.above, self.maximum, self.below, self.whole).read(node, path, reading)
 
 
 NUMBER = Number()
@@ -227,6 +240,26 @@ class Version(Value):
     def schema(self) -> Schema:
         """const."""
         return {"const": self.number}
+
+
+@frozen
+class OneOf(Value):
+    """One of a few whole numbers."""
+
+    numbers: tuple[int, ...]
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """int or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if not isinstance(value, (bool, str)) and value in self.numbers:
+            return self.numbers[self.numbers.index(int(value or 0))]
+        allowed = " | ".join(str(number) for number in self.numbers)
+        reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
+        return BAD
+
+    def schema(self) -> Schema:
+        """enum."""
+        return {"enum": list(self.numbers)}
 
 
 @frozen

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.joints import JOINTS, Joint
+from mdstopo.case.joints import Joint
 from mdstopo.case.joints.joint import Stated
-from mdstopo.case.model import GROUND, Bushing, Pair
+from mdstopo.case.model import Bushing, Components
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, listed, shown
@@ -61,9 +61,9 @@ def _build_joint(index: int, fields: Fields, frames: Frames, reading: Reading) -
     if bodies is None or ends is None or not fields.good():
         return None
     (first, first_world), (second, second_world) = ends
-    angle = 0.0 if bodies[0] == GROUND else frames.bodies[bodies[0]].angle
-    joint = JOINTS[fields["type"]]
-    own = joint.own_values(Stated(fields, first_world, second_world, angle), reading)
+    joint = frames.geometry.joints[fields["type"]]
+    both = (frames.bodies[bodies[0]], frames.bodies[bodies[1]])
+    own = joint.own_values(Stated(fields, first_world, second_world, both), reading)
     if own is None:
         return None
     name = fields["name"] or str(index)
@@ -84,7 +84,7 @@ def _two_bodies(fields: Fields, frames: Frames, reading: Reading) -> tuple[str, 
 
 def _points(
     fields: Fields, bodies: tuple[str, str], frames: Frames, reading: Reading
-) -> tuple[tuple[Pair, Pair], tuple[Pair, Pair]] | None:
+) -> tuple[tuple[Components, Components], tuple[Components, Components]] | None:
     """(local, world) of the point on each body."""
     at = fields["at"]
     path = inside(fields.path, "at")
@@ -103,8 +103,7 @@ def _points(
             return None
         stated = (at[bodies[0]], at[bodies[1]])
     elif at is None:  # only a fixed joint may leave it out
-        second = bodies[1]
-        center = (0.0, 0.0) if second == GROUND else frames.bodies[second].position
+        center = frames.geometry.default_at(frames.bodies[bodies[0]], frames.bodies[bodies[1]])
         stated = (center, center)
     elif isinstance(at[0], tuple):
         stated = (at[0], at[1])

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import Signal, Table
-from mdstopo.case.model import GROUND, Body, Load, LoadCase, Motion, Pair
+from mdstopo.case.arrays import Signal, Table, VectorSignal
+from mdstopo.case.model import GROUND, AnyBody, Components, Load, LoadCase, Motion
 from mdstopo.case.motions import Start
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames
@@ -90,17 +90,16 @@ def build_load_cases(
     return tuple(built)
 
 
-def _started(body: Body, start: Start | None) -> Body:
+def _started(body: AnyBody, start: Start | None) -> AnyBody:
     """The body with the start velocities that a motion prescribes and the body does not state."""
     if start is None:
         return body
-    vx, vy = body.velocity
-    velocity = (vx if start.vx is None else start.vx, vy if start.vy is None else start.vy)
+    velocity = tuple(own if given is None else given for own, given in zip(body.velocity, start.velocity, strict=True))
     rate = body.angular_velocity if start.angular_velocity is None else start.angular_velocity
     return replace(body, velocity=velocity, angular_velocity=rate)
 
 
-def _check_weights(gravity: Pair, frames: Frames, path: str, reading: Reading) -> None:
+def _check_weights(gravity: Components, frames: Frames, path: str, reading: Reading) -> None:
     for body in frames.bodies.values():
         if body.name != GROUND and not all(math.isfinite(body.mass * g) for g in gravity):
             reading.mistake(path, f"the weight of {body.name!r} is too large for a number")
@@ -125,26 +124,12 @@ def _build_load(fields: Fields, frames: Frames, reading: Reading) -> Load | None
         return None
     body = frames.bodies[name]
     at = frames.local_point(name, fields["at"], fields["frame"], inside(fields.path, "at"), reading)
-    force: Any = fields["force"] or (0.0, 0.0)
-    moment: Any = fields["moment"] or (0.0,)
-    if fields["acceleration"] is not None:
-        force = _scaled(fields["acceleration"], body.mass, inside(fields.path, "acceleration"), reading)
-    if fields["angular_acceleration"] is not None:
-        path = inside(fields.path, "angular_acceleration")
-        moment = _scaled(fields["angular_acceleration"], body.inertia, path, reading)
-    if at is BAD or force is BAD or moment is BAD:
-        return None
-    arm = max(1.0, abs(at[0]), abs(at[1]))
-    share = arm / min(1.0, body.mass, body.inertia)
-    if not all(math.isfinite(_largest(part) * share) for part in (*force, *moment)):
-        reading.mistake(fields.path, "the load is too large to compute with")
-        return None
-    return Load(name, force, at, moment[0], fields["frame"])
+    return frames.geometry.build_load(fields, body, at, reading)
 
 
-def _scaled(signals: tuple[Signal, ...], factor: float, path: str, reading: Reading) -> Any:
+def scaled(signals: VectorSignal, factor: float, path: str, reading: Reading) -> Any:
     """Accelerations as forces or moments, BAD where they overflow."""
-    if not all(math.isfinite(_largest(signal) * factor) for signal in signals):
+    if not all(math.isfinite(largest(signal) * factor) for signal in signals):
         reading.mistake(path, f"times {number_text(factor)} it is too large for a number")
         return BAD
     return tuple(
@@ -153,5 +138,6 @@ def _scaled(signals: tuple[Signal, ...], factor: float, path: str, reading: Read
     )
 
 
-def _largest(signal: Signal) -> float:
+def largest(signal: Signal) -> float:
+    """The largest magnitude over time."""
     return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mdstopo.case.arrays import Signal, Table
+from mdstopo.case.geometry import Geometry
 from mdstopo.case.model import GROUND, Motion, Prescribed
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.spline import value_and_slope
@@ -28,11 +29,10 @@ KINDS = ("acceleration", "velocity", "position")
 
 @frozen
 class Start(Value):
-    """What motions prescribe at the start; None where they do not."""
+    """What motions prescribe at the start; None where they do not. velocity: by coordinate."""
 
     angle: float | None = None
-    vx: float | None = None
-    vy: float | None = None
+    velocity: tuple[float | None, ...] = (None, None)
     angular_velocity: float | None = None
 
 
@@ -77,12 +77,12 @@ def _by_body(entries: Any, reading: Reading) -> dict[str, Fields]:
     return found
 
 
-def build_motions(by_body: dict[str, Fields]) -> tuple[Motion, ...]:
+def build_motions(by_body: dict[str, Fields], geometry: Geometry) -> tuple[Motion, ...]:
     """The motions that can be made."""
     built = []
     for body, fields in by_body.items():
         if fields.good():
-            parts = {axis: _prescribed(fields[axis]) for axis in ("x", "y", "angle")}
+            parts = {axis: _prescribed(fields[axis]) for axis, _ in geometry.coordinates}
             built.append(Motion(body, **parts))
     return tuple(built)
 
@@ -95,7 +95,11 @@ def _prescribed(fields: Fields | None) -> Prescribed | None:
 
 
 def resolve_starts(
-    top: Fields, times: dict[str, Window], by_case: dict[str, dict[str, Fields]], reading: Reading
+    top: Fields,
+    times: dict[str, Window],
+    by_case: dict[str, dict[str, Fields]],
+    geometry: Geometry,
+    reading: Reading,
 ) -> dict[tuple[str, str], Start]:
     """(load case, body) -> what is prescribed at the start; notes what does not agree with the body."""
     starts: dict[tuple[str, str], Start] = {}
@@ -109,15 +113,16 @@ def resolve_starts(
         for name, motion in by_body.items():
             body = bodies.get(name)
             if isinstance(body, Fields) and body.good():
-                starts[case, name] = _start(motion, body, window, reading)
+                starts[case, name] = _start(motion, body, window, geometry, reading)
     for name in bodies:
         _one_angle(name, bodies[name], by_case, starts, reading)
     return starts
 
 
-def _start(motion: Fields, body: Fields, window: Window, reading: Reading) -> Start:
+def _start(motion: Fields, body: Fields, window: Window, geometry: Geometry, reading: Reading) -> Start:
     found: dict[str, float] = {}
-    for axis, index in (("x", 0), ("y", 1), ("angle", None)):
+    velocity: list[float | None] = [None] * geometry.number
+    for axis, index in geometry.coordinates:
         part = motion[axis]
         if not isinstance(part, Fields) or not part.good():
             continue
@@ -152,9 +157,11 @@ def _start(motion: Fields, body: Fields, window: Window, reading: Reading) -> St
         if key in body.stated:
             stated = body[key] if index is None else body[key][index]
             _agree(rate, stated, scale, f"{body.path}.{key}", path, reading)
+        elif index is None:
+            found["angular_velocity"] = rate
         else:
-            found["angular_velocity" if index is None else f"v{axis}"] = rate
-    return Start(**found)
+            velocity[index] = rate
+    return Start(velocity=tuple(velocity), **found)
 
 
 def _agree(value: float, stated: float, scale: float, what: str, path: str, reading: Reading) -> None:

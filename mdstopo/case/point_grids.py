@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray
+from mdstopo.case.arrays import FloatArray, Pair
 from mdstopo.case.reading import Fields
 
 
@@ -63,8 +63,12 @@ def _circle(grid: Fields) -> FloatArray:
 
 
 def _rectangle(grid: Fields) -> FloatArray:
-    """Counter-clockwise along the perimeter from the lower left corner, the start not repeated."""
-    (x, y), (width, height), count = grid["center"], grid["size"], grid["count"]
+    return rectangle_sides(grid["center"], grid["size"], grid["count"])
+
+
+def rectangle_sides(center: Pair, size: Pair, count: int) -> FloatArray:
+    """Counter-clockwise along the perimeter from the lower left corner, the start not repeated: (count, 2)."""
+    (x, y), (width, height) = center, size
     left, right, low, high = x - width / 2, x + width / 2, y - height / 2, y + height / 2
     walked = 2 * (width + height) * (np.arange(count) / count)
     starts = np.cumsum([0.0, width, height, width])

@@ -15,18 +15,18 @@ from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.contacts import build_contacts
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.geometry import Geometry, geometry_in
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
 from mdstopo.case.links import build_bushings, build_joints, declare_joints
 from mdstopo.case.loading import build_load_cases, windows
-from mdstopo.case.model import GROUND, Body, Case
+from mdstopo.case.model import GROUND, Case
 from mdstopo.case.motions import build_motions, merged, resolve_starts, start_angle
 from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reading import BAD, Fields, Reading, found
-from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
-from mdstopo.case.start_geometry import Frames, build_body, build_points
+from mdstopo.case.start_geometry import Frames, build_points
 from mdstopo.case.words import inside
 
 _SECTIONS = {
@@ -89,9 +89,10 @@ def read_case(
         whole, root = root, root.at(root.line, root.column)
         root.entries = {key: entry for key, entry in whole.entries.items() if key not in without}
     reading.mark("", root)
-    top = FORMAT.read(root, "", reading)
+    geometry = geometry_in(root, reading)
+    top = geometry.format.read(root, "", reading)
     assert isinstance(top, Fields)
-    parts = _build(top, reading)
+    parts = _build(top, geometry, reading)
     if top["uncertainty"] is not None:
         from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
 
@@ -130,20 +131,20 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
     return root
 
 
-def _build(top: Fields, reading: Reading) -> dict[str, Any]:
+def _build(top: Fields, geometry: Geometry, reading: Reading) -> dict[str, Any]:
     """The parts of the case, as far as they can be made; notes every mistake on the way."""
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
     times = windows(top, reading)
     by_case = merged(top, reading)
-    starts = resolve_starts(top, times, by_case, reading)
-    frames = _frames(top, starts, reading)
+    starts = resolve_starts(top, times, by_case, geometry, reading)
+    frames = _frames(top, starts, geometry, reading)
     points = build_points(_section(top, "points"), frames, reading)
     made = build_groups(_section(top, "members"), points, frames, reading)
     designed = apply_design(top, made, reading)
     complete = isinstance(top["members"], dict) and len(made) == len(top["members"])
     groups = designed if complete or top["members"] is None else None
-    motions = {case: build_motions(by_body) for case, by_body in by_case.items()}
+    motions = {case: build_motions(by_body, geometry) for case, by_body in by_case.items()}
     variables = build_variables(top, groups, reading)
     warn_assemble(top, reading)
     load_cases = build_load_cases(top, times, motions, starts, frames, reading)
@@ -161,6 +162,7 @@ def _build(top: Fields, reading: Reading) -> dict[str, Any]:
         "optimizer": build_optimizer(top["optimizer"], reading),
         "solver": build_solver(top["solver"], times, reading),
         "variables": variables,
+        "dimension": geometry.number,
         **build_shared(top, groups, reading),
     }
 
@@ -178,10 +180,10 @@ def _check_references(top: Fields, reading: Reading) -> None:
     reading.check_references()
 
 
-def _frames(top: Fields, starts: dict[Any, Any], reading: Reading) -> Frames:
-    bodies = {GROUND: Body(GROUND, 1.0, 1.0, (0.0, 0.0))}
+def _frames(top: Fields, starts: dict[Any, Any], geometry: Geometry, reading: Reading) -> Frames:
+    bodies = {GROUND: geometry.ground}
     for name, fields in _section(top, "bodies").items():
-        body = build_body(name, fields, inside("bodies", name), start_angle(name, starts), reading)
+        body = geometry.build_body(name, fields, inside("bodies", name), start_angle(name, starts), reading)
         if body is not None:
             bodies[name] = body
-    return Frames(bodies)
+    return Frames(bodies, geometry)

@@ -15,15 +15,18 @@ from mdstopo.case.words import inside, listed, nearest, shown
 
 @frozen
 class Vector(Value):
-    """A list of a fixed number of values of one kind."""
+    """A list of a fixed number of values of one kind. elsewhere: a wrong length -> where it would be right."""
 
     length: int
     item: Kind
+    elsewhere: tuple[tuple[int, str], ...] = ()
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """tuple or BAD."""
         if node.kind != SEQUENCE or len(node.items) != self.length:
-            reading.mistake(path, f"found {found(node)}, allowed is a list of {self.length}", node)
+            where = dict(self.elsewhere).get(len(node.items)) if node.kind == SEQUENCE else None
+            hint = f"; {where}" if where else ""
+            reading.mistake(path, f"found {found(node)}, allowed is a list of {self.length}{hint}", node)
             return BAD
         values = tuple(self.item.read(child, f"{path}[{index}]", reading) for index, child in enumerate(node.items))
         return BAD if any(value is BAD for value in values) else values
@@ -37,7 +40,7 @@ class Vector(Value):
 
 @frozen
 class Direction(Value):
-    """A plane vector that is not zero."""
+    """A vector, in the plane or in space, that is not zero."""
 
     pair: Vector
 
@@ -174,13 +177,35 @@ class ByShape(Value):
 
 
 @frozen
+class ByDepth(Value):
+    """Different kinds for a list of single values and for a list of lists. what: both in words."""
+
+    what: str
+    flat: Kind
+    nested: Kind
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """What the kind for the list reads, or BAD."""
+        if node.kind != SEQUENCE or not node.items:
+            reading.mistake(path, f"found {found(node)}, allowed is {self.what}", node)
+            return BAD
+        kind = self.nested if node.items[0].kind == SEQUENCE else self.flat
+        return kind.read(node, path, reading)
+
+    def schema(self) -> Schema:
+        """Either."""
+        return {"anyOf": [self.flat.schema(), self.nested.schema()]}
+
+
+@frozen
 class Tagged(Value):
-    """A mapping whose key `tag` says which keys it has besides."""
+    """A mapping whose key `tag` says which keys it has besides. elsewhere: a word -> where it would be right."""
 
     what: str
     tag: str
     variants: Mapping[str, Record]
     more: Brought[Record] | None = None
+    elsewhere: tuple[tuple[str, str], ...] = ()
 
     @property
     def known(self) -> dict[str, Record]:
@@ -207,6 +232,11 @@ class Tagged(Value):
             return BAD
         place = inside(path, self.tag)
         if entry[1].kind == SCALAR and not _brought(self.more, entry[1].scalar(), self.known, place, reading):
+            return BAD
+        text = entry[1].scalar() if entry[1].kind == SCALAR else None
+        where = dict(self.elsewhere).get(text) if isinstance(text, str) and text not in self.known else None
+        if where is not None:
+            reading.mistake(place, f"found {found(entry[1])}; {where}", entry[1])
             return BAD
         word = self._word().read(entry[1], place, reading)
         return BAD if word is BAD else self.known[word].read(node, path, reading)
@@ -271,7 +301,8 @@ class Record(Value):
 
     doc: what it stands for, a sentence. one_of: of each of these sets exactly one key is needed; any_of: at least
     one of these; never_both: pairs; needs: a key -> the one that must stand beside it. more: keys of other
-    distributions, each of which stands for one of the first set of `one_of`.
+    distributions, each of which stands for one of the first set of `one_of`. elsewhere: an unknown key -> where it
+    would be right, or what stands in its place here.
     """
 
     what: str
@@ -282,6 +313,7 @@ class Record(Value):
     needs: tuple[tuple[str, str], ...] = ()
     doc: str = ""
     more: Brought[Key] | None = None
+    elsewhere: tuple[tuple[str, str], ...] = ()
 
     @property
     def all_keys(self) -> tuple[Key, ...]:
@@ -325,12 +357,16 @@ class Record(Value):
         self._together(fields, meant, path, reading)
         return fields
 
-    @staticmethod
-    def _unknown(node: Node, path: str, reading: Reading, known: Mapping[str, Key]) -> set[str]:
+    def _unknown(self, node: Node, path: str, reading: Reading, known: Mapping[str, Key]) -> set[str]:
         """Notes unknown keys; returns the right words they were probably meant to be."""
         meant: set[str] = set()
+        elsewhere = dict(self.elsewhere)
         for text, (key, _) in node.entries.items():
             if text in known:
+                continue
+            if text in elsewhere:
+                reading.mistake(inside(path, text), f"unknown key {shown(text)}: {elsewhere[text]}", key)
+                meant.update(names for names in known if f"`{names}`" in elsewhere[text])
                 continue
             best = nearest(text, [name for name in known if name not in node.entries])
             hint = ""

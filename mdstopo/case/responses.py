@@ -50,16 +50,16 @@ class ResponseKind(Value):
     of_members: bool = False
 
 
-_RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
-_OF_BODY = Key("body", BODY, "whose motion it is", required=True)
+RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")
+OF_BODY = Key("body", BODY, "whose motion it is", required=True)
 _COMPONENTS = explained({"x": "along x", "y": "along y", "norm": "the length of the vector"})
 _AT_POINT = Record(
     "the motion of a point",
     (
-        _OF_BODY,
+        OF_BODY,
         Key("at", PAIR, "the point, which rides on the body", unit="m", otherwise="the centre of mass"),
         FRAME,
-        _RELATIVE,
+        RELATIVE,
         Key("component", _COMPONENTS, "which part of the vector", default="norm"),
     ),
     doc="What an observer riding on `relative_to` sees: the change of the point's coordinates in that body's frame "
@@ -67,7 +67,7 @@ _AT_POINT = Record(
 )
 _OF_ANGLE = Record(
     "the rotation of a body",
-    (_OF_BODY, _RELATIVE),
+    (OF_BODY, RELATIVE),
     doc="psi of the body less psi of `relative_to`, not wrapped, or its time derivatives.",
 )
 _OF_GROUP = Record(
@@ -82,7 +82,7 @@ _OF_JOINT = Record(
 )
 
 
-def _sees_itself(keys: Fields, reading: Reading) -> bool:
+def sees_itself(keys: Fields, reading: Reading) -> bool:
     """Whether the body is its own observer, which is a mistake."""
     if keys["body"] != keys["relative_to"]:
         return False
@@ -92,11 +92,11 @@ def _sees_itself(keys: Fields, reading: Reading) -> bool:
 
 
 def _of_angle(word: str, keys: Fields, _: Frames, reading: Reading) -> Response | None:
-    return None if _sees_itself(keys, reading) else Response(word, body=keys["body"], relative_to=keys["relative_to"])
+    return None if sees_itself(keys, reading) else Response(word, body=keys["body"], relative_to=keys["relative_to"])
 
 
 def _at_point(word: str, keys: Fields, frames: Frames, reading: Reading) -> Response | None:
-    if _sees_itself(keys, reading) or keys["body"] not in frames.bodies:
+    if sees_itself(keys, reading) or keys["body"] not in frames.bodies:
         return None
     at = frames.local_point(keys["body"], keys["at"], keys["frame"], inside(keys.path, "at"), reading)
     if at is BAD:
@@ -175,6 +175,10 @@ RESPONSES: dict[str, ResponseKind] = {
 
 def kind_of(response: Response) -> ResponseKind:
     """The record of a response; KeyError where there is none."""
+    if response.dimension == 3:
+        from mdstopo.case.spatial_responses import SPATIAL_RESPONSES  # most cases are planar
+
+        return SPATIAL_RESPONSES[response.kind]
     if response.kind not in RESPONSES:  # a process that has not read the case
         OF_OTHERS.find(response.kind)
     return RESPONSES[response.kind]

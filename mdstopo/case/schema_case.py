@@ -10,7 +10,19 @@ from typing import Any
 
 from mdstopo.case.integrators import names as integrators
 from mdstopo.case.joints.joint import PAIR
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Number, OpenWord, Ref, Text, Version, explained
+from mdstopo.case.kinds import (
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    Flag,
+    Number,
+    OneOf,
+    OpenWord,
+    Ref,
+    Text,
+    Version,
+    explained,
+)
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of
 from mdstopo.case.schema_contact import CONTACT
@@ -19,6 +31,7 @@ from mdstopo.case.schema_scene import (
     BUSHING,
     GROUP,
     GROUP_KEYS,
+    IN_SPACE,
     JOINT,
     LAW,
     LOAD_CASE,
@@ -124,6 +137,7 @@ _RESPONSE = ByShape(
         one_of=(tuple(kind.word for kind in RESPONSES.values() if kind.keys is not None),),
         doc="Exactly one of these.",
         more=OF_OTHERS,
+        elsewhere=(("rotation", f"in the plane it is `angle`; {IN_SPACE}"), ("tilt", IN_SPACE)),
     ),
 )
 _REDUCERS = explained(
@@ -291,6 +305,12 @@ FORMAT = Record(
     "a case",
     (
         Key("format", Version(1), "version of the format", required=True),
+        Key(
+            "dimension",
+            OneOf((2, 3)),
+            "2: in the plane; 3: in space. It stands above all that depends on it",
+            default=2,
+        ),
         Key("title", Text(), "what outputs and pictures call the case", default=""),
         Key("gravity", PAIR, "acceleration of free fall, [x, y]", default=(0.0, 0.0), unit="m/s^2"),
         Key(
@@ -338,11 +358,15 @@ FORMAT = Record(
 
 def json_schema() -> dict[str, Any]:
     """The format as JSON Schema, draft 2020-12: completes and checks a case as it is typed."""
+    from mdstopo.case.schema_space import SPACE_FORMAT
+
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "mdstopo case file, format 1",
         "description": "One design problem. SI units; coordinates are global, at the start.",
-        **FORMAT.schema(),
+        "if": {"properties": {"dimension": {"const": 3}}, "required": ["dimension"]},
+        "then": SPACE_FORMAT.schema(),
+        "else": FORMAT.schema(),
     }
 
 

@@ -17,6 +17,7 @@ from mdstopo.case.kinds import (
     Number,
     NumberOrWord,
     Ref,
+    ScalarInPlane,
     explained,
 )
 from mdstopo.case.laws import LAWS, enter_law
@@ -35,21 +36,36 @@ FRAME = Key("frame", FRAMES, "what the coordinates beside it are measured in", d
 BODY = Ref("body")
 GROUP = Ref("member group")
 
+MASS = Key("mass", POSITIVE, "mass", required=True, unit="kg")
+#: what is told of keys and words that only cases in space have
+IN_SPACE = "it is for a case with `dimension: 3`"
 BODY_KEYS = Record(
     "a body",
     (
-        Key("mass", POSITIVE, "mass", required=True, unit="kg"),
-        Key("inertia", POSITIVE, "moment of inertia about the centre of mass", required=True, unit="kg m^2"),
+        MASS,
+        Key(
+            "inertia",
+            ScalarInPlane(above=0),
+            "moment of inertia about the centre of mass",
+            required=True,
+            unit="kg m^2",
+        ),
         Key("position", PAIR, "centre of mass at the start, [x, y]", required=True, unit="m"),
         Key("angle", NUMBER, "rotation at the start, counter-clockwise", default=0.0, unit="rad"),
         Key("velocity", PAIR, "of the centre of mass at the start, [vx, vy]", default=(0.0, 0.0), unit="m/s"),
-        Key("angular_velocity", NUMBER, "at the start, counter-clockwise", default=0.0, unit="rad/s"),
+        Key("angular_velocity", ScalarInPlane(), "at the start, counter-clockwise", default=0.0, unit="rad/s"),
     ),
     doc="A rigid body at the start. The fixed body `ground` is there without being declared.",
+    elsewhere=(("orientation", f"in the plane it is `angle`; {IN_SPACE}"),),
 )
 
 # Joints and bushings.
-JOINT = Tagged("a joint", "type", {word: record_of_joint(joint) for word, joint in JOINTS.items()})
+JOINT = Tagged(
+    "a joint",
+    "type",
+    {word: record_of_joint(joint) for word, joint in JOINTS.items()},
+    elsewhere=tuple((word, IN_SPACE) for word in ("spherical", "universal", "cylindrical", "planar")),
+)
 _THREE = Vector(3, NOT_NEGATIVE)
 BUSHING = Record(
     "a bushing",
@@ -75,7 +91,7 @@ BUSHING = Record(
 )
 
 # Prescribed motion.
-_COORDINATE = Record(
+COORDINATE = Record(
     "a prescribed coordinate",
     (
         Key(
@@ -104,12 +120,13 @@ MOTION = Record(
     "a motion",
     (
         Key("body", BODY, "whose coordinates are prescribed; a body is listed once", required=True),
-        Key("x", _COORDINATE, "of the centre of mass", otherwise="free"),
-        Key("y", _COORDINATE, "of the centre of mass", otherwise="free"),
-        Key("angle", _COORDINATE, "of the rotation", otherwise="free"),
+        Key("x", COORDINATE, "of the centre of mass", otherwise="free"),
+        Key("y", COORDINATE, "of the centre of mass", otherwise="free"),
+        Key("angle", COORDINATE, "of the rotation", otherwise="free"),
     ),
     any_of=("x", "y", "angle"),
     doc="What a body's coordinates do is given; they carry no unknowns, and loads on them change only the reaction.",
+    elsewhere=(("z", IN_SPACE), ("rotation", f"in the plane it is `angle`; {IN_SPACE}")),
 )
 
 # Points.
@@ -141,6 +158,7 @@ _GRIDS: dict[str, tuple[Kind, str]] = {
                 _COUNT,
             ),
             doc="Points evenly spaced on a part of a circle, both ends included.",
+            elsewhere=(("normal", IN_SPACE), ("start", IN_SPACE)),
         ),
         "points on an arc",
     ),
@@ -149,6 +167,7 @@ _GRIDS: dict[str, tuple[Kind, str]] = {
             "a circle",
             (_CENTER, _RADIUS, _COUNT),
             doc="Points evenly spaced on a whole circle, counter-clockwise from angle 0; the first is not repeated.",
+            elsewhere=(("normal", IN_SPACE), ("start", IN_SPACE)),
         ),
         "points on a circle",
     ),
@@ -157,6 +176,7 @@ _GRIDS: dict[str, tuple[Kind, str]] = {
             "a rectangle",
             (_CENTER, Key("size", Vector(2, POSITIVE), "[width, height]", required=True, unit="m"), _COUNT),
             doc="Points evenly spaced along the perimeter, counter-clockwise from the lower left corner.",
+            elsewhere=(("axes", IN_SPACE),),
         ),
         "points on the sides of a rectangle",
     ),
@@ -178,6 +198,7 @@ _GRID = Record(
     tuple(Key(name, kind, doc, unit="m" if name == "list" else "") for name, (kind, doc) in _GRIDS.items()),
     one_of=(tuple(_GRIDS),),
     doc="Points of one kind: exactly one of these.",
+    elsewhere=tuple((word, IN_SPACE) for word in ("plane", "box", "cylinder", "file")),
 )
 POINTS = Record(
     "a point grid",

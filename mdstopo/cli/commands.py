@@ -14,6 +14,7 @@ COMMANDS: dict[str, str] = {
     "report": "Write one HTML page that shows a result in motion.",
     "export": "Write a result as CSV tables or JSON.",
     "bench": "Measure scaling, work against precision, and what is left out.",
+    "lift": "Write the case in space of a planar one.",
     "new": "Write a starter case, with comments.",
     "schema": "Print the JSON Schema of the case format, for editors.",
     "stress": "Compute extreme scenes and compare each with an independent value.",

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
-from mdstopo.case.model import GROUND, Body, Case, MemberGroup, VolumeRow
+from mdstopo.case.mesh_files import is_mesh
+from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.number_rows import rows_in
 from mdstopo.case.overrides import apply_overrides
-from mdstopo.case.start_geometry import Frames
+from mdstopo.case.start_geometry import Frames, frames_of
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.scaled_laws import sized as sized_law
 from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
@@ -98,6 +99,8 @@ def _files(case: Case) -> Plain:
     folder = Path() if case.path is None else case.path.parent
     found: Plain = {}
     for name, digest in case.files.items():
+        if is_mesh(name):
+            continue  # it stays a file
         try:
             data = (folder / name).read_bytes()
         except OSError as error:
@@ -135,7 +138,7 @@ def _names(
 def _members(
     content: Plain, case: Case, names: Sequence[str], fixed: Mapping[str, list[str]], design: FloatArray
 ) -> Plain:
-    frames = Frames({GROUND: Body(GROUND, 1.0, 1.0, (0.0, 0.0)), **{body.name: body for body in case.bodies}})
+    frames = frames_of(case)
     values = design[case.n_design :]
     members: Plain = {}
     first = 0

@@ -119,7 +119,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         drive=drive, joint=joint,
         joint_par=joint_par, row=layout.row, place=layout.place,
         size=np.array(
-            [*layout.size, int(damped), len(layout.steady), bodies.rotations, bodies.attitude], dtype=np.int64
+            [*layout.size, int(damped), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
         ), line=layout.line,
         envelope=layout.envelope, product=layout.product, steady=layout.steady,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,

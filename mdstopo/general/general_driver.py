@@ -38,7 +38,7 @@ from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, Resp
 from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
 from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
-from mdstopo.scene.model import FloatArray
+from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class GeneralDriver:
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
-        self._packed = self.ints, self.floats = pack_general(model, scene.kinematics)
+        self._packed = self.ints, self.floats = self._pack(model)
         self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS])
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
@@ -120,6 +120,9 @@ class GeneralDriver:
         if self._entry is None:
             self._entry = load_method(self.method.kind)
         return self._entry
+
+    def _pack(self, model: GeneralModel) -> tuple[IndexArray, FloatArray]:
+        return pack_general(model, self.scene.kinematics)
 
     @property
     def _is_planar(self) -> bool:
@@ -361,7 +364,7 @@ class GeneralDriver:
 
     def start_from(self, q: FloatArray) -> None:
         """Take other positions q (n,) at the start."""
-        self._packed = self.ints, self.floats = pack_general(self._model._replace(q0=q))
+        self._packed = self.ints, self.floats = self._pack(self._model._replace(q0=q))
 
     def start_slopes(self) -> FloatArray:
         """(M_padded + P, n): derivatives of the start's positions by alpha^mu and values; no rows where it is as
@@ -384,7 +387,7 @@ class GeneralDriver:
             self.room[0], self._message = self.scene.model.times[0], self.start.message
             return UNSETTLED, 0, float(self.room[0])
         self.ints, self.floats = (
-            pack_general(landed(self._with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
+            self._pack(landed(self._with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
         )
         while True:
             self.work[:] = 0
@@ -468,7 +471,7 @@ class GeneralDriver:
         q0, v0 = self._start
         model = self.scene.model._replace(q0=q0, v0=v0)
         self._model = model if self._placing is None or not len(self._values) else self._placing.at(model, self._values)
-        self._packed = self.ints, self.floats = pack_general(self._model)
+        self._packed = self.ints, self.floats = self._pack(self._model)
 
     def _with_start(self) -> GeneralModel:
         """The model with the start as it was assembled or has settled."""

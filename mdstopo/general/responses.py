@@ -13,6 +13,7 @@ from typing import Any, TypeVar, cast
 import numpy as np
 
 from mdstopo.case.responses import RESPONSES, ResponseKind
+from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 from mdstopo.compiler import store
 from mdstopo.compiler.choice import Listed, chosen
 from mdstopo.compiler.jit import by_type, kernel, part
@@ -391,14 +392,26 @@ def point_value(model, j, q, v, a, bars):
 
 @kernel
 def angle_value(model, j, q, v, a, bars):
-    """In a plane: an angle, its rate or second derivative, as response j asks; arguments as of `point_value`."""
+    """In a plane: an angle, its rate or second derivative, as response j asks.
+
+    model: the compiled scene.
+    j: the response.
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    bars (3, n): slopes by q, v and a are added to it.
+    """
     body = model.response[j, BODY]
     return angle_motion(model, model.response[j, ORDER], body, model.response[j, REFERENCE], q, v, a, bars)
 
 
 @kernel
 def turn_value(model, j, q, v, a, bars):
-    """In space: how a body has turned, how fast it turns, or the rate of that; arguments as of `point_value`."""
+    """In space: how a body has turned, how fast it turns, or the rate of that.
+
+    model: the compiled scene.
+    j: the response.
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    bars (3, n): slopes by q, v and a are added to it.
+    """
     body = model.response[j, BODY]
     reference = model.response[j, REFERENCE]
     component = model.response[j, COMPONENT]
@@ -407,7 +420,13 @@ def turn_value(model, j, q, v, a, bars):
 
 @kernel
 def tilt_value(model, j, q, v, a, bars):
-    """In space: the angle by which an axis of a body has tilted; arguments as of `point_value`."""
+    """In space: the angle by which an axis of a body has tilted.
+
+    model: the compiled scene.
+    j: the response.
+    q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    bars (3, n): slopes by q, v and a are added to it.
+    """
     first = dimensions(model)  # behind the place of a point
     axis = model.response_par[j, first:]
     return tilt_motion(model, axis, model.response[j, BODY], model.response[j, REFERENCE], q, v, a, bars)
@@ -828,7 +847,7 @@ def code_of(kind: ResponseKind) -> int:
     return CODES[kind.kernels]
 
 
-for _kind in RESPONSES.values():
+for _kind in (*RESPONSES.values(), *SPATIAL_RESPONSES.values()):
     if _kind.kernels.startswith("mdstopo."):
         code_of(_kind)
 LISTED.is_filled = True

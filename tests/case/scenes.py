@@ -100,6 +100,101 @@ optimizer: {name: gsao, preset: oc, max_iterations: 100, tolerance: 1.0e-6, star
 solver: {integrator: auto, tolerance: 1.0e-8, sensitivity: auto, assemble: true}
 """
 
+SPACE = """\
+format: 1
+dimension: 3
+gravity: [0, 0, -9.8]
+time: {end: 0.2}
+bodies:
+  a: {mass: 2, inertia: [2, 3, 4], position: [1, 2, 3]}
+  b: {mass: 4, inertia: [5, 5, 5], position: [2, 0, 0]}
+joints: []
+points:
+  p: {body: a, grid: {list: [[0, 0, 0], [0, 1, 0]]}}
+  q: {body: b, grid: {list: [[2, 0, 0], [2, 1, 0], [2, 2, 5]]}}
+members:
+  belts: {from: p, to: q, law: {type: spring, stiffness: 225}}
+loads:
+  - {body: b, force: [1, 0, 0]}
+objectives:
+  G: {response: energy}
+constraints:
+  - {volume: all, limit: 3}
+"""
+
+EVERYTHING_IN_SPACE = """\
+format: 1
+dimension: 3
+title: everything in space
+gravity: [0, 0, -9.8]
+time: {start: 0, end: 0.2}
+bodies:
+  a: {mass: 60, inertia: [2, 3, 4], position: [1, 2, 3], orientation: {axis: [0, 0, 2], angle: 0.5}}
+  b: {mass: 20, inertia: [[2, 0.1, 0], [0.1, 3, 0], [0, 0, 4]], position: [0, -1, 0], velocity: [0, 0, 1],
+      angular_velocity: [1, 2, 3], orientation: {quaternion: [1, 0, 0, 0]}}
+  c: {mass: 1, inertia: [1, 1, 1], position: [5, 5, 5], orientation: {matrix: [[0, -1, 0], [1, 0, 0], [0, 0, 1]]}}
+  d: {mass: 3, inertia: [1, 1, 2], position: [6, 6, 6],
+      orientation: [{axis: [1, 0, 0], angle: 0.1}, {axis: [0, 1, 0], angle: 0.2}]}
+joints:
+  - {name: ball, type: spherical, bodies: [a, ground], at: [0, 0.25, 0]}
+  - {type: revolute, bodies: [a, b], at: [1, 0, 0], axis: [0, 0, 2]}
+  - {type: universal, bodies: [a, b], at: [0, 0, 0], axes: [[1, 0, 0], [0, 1, 0]]}
+  - {type: prismatic, bodies: [a, b], at: [1, 0, 0], axis: {a: [1, 0, 0], b: [1, 1e-3, 0]}}
+  - {type: cylindrical, bodies: [a, b], at: {a: [1, 0, 0], b: [2, 0, 0]}, axis: [1, 0, 0]}
+  - {type: planar, bodies: [a, b], at: [0, 0, 0], normal: [0, 0, 1]}
+  - {type: fixed, bodies: [a, b]}
+  - {type: distance, bodies: [a, b], at: [[0, 0, 0], [1, 0, 0]]}
+motions:
+  - {body: c, x: {acceleration: 9.8}, z: {acceleration: {table: [[0, 0], [0.1, 20], [0.2, 0]]}}}
+  - {body: d, y: {position: {table: [[0, 6], [0.1, 6.1], [0.15, 6.3], [0.2, 7]]}}, x: {velocity: 0}}
+points:
+  edge:
+    body: a
+    frame: body
+    grid: {rectangle: {center: [0, 0, 0], axes: [[1, 0, 0], [0, 1, 0]], size: [0.5, 0.5], count: 20}}
+  many:
+    body: b
+    grid:
+      - {list: [[0, 1, 2], [2, 3, 4]]}
+      - {line: {from: [-1, -0.8, 0], to: [-1, 0.8, 1], count: 3}}
+      - {arc: {center: [0, 0, 0], radius: 1, normal: [0, 0, 1], start: [1, 0, 0], from: 3.14, to: 0, count: 9}}
+      - {circle: {center: [0, 0, 9], radius: 1, normal: [0, 1, 1], start: [1, 0, 0], count: 12}}
+      - {plane: {corner: [0, 0, 7], edges: [[1, 0, 0], [1, 1, 0]], count: [3, 2]}}
+      - {lattice: {from: [0, 0, 20], to: [1, 1, 21], count: [2, 3, 4]}}
+      - {box: {from: [0, 0, 30], to: [1, 1, 31], count: [3, 3, 3]}}
+      - {cylinder: {from: [0, 0, 40], to: [0, 0, 41], radius: 1, start: [1, 0, 0], count: [6, 2]}}
+members:
+  belts: {from: edge, to: many, min_length: 0, max_length: 100, law: {type: spring, stiffness: 225}, cost: length}
+  single:
+    from: {body: ground, at: [0, 1, 0]}
+    to: {body: a, at: [0.1, 0, 0], frame: body}
+    design: false
+    law: {type: gap, stiffness: 1}
+loads:
+  - {body: a, force: [10, 0, 0], at: [0, 0, 0], moment: [0, 0, 3], frame: global}
+  - {body: b, acceleration: [9.8, 0, 0], angular_acceleration: [0, 0, 20]}
+  - {body: b, force: {table: [[0, 1, 2, 3], [0.1, 3, 4, 5]]}, moment: {table: [[0, 1, 0, 0], [1, 2, 0, 0]]}}
+  - {body: b, force: [{table: [[0, 1], [1, 1]]}, 3, 0], frame: body}
+load_cases:
+  turning: {loads: [{body: b, angular_acceleration: [0, 20, 0]}], gravity: [0, 0, 0], time: {end: 0.1}}
+  moving: {loads: [{body: b, acceleration: [20, 0, 0]}], motions: [{body: c, x: {velocity: 0}}]}
+design: {initial: {belts: 0.2}, lower: 0.001}
+objectives:
+  G1: {response: energy, load_case: turning}
+  G2: {response: {displacement: {body: b, at: [0, 0, 0], component: z}}, load_case: moving}
+  G3: {response: {rotation: {body: a, relative_to: b, component: x}}, load_case: turning}
+  G4: {response: {member_force: {group: single}}, load_case: turning}
+  G5: {response: {joint_force: {joint: ball}}, load_case: turning}
+  G6: {response: {joint_moment: {joint: 1}}, load_case: turning, sense: maximize, over_time: rms}
+  G7: {response: {tilt: {body: a, axis: [0, 0, 1], frame: body, relative_to: b}}, load_case: turning}
+  G8: {response: {angular_acceleration: {body: a}}, load_case: turning}
+combine: {weights: {G1: 0.5, G2: 0.5, G3: 0, G4: 1, G5: 0, G6: 0, G7: 0, G8: 0}, method: weighted_sum}
+constraints:
+  - {volume: [belts], limit: 102}
+  - {response: {angular_velocity: {body: a, component: y}}, over_time: max_abs, load_case: turning, limit: 0.05}
+solver: {integrator: runge_kutta, tolerance: 1.0e-8, sensitivity: direct, assemble: false}
+"""
+
 
 def changed(text: str, *changes: tuple[str, str]) -> str:
     """`text` with the first occurrence of each old part replaced; the part must be there."""

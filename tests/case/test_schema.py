@@ -15,7 +15,7 @@ from mdstopo.case.nodes import MAPPING, SEQUENCE, Node, parse
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.schema_case import json_schema
 
-from .scenes import EVERYTHING, SMALL
+from .scenes import EVERYTHING, EVERYTHING_IN_SPACE, SMALL
 
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 VALIDATOR = Draft202012Validator(json_schema())
@@ -49,13 +49,18 @@ def test_a_case_with_every_key_passes() -> None:
     assert not list(VALIDATOR.iter_errors(as_data(EVERYTHING)))
 
 
+def test_a_case_in_space_with_every_key_passes() -> None:
+    assert read_case(EVERYTHING_IN_SPACE).dimension == 3
+    assert not list(VALIDATOR.iter_errors(as_data(EVERYTHING_IN_SPACE)))
+
+
 def test_every_key_of_the_format_has_its_words_limits_and_defaults_in_the_schema() -> None:
-    solver = json_schema()["properties"]["solver"]["properties"]
+    solver = json_schema()["else"]["properties"]["solver"]["properties"]
     assert solver["integrator"]["enum"] == ["auto", "gauss", "runge_kutta", "generalized_alpha"]
     assert solver["integrator"]["default"] == "auto"
     assert solver["tolerance"]["exclusiveMinimum"] == 0
     assert solver["tolerance"]["description"]
-    assert json_schema()["required"] == ["format", "time", "bodies"]
+    assert json_schema()["else"]["required"] == ["format", "time", "bodies"]
 
 
 def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -81,7 +86,7 @@ def with_value(value: Any, path: tuple[Any, ...], new: Any) -> Any:
 
 
 DROP = object()
-SOURCES = [as_data(SMALL), as_data(EVERYTHING)]
+SOURCES = [as_data(SMALL), as_data(EVERYTHING), as_data(EVERYTHING_IN_SPACE)]
 VALUES = [None, True, "text", "", "energy", "ground", 0, 1, -1, 2.5, 20.0, 1e9, [], [1], [1, 2], {}, {"x": 1}]
 VALUES += [[[0, 1], [2, 3]], {"file": 3}, {"table": [[0, 1]]}, {"table": []}, ["belts"], [0.5, 0.5, 0.5]]
 NEW = st.sampled_from([DROP, *VALUES])

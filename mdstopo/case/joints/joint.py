@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
-from mdstopo.case.arrays import Pair
+from mdstopo.case.arrays import Components, Pair
 from mdstopo.case.kinds import NUMBER, Name, Ref, Word
+from mdstopo.case.parts import AnyBody
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.records import ByName, ByShape, Key, Record, Vector
 from mdstopo.case.value import Value, frozen
 
-PAIR = Vector(2, NUMBER)
+PAIR = Vector(2, NUMBER, ((3, "three are for a case with `dimension: 3`"),))
 _OWN = ByName("body", PAIR, "[x, y]")
 #: a point that both bodies share, or each body's own
 POINT = ByShape("[x, y] or {body: [x, y], body: [x, y]}", sequence=PAIR, mapping=_OWN)
@@ -23,13 +24,13 @@ _NAME = Key("name", Name(), "what responses and results call the joint", otherwi
 class Stated(NamedTuple):
     """A joint as a case file states it.
 
-    fields: its keys; first, second: its point on each body in global coordinates; angle: the first body's at the start.
+    fields: its keys; first, second: its point on each body in global coordinates; bodies: the two at the start.
     """
 
     fields: Fields
-    first: Pair
-    second: Pair
-    angle: float
+    first: Components
+    second: Components
+    bodies: tuple[AnyBody, AnyBody]
 
 
 @frozen(kw_only=True)

@@ -34,7 +34,8 @@ class PrismaticJoint(Joint):
         longest = max(abs(axis[0]), abs(axis[1]))
         x, y = axis[0] / longest, axis[1] / longest
         norm = math.hypot(x, y)
-        c, s = math.cos(stated.angle) / norm, math.sin(stated.angle) / norm
+        angle = stated.bodies[0].angle
+        c, s = math.cos(angle) / norm, math.sin(angle) / norm
         return {"axis": (c * x + s * y, c * y - s * x)}
 
     def row(self) -> dict[int, float]:

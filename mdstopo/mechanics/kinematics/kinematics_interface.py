@@ -59,6 +59,11 @@ class Kinematics:
         found: Callable[..., Any] = getattr(importlib.import_module(self.entries), name)
         return found
 
+    @property
+    def load_slopes(self) -> int:
+        """`load_slopes` in Python."""
+        return int(self.kernels["load_slopes"].py_func(None))
+
     def retract(self, q: FloatArray, shift: FloatArray) -> FloatArray:
         """`retract` in Python: coordinates (n_q,) from others and a shift (n,)."""
         out = np.empty_like(q)

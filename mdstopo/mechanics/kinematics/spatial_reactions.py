@@ -29,7 +29,7 @@ from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, times, turne
 
 @kernel
 def transmitted(model, j, which, q, lam, by_lam, by_q):
-    """See `kinematics_interface.transmitted`."""
+    """The norms above; see `kinematics_interface.transmitted`."""
     w = np.empty(PLACES)
     phi = np.zeros(ROWS)
     jac = np.zeros((ROWS, 2 * FREEDOMS))

@@ -1,0 +1,73 @@
+"""What is different in the plane and in space for the reader of cases: one record for each, chosen once."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from mdstopo.case.arrays import Components, FloatArray
+from mdstopo.case.nodes import SCALAR, Node
+from mdstopo.case.parts import AnyBody, Load
+from mdstopo.case.reading import Fields, Reading
+from mdstopo.case.words import listed
+
+if TYPE_CHECKING:
+    from mdstopo.case.joints.joint import Joint
+    from mdstopo.case.records import Record
+    from mdstopo.case.responses import ResponseKind
+
+_MODULES = {2: "mdstopo.case.plane:PLANE", 3: "mdstopo.case.space:SPACE"}
+#: what may stand above `dimension`: nothing of it depends on the dimension
+_BEFORE = ("format", "dimension", "title", "time", "design", "combine", "optimizer")
+
+
+class Geometry(NamedTuple):
+    """How cases of a dimension are read.
+
+    number: 2 or 3; format: the keys of a case. ground: the fixed body.
+    coordinates: those that motions prescribe, each with its place in a body's position; None for the angle.
+    to_local, to_world (body, points (n, number)): the points in the other coordinates.
+    build_body (name, keys, path, prescribed angle or None, reading): the body, None where it cannot be made.
+    least: the smallest of a body's mass and moments of inertia, in kg and kg m^2.
+    grid_count, grid_points (kind, keys), check_grid (kind, keys, reading): of point grids. build_load (keys, body, its
+    point in body coordinates or BAD, reading): the load, None where it cannot be made.
+    joints, responses: by their words. default_at (first, second body): where a fixed joint is that does not say it.
+    """
+
+    number: int
+    format: Record
+    ground: AnyBody
+    coordinates: tuple[tuple[str, int | None], ...]
+    to_local: Callable[[AnyBody, FloatArray], FloatArray]
+    to_world: Callable[[AnyBody, FloatArray], FloatArray]
+    build_body: Callable[[str, Any, str, float | None, Reading], AnyBody | None]
+    least: Callable[[AnyBody], float]
+    grid_count: Callable[[str, Any], int]
+    grid_points: Callable[[str, Any], FloatArray]
+    check_grid: Callable[[str, Any, Reading], bool]
+    build_load: Callable[[Fields, AnyBody, Components, Reading], Load | None]
+    joints: Mapping[str, type[Joint]]
+    responses: Mapping[str, ResponseKind]
+    default_at: Callable[[AnyBody, AnyBody], Components]
+
+
+def geometry_of(dimension: int) -> Geometry:
+    """The record of a dimension, 2 or 3."""
+    module, _, name = _MODULES[dimension].partition(":")
+    geometry: Geometry = getattr(importlib.import_module(module), name)
+    return geometry
+
+
+def geometry_in(root: Node, reading: Reading) -> Geometry:
+    """What a case says of its dimension, the plane where it says nothing or a mistake; notes where it says it late."""
+    entry = root.entries.get("dimension")
+    if entry is None:
+        return geometry_of(2)
+    key, value = entry
+    names = list(root.entries)
+    late = [name for name in names[: names.index("dimension")] if name not in _BEFORE]
+    if late and not value.origin:
+        reading.mistake("dimension", f"stands below {listed(late)}; it stands above all that depends on it", key)
+    number = value.scalar() if value.kind == SCALAR else None
+    return geometry_of(3 if not isinstance(number, bool) and number == 3 else 2)

@@ -1,0 +1,311 @@
+"""The case in space of a planar one: its plane is z = 0, or any other through the origin.
+
+Bodies have the same moment of inertia about all axes and body axes that start as the plane's, so that a planar motion
+stays in the plane and coordinates of a body keep their numbers. Pins become hinges about the normal of the plane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray, Signal, Table
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import GROUND, Case
+from mdstopo.case.number_rows import Signals
+from mdstopo.case.overrides import node_of
+from mdstopo.case.reading import Reading
+from mdstopo.case.responses import RESPONSES
+from mdstopo.case.rotations import about_axis
+from mdstopo.case.signals import combined
+from mdstopo.case.words import inside
+from mdstopo.finalize.document import Plain, content_of
+from mdstopo.finalize.text import text_of
+
+#: what `over_time` makes of an angle's norm is what it makes of the angle
+_UNSIGNED = ("max_abs", "rms")
+_ANGLES = {
+    "angle": "rotation",
+    "angular_velocity": "angular_velocity",
+    "angular_acceleration": "angular_acceleration",
+}
+_SAME = ("energy", "member_force", "joint_force", "joint_moment")
+
+
+def lifted(case: Case, axis: tuple[float, float, float] = (0.0, 0.0, 1.0), angle: float = 0.0) -> str:
+    """The text of the case in space.
+
+    axis, angle (rad): the turn that brings the plane z = 0 to where the scene shall lie. Raises CaseError with all that
+    cannot be lifted, and StoreError where an included file cannot be read any more.
+    """
+    return text_of(_Lift(case, axis, angle).content())
+
+
+class _Lift:
+    """One case on its way: where its plane lies, and what cannot go along."""
+
+    def __init__(self, case: Case, axis: tuple[float, float, float], angle: float) -> None:
+        self.case = case
+        self.is_tilted = angle != 0.0
+        self.turn = {"axis": list(axis), "angle": angle}
+        #: (3, 3): its columns are the plane's x, its y, and its normal
+        self.plane = about_axis(axis, angle) if self.is_tilted else np.eye(3)
+        self.refused: list[tuple[str, str]] = []
+
+    def content(self) -> Plain:
+        """The document. Raises CaseError."""
+        old = content_of(self.case)
+        if self.case.dimension != 2:
+            self.refuse("dimension", "is 3: the case is in space already")
+        new: Plain = {"format": old.pop("format"), "dimension": 3}
+        for key, value in old.items():
+            if key != "dimension" and value is not None:
+                new[key] = self.sections().get(key, _as_it_is)(value, key)
+        if self.refused:
+            marks = self.case.marks
+            mistakes = [marks.mistake(path, f"{words}: it cannot be lifted") for path, words in self.refused]
+            raise CaseError(mistakes, str(self.case.path or "<text>"))
+        return new
+
+    def sections(self) -> dict[str, Callable[[Any, str], Any]]:
+        """What becomes of the value of a key; of others nothing does."""
+        return {
+            "gravity": lambda value, _: self.vector(value),
+            "bodies": self.each(self.body),
+            "joints": self.each(self.joint),
+            "bushings": self.not_yet("bushings"),
+            "contacts": self.not_yet("contacts"),
+            "uncertainty": self.not_yet("uncertain values"),
+            "motions": self.each(self.motion),
+            "points": self.each(self.points),
+            "members": self.each(self.group),
+            "loads": self.each(self.load),
+            "load_cases": self.each(self.load_case),
+            "objectives": self.each(self.looked_at),
+            "constraints": self.each(self.looked_at),
+            "solver": self.solver,
+        }
+
+    def refuse(self, path: str, words: str) -> None:
+        """Note what cannot be lifted."""
+        self.refused.append((path, words))
+
+    def not_yet(self, what: str) -> Callable[[Any, str], Any]:
+        """A section that may only be empty."""
+
+        def refuse(value: Any, path: str) -> Any:
+            if value:
+                self.refuse(path, f"{what} are not in space yet")
+            return value
+
+        return refuse
+
+    @staticmethod
+    def each(lift: Callable[[Any, str], Any]) -> Callable[[Any, str], Any]:
+        """The parts of a list or of a mapping by names."""
+
+        def lifted_parts(value: Any, path: str) -> Any:
+            if isinstance(value, Mapping):
+                return {name: lift(part, inside(path, name)) for name, part in value.items()}
+            return [lift(part, f"{path}[{index}]") for index, part in enumerate(value)]
+
+        return lifted_parts
+
+    # Vectors.
+
+    def vector(self, pair: Any, frame: str = "global") -> list[float]:
+        """A vector in the plane; a body's own axes are those of the plane."""
+        if frame == "body" or not self.is_tilted:
+            return [*pair, 0]
+        return _plain(self.plane[:, :2] @ np.array(pair, dtype=np.float64))
+
+    def normal(self, size: float = 1.0, frame: str = "global") -> list[float]:
+        """A vector along the normal."""
+        if frame == "body" or not self.is_tilted:
+            return [0, 0, size]
+        return _plain(self.plane[:, 2] * size)
+
+    def signals(self, value: Any, matrix: FloatArray) -> Any:
+        """What a planar quantity over time is in space."""
+        reading = Reading(Path())
+        names = ("x", "y")[: matrix.shape[1]]
+        read: tuple[Signal, ...] = Signals(names).read(node_of(value, ""), "", reading)
+        assert not reading.mistakes  # it has been read before
+        found = combined(matrix, read)
+        if not isinstance(found[0], Table):
+            return list(found)
+        columns = [found[0].times, *(each.values[:, 0] for each in found if isinstance(each, Table))]
+        return {"table": np.column_stack(columns).tolist()}
+
+    # Sections.
+
+    def body(self, old: Plain, path: str) -> Plain:
+        """Its inertia is that of a ball: in the plane only the moment about the normal counts."""
+        del path
+        new: Plain = {}
+        turns = []
+        for key, value in old.items():
+            if key == "inertia":
+                new[key] = [value] * 3
+            elif key in ("position", "velocity"):
+                new[key] = self.vector(value)
+            elif key == "angular_velocity":
+                new[key] = self.normal(value)
+            elif key == "angle":
+                turns = [{"axis": [0, 0, 1], "angle": value}]
+            else:
+                new[key] = value
+        turns += [self.turn] if self.is_tilted else []
+        return {**new, "orientation": turns} if turns else new
+
+    def joint(self, old: Plain, path: str) -> Plain:
+        """A pin turns about the normal; a weld on ground is where the plane has it."""
+        del path
+        new = {key: value for key, value in old.items() if key != "at"}
+        at = old.get("at")
+        if at is None and old["type"] == "fixed" and old["bodies"][1] == GROUND:
+            at = [0, 0]
+        if isinstance(at, Mapping):
+            new["at"] = {body: self.vector(point) for body, point in at.items()}
+        elif at is not None:
+            new["at"] = [self.vector(point) for point in at] if isinstance(at[0], list) else self.vector(at)
+        if old["type"] == "prismatic":
+            new["axis"] = self.vector(old["axis"])
+        if old["type"] == "revolute":
+            new["axis"] = self.normal()
+        return new
+
+    def motion(self, old: Plain, path: str) -> Plain:
+        """Only x and y, and these only in the plane z = 0, are coordinates in space."""
+        if "angle" in old:
+            self.refuse(inside(path, "angle"), "prescribed rotations are not in space yet")
+        for axis in ("x", "y"):
+            if self.is_tilted and axis in old:
+                self.refuse(inside(path, axis), "in a tilted plane it is no single coordinate")
+        return old
+
+    def points(self, old: Plain, path: str) -> Plain:
+        """The grids in the plane."""
+        del path
+        frame, grid = _frame(old), old["grid"]
+        lift = self.grid
+        return {**old, "grid": [lift(each, frame) for each in grid] if isinstance(grid, list) else lift(grid, frame)}
+
+    def grid(self, old: Plain, frame: str) -> Plain:
+        """One grid; a lattice in a tilted plane becomes a part of that."""
+        ((kind, keys),) = old.items()
+        if kind == "list":
+            return {kind: [self.vector(point, frame) for point in keys]}
+        if kind == "line":
+            ends = {end: self.vector(keys[end], frame) for end in ("from", "to")}
+            return {kind: {**ends, "count": keys["count"]}}
+        if kind == "lattice":
+            return self.lattice(keys, frame)
+        new = {**keys, "center": self.vector(keys["center"], frame)}
+        if kind == "rectangle":
+            new["axes"] = [self.vector([1, 0], frame), self.vector([0, 1], frame)]
+        else:
+            new["normal"], new["start"] = self.normal(frame=frame), self.vector([1, 0], frame)
+        return {kind: new}
+
+    def lattice(self, keys: Plain, frame: str) -> Plain:
+        """A lattice of one layer, or where it is tilted a part of the plane."""
+        (x0, y0), (x1, y1), count = keys["from"], keys["to"], keys["count"]
+        if frame == "body" or not self.is_tilted:
+            return {"lattice": {"from": [x0, y0, 0], "to": [x1, y1, 0], "count": [*count, 1]}}
+        sides = [[x1 - x0, 0], [0, y1 - y0]]
+        if all(any(side) for side in sides):
+            edges = [self.vector(side) for side in sides]
+            return {"plane": {"corner": self.vector([x0, y0]), "edges": edges, "count": count}}
+        # Without one of the edges it is a line of points, which a lattice in the plane may be.
+        xs, ys = np.linspace(x0, x1, count[0]), np.linspace(y0, y1, count[1])
+        return {"list": [self.vector([x, y]) for y in ys.tolist() for x in xs.tolist()]}
+
+    def group(self, old: Plain, path: str) -> Plain:
+        """Ends given in place are lifted; grids are by themselves."""
+        del path
+        new = dict(old)
+        for end in ("from", "to"):
+            if isinstance(old[end], Mapping):
+                new[end] = {**old[end], "at": self.vector(old[end]["at"], _frame(old[end]))}
+        return new
+
+    def load(self, old: Plain, path: str) -> Plain:
+        """Forces stay in the plane, couples are along its normal."""
+        del path
+        frame = _frame(old)
+        axes = np.eye(3) if frame == "body" else self.plane
+        new = dict(old)
+        for key in ("force", "acceleration"):
+            if key in old:
+                new[key] = self.signals(old[key], axes[:, :2])
+        for key in ("moment", "angular_acceleration"):
+            if key in old:
+                new[key] = self.signals(old[key], axes[:, 2:])
+        if "at" in old:
+            new["at"] = self.vector(old["at"], frame)
+        return new
+
+    def load_case(self, old: Plain | None, path: str) -> Plain:
+        """Its gravity, loads and motions."""
+        lifts = {key: self.sections()[key] for key in ("gravity", "loads", "motions")}
+        return {key: lifts.get(key, _as_it_is)(value, inside(path, key)) for key, value in (old or {}).items()}
+
+    def looked_at(self, old: Plain, path: str) -> Plain:
+        """An objective or a constraint."""
+        response = old.get("response")
+        if not isinstance(response, Mapping):
+            return old
+        ((word, keys),) = response.items()
+        return {**old, "response": self.response(word, keys, old.get("over_time", "max"), inside(path, "response"))}
+
+    def response(self, word: str, keys: Plain, over_time: str, path: str) -> Plain:
+        """A response; seen from ground in a tilted plane only what has no direction there."""
+        kind, here = RESPONSES[word], inside(path, word)
+        from_ground = self.is_tilted and keys.get("relative_to", GROUND) == GROUND
+        if word in _SAME:
+            return {word: keys}
+        if word in _ANGLES:
+            component = "norm" if from_ground else "z"
+            if from_ground and over_time not in _UNSIGNED:
+                words = f"in a tilted plane only its size is a component, and over_time {over_time} needs its sign"
+                self.refuse(here, words)
+            return {_ANGLES[word]: {**keys, "component": component}}
+        if not kind.of_point:
+            self.refuse(here, "what becomes of this response in space is not known")
+            return {word: keys}
+        if from_ground and keys.get("component", "norm") != "norm":
+            self.refuse(inside(here, "component"), "in a tilted plane it is no single component")
+        return {word: {**keys, "at": self.vector(keys["at"], _frame(keys))} if "at" in keys else keys}
+
+    def solver(self, old: Plain, path: str) -> Plain:
+        """What is not in space yet."""
+        refused = {
+            "integrator": ("gauss", "generalized_alpha"),
+            "sensitivity": ("iterative",),
+            "assemble": (True,),
+            "settle": (True,),
+        }
+        for key, values in refused.items():
+            if old.get(key) in values:
+                self.refuse(inside(path, key), f"{str(old[key]).lower()} is not in space yet")
+        return old
+
+
+def _as_it_is(value: Any, path: str) -> Any:
+    del path
+    return value
+
+
+def _frame(keys: Plain) -> str:
+    """What coordinates are measured in; those of ground are global ones."""
+    return "global" if keys["body"] == GROUND else str(keys.get("frame", "global"))
+
+
+def _plain(vector: FloatArray) -> list[float]:
+    """Its numbers; -0 is 0."""
+    found: list[float] = (vector + 0.0).tolist()
+    return found

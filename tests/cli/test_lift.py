@@ -1,0 +1,215 @@
+"""`mdstopo lift`: the case in space of a planar one reads back as the same scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mdstopo.case.arrays import Table
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.rotations import about_axis
+from mdstopo.finalize.lift import lifted
+
+CASES = Path(__file__).parents[2] / "cases"
+PLANAR = """\
+format: 1
+title: planar
+gravity: [0, -9.8]
+time: {start: 0, end: 0.2}
+bodies:
+  a: {mass: 60, inertia: 10, position: [1, 2], angle: 0.5, angular_velocity: 3}
+  b: {mass: 20, inertia: 6, position: [0, -1], velocity: [0.25, 0.5]}
+joints:
+  - {name: hip, type: revolute, bodies: [a, ground], at: [0, 0.25]}
+  - {type: prismatic, bodies: [a, b], at: {a: [1, 0], b: [1, 0]}, axis: [2, 1]}
+  - {type: fixed, bodies: [a, ground]}
+  - {type: distance, bodies: [a, b], at: [[0, 0], [1, 0]]}
+points:
+  edge: {body: a, frame: body, grid: {rectangle: {center: [0, 0], size: [0.5, 0.25], count: 7}}}
+  many:
+    body: b
+    grid:
+      - {list: [[0, 1], [2, 3]]}
+      - {line: {from: [-1, -0.8], to: [-1, 0.8], count: 3}}
+      - {arc: {center: [0, 0], radius: 1, from: 3.14, to: 0, count: 9}}
+      - {circle: {center: [0, 0], radius: 2, count: 5}}
+      - {rectangle: {center: [1, 5], size: [0.5, 0.25], count: 7}}
+      - {lattice: {from: [0, 0], to: [1, 3], count: [3, 4]}}
+      - {lattice: {from: [7, 0], to: [7, 3], count: [1, 4]}}
+  fixed: {body: ground, frame: body, grid: {list: [[9, 9]]}}
+members:
+  belts: {from: edge, to: many, law: {type: spring, stiffness: 225}}
+  single:
+    from: {body: ground, at: [0, 1]}
+    to: {body: a, at: [0.1, 0], frame: body}
+    design: false
+    law: {type: gap, stiffness: 1}
+  last: {from: fixed, to: edge, law: {type: spring, stiffness: 1}}
+loads:
+  - {body: a, force: [10, 1], at: [0, 0], moment: 3}
+  - {body: b, acceleration: [9.8, 0], angular_acceleration: 20}
+  - {body: a, force: {table: [[0, 1, 2], [0.1, 3, 4]]}, moment: {table: [[0, 1], [1, 2]]}, frame: body, at: [1, 0]}
+  - {body: b, force: [{table: [[0, 1], [0.1, 1], [0.1, 5]]}, 3], moment: [[0, 1], [1, 2]]}
+load_cases:
+  one: {loads: [{body: b, angular_acceleration: 20}], gravity: [1, 0]}
+  two: {time: {end: 0.1}}
+objectives:
+  G1: {response: energy, load_case: one}
+  G2: {response: {displacement: {body: a, at: [1, 3]}}, load_case: one}
+  G3: {response: {angle: {body: a, relative_to: b}}, load_case: one}
+  G4: {response: {angular_velocity: {body: a}}, load_case: one, over_time: max_abs}
+  G5: {response: {joint_force: {joint: hip}}, load_case: one}
+  G6: {response: {velocity: {body: a, relative_to: b, component: x}}, load_case: one}
+combine: {weights: {G1: 1, G2: 1, G3: 1, G4: 1, G5: 1, G6: 1}}
+constraints:
+  - {volume: all, fraction: 0.1}
+  - {response: {member_force: {group: belts}}, load_case: two, limit: 5}
+"""
+SPOTS = [((0.0, 0.0, 1.0), 0.0), ((1.0, 0.0, 0.0), 1.5707963267948966), ((1.0, -2.0, 0.5), 0.7)]
+
+
+def same_scene(planar: Case, spatial: Case, plane: np.ndarray) -> None:
+    """Everything of the planar scene stands in the plane; its columns are x, y and the normal."""
+    xy = plane[:, :2]
+    for old, new in zip(planar.bodies, spatial.bodies, strict=True):
+        c, s = np.cos(old.angle), np.sin(old.angle)
+        np.testing.assert_allclose(new.position, xy @ np.array(old.position), atol=1e-14)
+        np.testing.assert_allclose(new.velocity, xy @ np.array(old.velocity), atol=1e-14)
+        np.testing.assert_allclose(new.angular_velocity, plane[:, 2] * old.angular_velocity, atol=1e-14)
+        np.testing.assert_allclose(new.rotation, plane @ [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-14)
+        assert new.inertia.tolist() == np.diag([old.inertia] * 3).tolist()
+    for old, new in zip(planar.members, spatial.members, strict=True):
+        np.testing.assert_allclose(new.length, old.length, rtol=1e-13, atol=1e-13)
+        np.testing.assert_allclose(new.p_world, old.p_world @ xy.T, atol=1e-13)
+        np.testing.assert_allclose(new.q_local[:, :2], old.q_local @ flat(old.body_to, plane), atol=1e-13)
+        np.testing.assert_array_equal(new.cost, old.cost)
+    for old, new in zip(planar.joints, spatial.joints, strict=True):
+        assert (new.type, new.name, new.bodies) == (old.type, old.name, old.bodies)
+        np.testing.assert_allclose(new.at_first[:2], np.array(old.at_first) @ flat(old.bodies[0], plane), atol=1e-13)
+        np.testing.assert_allclose(new.at_second[:2], np.array(old.at_second) @ flat(old.bodies[1], plane), atol=1e-13)
+    for old, new in zip(planar.load_cases, spatial.load_cases, strict=True):
+        assert (new.name, new.start, new.end) == (old.name, old.start, old.end)
+        np.testing.assert_allclose(new.gravity, xy @ np.array(old.gravity), atol=1e-14)
+        for one, other in zip(old.loads, new.loads, strict=True):
+            axes = np.eye(3) if one.frame == "body" else plane
+            for time in (0.0, 0.05, 0.1, 0.15):
+                force = axes[:, :2] @ [at(each, time) for each in one.force]
+                np.testing.assert_allclose([at(each, time) for each in other.force], force, rtol=1e-14, atol=1e-13)
+            couple = axes[:, 2] * at(one.moment, 0.05)
+            turning = other.angular_acceleration
+            scale = 1.0 if turning is None else planar.body(one.body).inertia
+            found = [scale * at(each, 0.05) for each in turning or other.moment]
+            np.testing.assert_allclose(found, couple, rtol=1e-14, atol=1e-13)
+
+
+def flat(body: str, plane: np.ndarray) -> np.ndarray:
+    """From planar coordinates of a body to the first two in space: those of ground are global."""
+    return plane[:2, :2].T if body == "ground" else np.eye(2)
+
+
+def at(signal: float | Table, time: float) -> float:
+    """A signal at a time, right-continuous."""
+    if not isinstance(signal, Table):
+        return signal
+    t, x = signal.times, signal.values[:, 0]
+    k = int(np.searchsorted(t, time, side="right")) - 1
+    if k == len(t) - 1:
+        return float(x[-1])
+    return float(x[k] + (x[k + 1] - x[k]) * (time - t[k]) / (t[k + 1] - t[k]))
+
+
+@pytest.mark.parametrize("spot", SPOTS)
+def test_the_case_in_space_is_the_same_scene(spot: tuple[tuple[float, float, float], float]) -> None:
+    planar = read_case(PLANAR)
+    spatial = read_case(lifted(planar, *spot))
+    assert spatial.dimension == 3
+    same_scene(planar, spatial, about_axis(*spot))
+    assert [each.name for each in spatial.objectives] == [each.name for each in planar.objectives]
+    responses = {each.name: each.response for each in spatial.objectives}
+    assert (responses["G3"].kind, responses["G3"].component) == ("rotation", "z")
+    assert responses["G4"].component == ("norm" if spot[1] else "z")
+    assert responses["G6"].component == "x"
+    assert spatial.constraints[0] == planar.constraints[0]
+    assert spatial.joints[0].axes_first[0] @ spatial.bodies[0].rotation.T == pytest.approx(about_axis(*spot)[:, 2])
+
+
+@given(axis=st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1), angle=st.floats(0.01, 6))
+@settings(max_examples=15, deadline=None, derandomize=True)
+def test_any_plane_has_the_same_scene(axis: tuple[float, float, float], angle: float) -> None:
+    planar = read_case(PLANAR)
+    same_scene(planar, read_case(lifted(planar, axis, angle)), about_axis(axis, angle))
+
+
+@pytest.mark.parametrize("name", ["fig6", "fig7", "catch", "lander", "mooring", "isolator"])
+def test_cases_of_the_project_are_lifted(name: str) -> None:
+    planar = load_case(CASES / f"{name}.yaml", {"solver.integrator": "auto"})
+    same_scene(planar, read_case(lifted(planar)), np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "points:\n",
+            "motions: [{body: a, angle: {velocity: 3}}]\npoints:\n",
+            "x.yaml:13:21: motions[0].angle: prescribed rotations are not in space yet: it cannot be lifted",
+        ),
+        (
+            "points:\n",
+            "bushings: [{bodies: [a, b], at: [0, 0], stiffness: [1, 1, 1]}]\npoints:\n",
+            "x.yaml:13:11: bushings: bushings are not in space yet: it cannot be lifted",
+        ),
+        (
+            "points:\n",
+            "solver: {integrator: generalized_alpha}\npoints:\n",
+            "x.yaml:13:22: solver.integrator: generalized_alpha is not in space yet: it cannot be lifted",
+        ),
+        ("points:\n", "solver: {settle: true}\npoints:\n", "solver.settle: true is not in space yet"),
+    ],
+)
+def test_what_cannot_be_lifted_is_refused_at_its_place(old: str, new: str, message: str) -> None:
+    with pytest.raises(CaseError) as refused:
+        lifted(read_case(PLANAR.replace(old, new, 1), path="x.yaml"))
+    assert message in str(refused.value)
+
+
+def test_what_has_no_component_in_a_tilted_plane_is_refused() -> None:
+    text = PLANAR.replace("over_time: max_abs", "over_time: max").replace("at: [1, 3]}", "at: [1, 3], component: y}")
+    text = text.replace("points:\n", "motions: [{body: b, x: {velocity: 0.25}}]\npoints:\n", 1)
+    assert read_case(lifted(read_case(text))).load_cases[0].motions[0].x is not None
+    with pytest.raises(CaseError) as refused:
+        lifted(read_case(text), (1, 0, 0), 0.1)
+    told = [each.path_key for each in refused.value.mistakes]
+    assert told == [
+        "motions[0].x",
+        "objectives.G2.response.displacement.component",
+        "objectives.G4.response.angular_velocity",
+    ]
+
+
+def test_the_command_writes_or_prints(run: Callable[..., Result], tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(PLANAR)
+    printed = run("lift", str(tmp_path / "p.yaml"), "--tilt", "1", "0", "0", "0.5")
+    assert printed.exit_code == 0
+    assert read_case(printed.stdout).dimension == 3
+    out = tmp_path / "new" / "s.yaml"
+    done = run("lift", str(tmp_path / "p.yaml"), "--out", str(out))
+    assert done.stdout.splitlines() == [str(out), f"  mdstopo check {out}"]
+    assert load_case(out).dimension == 3
+    again = run("lift", str(tmp_path / "p.yaml"), "--out", str(out))
+    assert again.exit_code == 2
+    assert f"{out} exists already; it is left as it is" in again.stderr
+    assert run("lift", str(out)).exit_code == 2
+    assert "it cannot be lifted" in run("lift", str(out)).stderr
+    for wrong in (("0", "0", "0", "1"), ("nan", "0", "1", "1")):
+        refused = run("lift", str(tmp_path / "p.yaml"), "--tilt", *wrong)
+        assert refused.exit_code == 2
+        assert "--tilt" in refused.stderr
