@@ -129,7 +129,7 @@ class GeneralModel(NamedTuple):
         IndexArray, Field("n_response, 6", "kind, body, reference, component, order in time, group or joint")
     ]
     response_par: Annotated[
-        FloatArray, Field("n_response, n_place", "a point or axis of the body, then numbers of its own")
+        FloatArray, Field("n_response, n_number", "a point or axis of the body, then numbers of its own")
     ]
     contact_pair: Annotated[IndexArray, Field("n_contact", "the pair of edge and point")]
     contact: Annotated[FloatArray, Field("n_contact, 11", "see `mechanics.contact`")]
