@@ -85,7 +85,9 @@ class GeneralModel(NamedTuple):
         FloatArray, Field("n_seg, n_driven, 4", "where they are in a segment: powers of the time since its start")
     ]
     joint: Annotated[IndexArray, Field("n_joint, 5", "code, first and second body, pair, rows")]
-    joint_par: Annotated[FloatArray, Field("n_joint, n_par", "the joint's parameters (`mechanics.joints.table`, `spatial_joints`)")]
+    joint_par: Annotated[
+        FloatArray, Field("n_joint, n_par", "the joint's parameters (`mechanics.joints.table`, `spatial_joints`)")
+    ]
     row: Annotated[IndexArray, Field("n_joint, rows", "the place of each of its rows among the solved ones, or -1")]
     place: Annotated[
         IndexArray, Field("n_place", "where each coordinate, then each solved row, stands in the banded matrix")
@@ -126,7 +128,9 @@ class GeneralModel(NamedTuple):
     response: Annotated[
         IndexArray, Field("n_response, 6", "kind, body, reference, component, order in time, group or joint")
     ]
-    response_par: Annotated[FloatArray, Field("n_response, n_place", "a point or axis of the body, then numbers of its own")]
+    response_par: Annotated[
+        FloatArray, Field("n_response, n_place", "a point or axis of the body, then numbers of its own")
+    ]
     contact_pair: Annotated[IndexArray, Field("n_contact", "the pair of edge and point")]
     contact: Annotated[FloatArray, Field("n_contact, 11", "see `mechanics.contact`")]
     varied: Annotated[

@@ -89,6 +89,7 @@ def _chosen_of_bodies(pick: Callable[[ResponseKernels], Any]) -> Callable[[F], F
 
     def make(stub: F) -> F:
         function = cast(FunctionType, stub)
+
         def of(where: str) -> Any:
             name = f"{function.__name__}_{where}"
             named = FunctionType(function.__code__.replace(co_name=name), function.__globals__, name)

@@ -13,7 +13,6 @@ from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints.kernels import FITTED
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
-from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
 from mdstopo.mechanics.kinematics.spatial_joints import (
     ACROSS,
     CYLINDRICAL,
@@ -27,6 +26,7 @@ from mdstopo.mechanics.kinematics.spatial_joints import (
     UNIVERSAL,
     row_of_joint,
 )
+from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
 from mdstopo.mechanics.kinematics.spatial_poses import HOME
 from mdstopo.scene.loads import Loads
 from mdstopo.scene.model import FloatArray, IndexArray

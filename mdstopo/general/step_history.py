@@ -67,7 +67,9 @@ class StepHistory:
         ),
     ]
     C: Annotated[FloatArray, Field("stages, n_pair, both, both", "-dF/dv, likewise")]
-    turn: Annotated[FloatArray, Field("stages, n, load_slopes", "slopes of the loads by their bodies' turns and turning rates")]
+    turn: Annotated[
+        FloatArray, Field("stages, n, load_slopes", "slopes of the loads by their bodies' turns and turning rates")
+    ]
     turned: Annotated[FloatArray, Field("factored, n_body, attitude", "attitudes of the bodies")]
     pull: Annotated[
         FloatArray,

@@ -20,8 +20,8 @@ from mdstopo.mechanics.joints.table import joint_gamma as gamma_by_code
 from mdstopo.mechanics.joints.table import joint_is_point as is_point_by_code
 from mdstopo.mechanics.joints.table import joint_rows as rows_by_code
 from mdstopo.mechanics.joints.table import joint_stiffness as stiffness_by_code
-from mdstopo.mechanics.joints.table import joint_velocity_slope as velocity_slope_by_code
 from mdstopo.mechanics.joints.table import joint_transmitted
+from mdstopo.mechanics.joints.table import joint_velocity_slope as velocity_slope_by_code
 from mdstopo.mechanics.kinematics import (
     planar_bushings,
     planar_contacts,

@@ -80,19 +80,53 @@ def turn_between(before, after):
 
 
 @part
-def turn_rate(t, u):
-    """J(t) u: the turning rate in the turned frame while t changes at the rate u."""
-    square = dot(t, t)
-    angle = math.sqrt(square)
+def _weights(square):
+    """(1 - cos)/|t|^2 and (1 - sin/|t|)/|t|^2 of a squared angle, and their derivatives by it."""
     if square < SMALL:
+        first = 0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0)))
+        first += square * square * square * square * (1.0 / 3628800.0 - square / 479001600.0)
         second = 1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square * (1.0 / 362880.0)))
         second += square * square * square * square * (1.0 / 39916800.0 - square / 6227020800.0)
-    else:
-        second = (1.0 - math.sin(angle) / angle) / square
+        by_first = -1.0 / 24.0 + square * (2.0 / 720.0 - square * (3.0 / 40320.0 - square * (4.0 / 3628800.0)))
+        by_first -= square * square * square * square * 5.0 / 479001600.0
+        by_second = -1.0 / 120.0 + square * (2.0 / 5040.0 - square * (3.0 / 362880.0 - square * (4.0 / 39916800.0)))
+        by_second -= square * square * square * square * 5.0 / 6227020800.0
+        return first, second, by_first, by_second
+    angle = math.sqrt(square)
     half = math.sin(0.5 * angle)
-    first = 2.0 * half * half / square if square > 1e-16 else 0.5
+    sine = math.sin(angle) / angle
+    first = 2.0 * half * half / square
+    second = (1.0 - sine) / square
+    return first, second, (0.5 * sine - first) / square, (0.5 * (first - second) - second) / square
+
+
+@part
+def turn_rate(t, u):
+    """J(t) u: the turning rate in the turned frame while t changes at the rate u."""
+    first, second, _, _ = _weights(dot(t, t))
     x = cross(t, u)
     return plus(u, minus(times(second, cross(t, x)), times(first, x)))
+
+
+@part
+def turn_rate_jvp(t, u, dt):
+    """The change of J(t) u with a change of t alone."""
+    first, second, by_first, by_second = _weights(dot(t, t))
+    along = 2.0 * dot(t, dt)
+    x = cross(t, u)
+    dx = cross(dt, u)
+    change = minus(times(second, plus(cross(dt, x), cross(t, dx))), times(first, dx))
+    return plus(change, times(along, minus(times(by_second, cross(t, x)), times(by_first, x))))
+
+
+@part
+def turn_rate_vjp(t, u, bar):
+    """The cotangent of t from that of J(t) u; see `vector_rate_vjp`."""
+    first, second, by_first, by_second = _weights(dot(t, t))
+    x = cross(t, u)
+    own = minus(times(second, plus(cross(x, bar), cross(u, cross(bar, t)))), times(first, cross(u, bar)))
+    along = 2.0 * (by_second * dot(bar, cross(t, x)) - by_first * dot(bar, x))
+    return plus(own, times(along, t))
 
 
 @part

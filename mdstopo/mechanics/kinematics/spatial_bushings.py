@@ -12,7 +12,7 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.rotations import logarithm, vector_rate, vector_rate_jvp
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
 from mdstopo.mechanics.kinematics.spatial_lines import add_column
-from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, FREEDOMS, HOME_AXES, S, S_SINCE, W
+from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, FREEDOMS, HOME_AXES, S_SINCE, S, W
 from mdstopo.mechanics.kinematics.vectors import add, cross, plus, times, turned, turned_back, vector_at
 
 #: columns of `GeneralModel.bushing`: both points, the stretch at home (axes of the first body), stiffness and damping

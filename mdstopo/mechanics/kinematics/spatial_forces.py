@@ -8,15 +8,14 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.spatial_poses import (
     ATTITUDE,
-    D,
     D_RATE,
     FREEDOMS,
     OMEGA_A,
-    POSE,
     ROTATIONS,
-    S,
     TURN,
     TURN_A,
+    D,
+    S,
     W,
     fill_attitude,
 )

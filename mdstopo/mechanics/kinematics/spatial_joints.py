@@ -68,9 +68,9 @@ def rows_of(code):
     """How many rows a joint has."""
     if code == FIXED:
         return 6
-    if code == REVOLUTE or code == PRISMATIC:
+    if code in (REVOLUTE, PRISMATIC):
         return 5
-    if code == UNIVERSAL or code == CYLINDRICAL:
+    if code in (UNIVERSAL, CYLINDRICAL):
         return 4
     if code == DISTANCE:
         return 1
@@ -83,7 +83,7 @@ def row_of_joint(code, r):
     if code == DISTANCE:
         return LINK, 0, 0
     points = 0
-    if code == SPHERICAL or code == REVOLUTE or code == UNIVERSAL or code == FIXED:
+    if code in (SPHERICAL, REVOLUTE, UNIVERSAL, FIXED):
         points = 3
         if r < points:
             return AT, r, 0
@@ -484,4 +484,3 @@ def reactions(joint, joint_par, home, row, q, lam, out):
             moment = minus(moment, cross(arm, turned_back(w, ONE + TURN, force)))
             put(out[t, j], 0, force)
             put(out[t, j], 3, turned(w, ONE + TURN, moment))
-

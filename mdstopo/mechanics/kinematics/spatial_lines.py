@@ -189,4 +189,3 @@ def add_column(k, i, j, a):
     k[i, j] += a[0]
     k[i + 1, j] += a[1]
     k[i + 2, j] += a[2]
-

@@ -29,15 +29,15 @@ from mdstopo.mechanics.kinematics.spatial_lines import (
 from mdstopo.mechanics.kinematics.spatial_poses import (
     ATTITUDE,
     COORDINATES,
-    D,
     D_RATE,
     D_SINCE,
     FREEDOMS,
     HOME_PLACE,
-    S,
     S_SINCE,
     TURN,
     TURN_SINCE,
+    D,
+    S,
     W,
     fill_attitude,
 )
@@ -380,6 +380,4 @@ def add_inerter_tangents(model, pair, lo, count, inertance, member_state, q, v, 
             for c in range(2 * FREEDOMS):
                 k_out[pair, r, c] += w * row[r] * by_q[c]
                 c_out[pair, r, c] += w * row[r] * by_v[c]
-        add_line_stiffness(
-            turn_one, TURN, turn_two, TURN, first, second, e, length, w * second_rate_now, k_out[pair]
-        )
+        add_line_stiffness(turn_one, TURN, turn_two, TURN, first, second, e, length, w * second_rate_now, k_out[pair])

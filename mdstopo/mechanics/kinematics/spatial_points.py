@@ -46,12 +46,12 @@ ACROSS_TWO = 5
 @part
 def seen_along(model, r, component, y):
     """The component of a vector y (axes of body r), and the direction whose component has its slopes."""
-    if component == X or component == Y or component == Z:
+    if component in (X, Y, Z):
         axis = axis_of(model, r, 0 if component == X else 1 if component == Y else 2)
         return dot(axis, y), axis
     size = math.sqrt(dot(y, y))
     along = times(1.0 / size if size > 0.0 else 0.0, y)
-    if component == ACROSS or component == ACROSS_TWO:
+    if component in (ACROSS, ACROSS_TWO):
         # perpendicular to the vector: to the axis that it is farthest from, and to both
         a, b, c = abs(along[0]), abs(along[1]), abs(along[2])
         first = a <= b and a <= c
@@ -119,9 +119,7 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
     omega = vector_at(v, k + 3)
     omega_b = vector_at(v, i + 3)
     s_rate = cross(omega_b, s)
-    first = turned_back(
-        one, TURN, minus(plus(vector_at(v, i), turned(two, TURN, s_rate)), vector_at(v, k))
-    )
+    first = turned_back(one, TURN, minus(plus(vector_at(v, i), turned(two, TURN, s_rate)), vector_at(v, k)))
     rate = minus(first, cross(omega, y))
     if order == 1:
         value, n = seen_along(model, r, component, rate)
@@ -129,9 +127,7 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
         return value
     turning = vector_at(a, k + 3)
     s_second = plus(cross(vector_at(a, i + 3), s), cross(omega_b, s_rate))
-    second = turned_back(
-        one, TURN, minus(plus(vector_at(a, i), turned(two, TURN, s_second)), vector_at(a, k))
-    )
+    second = turned_back(one, TURN, minus(plus(vector_at(a, i), turned(two, TURN, s_second)), vector_at(a, k)))
     push = minus(second, plus(cross(turning, y), plus(times(2.0, cross(omega, rate)), cross(omega, cross(omega, y)))))
     value, n = seen_along(model, r, component, push)
     g = turned(one, TURN, n)

@@ -127,7 +127,10 @@ def turned_pose(model, p, turned, q, v, rel):
 
 @part
 def pose_acceleration(model, rel, p, a, out):
-    """d'' = R_A^T D'' + d x omega_A' + 2 d' x omega_A + omega_A x (d x omega_A), w' = S omega_B' - omega_A' + w x omega_A."""
+    """Second derivatives of a relative pose; see `kinematics_interface.pose_acceleration`.
+
+    d'' = R_A^T D'' + d x omega_A' + 2 d' x omega_A + omega_A x (d x omega_A), w' = S omega_B' - omega_A' + w x omega_A.
+    """
     i = FREEDOMS * model.pair[p, 0]
     j = FREEDOMS * model.pair[p, 1]
     r = rel[p]

@@ -11,7 +11,7 @@ Backwards, with u_i the cotangent of the turn of stage i, g_i that of its turnin
 """
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS
+from mdstopo.mechanics.kinematics.planar_steps import BY_RATE, BY_STAGE, END, END_RATE, NODES, VECTORS, hermite
 from mdstopo.mechanics.kinematics.rotations import (
     exponential,
     inverse,
@@ -20,6 +20,8 @@ from mdstopo.mechanics.kinematics.rotations import (
     turn_between,
     turn_by,
     turn_rate,
+    turn_rate_jvp,
+    turn_rate_vjp,
     vector_rate,
     vector_rate_jvp,
     vector_rate_vjp,
@@ -314,6 +316,93 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
         put(dq, d + 3, seen)
         put(dv, d, velocity)
         put(dv, d + 3, omega)
+
+
+@part
+def _ends(q0, q1, v0, v1, i, d):
+    """The rotation vector across a step and its rates at both ends, of the body at i of coordinates and d of others."""
+    way = turn_between(quaternion_at(q0, i + 3), quaternion_at(q1, i + 3))
+    return way, vector_at(v0, d + 3), vector_rate(way, vector_at(v1, d + 3))
+
+
+@kernel
+def cubic(model, c, h, q0, v0, q1, v1, q, v):
+    """The cubic through both ends of a step; see `kinematics_interface.cubic`.
+
+    Turns follow the cubic p of the rotation vector from the start: q = q_0 exp(p), omega = J(p) p'.
+    """
+    a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
+    for body in range(v.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        one = vector_at(q0, i)
+        two = vector_at(q1, i)
+        first = vector_at(v0, d)
+        last = vector_at(v1, d)
+        put(q, i, plus(plus(times(a0, one), times(a1, two)), plus(times(h * b0, first), times(h * b1, last))))
+        put(v, d, plus(times(da1 / h, minus(two, one)), plus(times(db0, first), times(db1, last))))
+        way, first, last = _ends(q0, q1, v0, v1, i, d)
+        p = plus(times(a1, way), plus(times(h * b0, first), times(h * b1, last)))
+        rate = plus(times(da1 / h, way), plus(times(db0, first), times(db1, last)))
+        put_quaternion(q, i + 3, turn_by(quaternion_at(q0, i + 3), p))
+        put(v, d + 3, turn_rate(p, rate))
+
+
+@kernel
+def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q, end_v):
+    """The cotangents of both ends of a cubic; see `kinematics_interface.cubic_vjp`."""
+    a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
+    for body in range(bar_q.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        place = vector_at(bar_q, d)
+        speed = vector_at(bar_v, d)
+        put(start_q, d, plus(times(a0, place), times(da0 / h, speed)))
+        put(start_v, d, plus(times(h * b0, place), times(db0, speed)))
+        put(end_q, d, plus(times(a1, place), times(da1 / h, speed)))
+        put(end_v, d, plus(times(h * b1, place), times(db1, speed)))
+        way, first, last = _ends(q0, q1, v0, v1, i, d)
+        p = plus(times(a1, way), plus(times(h * b0, first), times(h * b1, last)))
+        rate = plus(times(da1 / h, way), plus(times(db0, first), times(db1, last)))
+        seen = vector_at(bar_q, d + 3)
+        spin = vector_at(bar_v, d + 3)
+        bar_p = plus(turn_rate(times(-1.0, p), seen), turn_rate_vjp(p, rate, spin))
+        bar_rate = turn_rate(times(-1.0, p), spin)
+        bar_last = plus(times(h * b1, bar_p), times(db1, bar_rate))
+        bar_way = plus(times(a1, bar_p), times(da1 / h, bar_rate))
+        bar_way = plus(bar_way, vector_rate_vjp(way, vector_at(v1, d + 3), bar_last))
+        put(start_v, d + 3, plus(times(h * b0, bar_p), times(db0, bar_rate)))
+        put(end_v, d + 3, vector_rate(times(-1.0, way), bar_last))
+        # way = log(q_0^-1 q_1): J(way) dway is what q_1 turns by, less what q_0 does, seen from the end
+        by_end = vector_rate(times(-1.0, way), bar_way)
+        put(end_q, d + 3, by_end)
+        put(start_q, d + 3, minus(back_turned(times(-1.0, p), seen), back_turned(times(-1.0, way), by_end)))
+
+
+@kernel
+def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
+    """The change of a cubic; see `kinematics_interface.cubic_jvp`."""
+    a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
+    for body in range(dq.shape[0] // FREEDOMS):
+        i = COORDINATES * body
+        d = FREEDOMS * body
+        one = vector_at(dq, d)
+        two = vector_at(end_dq, d)
+        first = vector_at(dv, d)
+        last = vector_at(end_dv, d)
+        put(dq, d, plus(plus(times(a0, one), times(a1, two)), plus(times(h * b0, first), times(h * b1, last))))
+        put(dv, d, plus(times(da1 / h, minus(two, one)), plus(times(db0, first), times(db1, last))))
+        way, start, end = _ends(q0, q1, v0, v1, i, d)
+        p = plus(times(a1, way), plus(times(h * b0, start), times(h * b1, end)))
+        rate = plus(times(da1 / h, way), plus(times(db0, start), times(db1, end)))
+        turn = vector_at(dq, d + 3)
+        first = vector_at(dv, d + 3)
+        dway = vector_rate(way, minus(vector_at(end_dq, d + 3), back_turned(way, turn)))
+        last = plus(vector_rate_jvp(way, vector_at(v1, d + 3), dway), vector_rate(way, vector_at(end_dv, d + 3)))
+        dp = plus(times(a1, dway), plus(times(h * b0, first), times(h * b1, last)))
+        drate = plus(times(da1 / h, dway), plus(times(db0, first), times(db1, last)))
+        put(dq, d + 3, plus(back_turned(p, turn), turn_rate(p, dp)))
+        put(dv, d + 3, plus(turn_rate_jvp(p, rate, dp), turn_rate(p, drate)))
 
 
 @kernel
