@@ -1,14 +1,20 @@
 """The keys of a case as Markdown, from the definitions that the reader and the JSON Schema are made of."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, Ref, Text, Version, Word
+from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
+from mdstopo.case.mesh_files import MeshFile
+from mdstopo.case.not_yet import NotYet, NotYetAs
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
-from mdstopo.case.records import ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
+from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.schema_case import FORMAT
+from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
 
+#: sections of a case in space that have a table on its page
+IN_SPACE = ("bodies", "joints", "motions", "points", "loads", "objectives")
 #: where the page tells of tables of time and of rows from files
 ROWS = "rows"
 #: mappings that many keys share, told once
@@ -24,16 +30,25 @@ class Place:
     depth: int
 
 
-def places() -> dict[str, list[Place]]:
+def places(case: Record = FORMAT) -> dict[str, list[Place]]:
     """Every mapping below a key of a case, each once, by that key; those of tables and files under `ROWS`."""
     seen: set[int] = set()
-    found = {key.name: list(_below(key.kind, key.name, 0, seen)) for key in FORMAT.keys}
-    return {"": [Place("", FORMAT, 0)], **found, ROWS: [Place(path, each, 0) for path, each in _SHARED.items()]}
+    found = {key.name: list(_below(key.kind, key.name, 0, seen)) for key in case.keys}
+    return {"": [Place("", case, 0)], **found, ROWS: [Place(path, each, 0) for path, each in _SHARED.items()]}
 
 
-def keys_of(section: str) -> str:
+def keys_in_space(section: str) -> str:
+    """The same of a case in space, for a page that has `IN_SPACE` alone; other links lead to the page of the case."""
+    known = places(SPACE_FORMAT)
+    here = {f"{each.path}-keys" for name in IN_SPACE for each in known[name]}
+    link = re.compile(r"\]\(#([\w.-]+)\)")
+    text = keys_of(section, SPACE_FORMAT)
+    return link.sub(lambda found: found[0] if found[1] in here else f"](case.md#{found[1]})", text)
+
+
+def keys_of(section: str, case: Record = FORMAT) -> str:
     """The mappings below one key of a case, each as a heading with a table; "" for the case itself."""
-    known = places()
+    known = places(case)
     if not known.get(section):
         raise ValueError(f"no mapping is below {section!r}; there are {', '.join(known)}")
     anchors = {id(each.record): each.path for part in known.values() for each in part}
@@ -61,6 +76,8 @@ def _parts(kind: Kind) -> list[Kind]:
     """The kinds that a list, a mapping from names or a choice is made of."""
     if isinstance(kind, (Vector, ListOf, Named, ByName, ByKey)):
         return [kind.item]
+    if isinstance(kind, ByDepth):
+        return [kind.flat, kind.nested]
     if isinstance(kind, ByShape):
         return [part for part in (kind.scalar, kind.sequence, kind.mapping) if part is not None]
     return []
@@ -158,6 +175,10 @@ def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
         return f"mapping from {_plural(kind.kind)} to {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByKey):
         return f"mapping from {kind.what}: {_value(kind.item, anchors, path)}"
+    if isinstance(kind, NotYetAs):
+        return _value(kind.kind, anchors, path)
+    if isinstance(kind, ByDepth):
+        return ", or ".join(_value(part, anchors, path) for part in _parts(kind))
     if isinstance(kind, ByShape):
         if isinstance(kind.sequence, ListOf) and kind.sequence.item is kind.mapping:
             return f"{_value(kind.mapping, anchors, path)}, or a list of such"
@@ -167,8 +188,9 @@ def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
 
 def _several(kind: Vector) -> str:
     """A list of a fixed length."""
-    if isinstance(kind.item, Vector):
-        return f"list of {kind.length}, each a {_several(kind.item)}"
+    item = kind.item.pair if isinstance(kind.item, Direction) else kind.item
+    if isinstance(item, Vector):
+        return f"list of {kind.length}, each a {_several(item)}"
     if isinstance(kind.item, Ref):
         return f"names of {kind.length} {_plural(kind.item.kind)}"
     return f"list of {kind.length} {_cell(_simple(kind.item)).replace('number', 'numbers', 1)}"
@@ -193,8 +215,13 @@ def _simple(kind: Kind) -> str:
         return f"{constant}, or {table}" if kind.constant else table
     if isinstance(kind, Version):
         return f"`{kind.number}`"
+    if isinstance(kind, OneOf):
+        return ", ".join(f"`{number}`" for number in kind.numbers)
+    if isinstance(kind, NotYet):
+        return "nothing yet"
     texts: dict[type, str] = {
-        Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file", Anything: "any value",
+        Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
+        MeshFile: "path of an STL or OBJ file", Anything: "any value",
     }  # fmt: skip
     return texts[type(kind)]
 

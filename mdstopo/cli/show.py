@@ -200,7 +200,8 @@ def _say_members(output: Output, view: "ResultView", count: int) -> None:
     groups = np.array(view.lines("members/group"))[design]
     order = np.argsort(-alpha, kind="stable")[:count]
     output.say(f"the {len(order)} largest of {len(alpha)} design variables")
-    rows = [["number", "group", "alpha", "from x", "y", "to x", "y"]]
+    axes = ["x", "y", "z"][1 : p.shape[1]]
+    rows = [["number", "group", "alpha", "from x", *axes, "to x", *axes]]
     rows += [[str(i), str(groups[i]), *(number(v) for v in (alpha[i], *p[i], *q[i]))] for i in order]
     output.table(rows)
 

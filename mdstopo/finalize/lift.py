@@ -57,18 +57,23 @@ class _Lift:
 
     def content(self) -> Plain:
         """The document. Raises CaseError."""
-        old = content_of(self.case)
         if self.case.dimension != 2:
             self.refuse("dimension", "is 3: the case is in space already")
+            self.tell()
+        old = content_of(self.case)
         new: Plain = {"format": old.pop("format"), "dimension": 3}
         for key, value in old.items():
             if key != "dimension" and value is not None:
                 new[key] = self.sections().get(key, _as_it_is)(value, key)
+        self.tell()
+        return new
+
+    def tell(self) -> None:
+        """Raise CaseError where anything is refused."""
         if self.refused:
             marks = self.case.marks
             mistakes = [marks.mistake(path, f"{words}: it cannot be lifted") for path, words in self.refused]
             raise CaseError(mistakes, str(self.case.path or "<text>"))
-        return new
 
     def sections(self) -> dict[str, Callable[[Any, str], Any]]:
         """What becomes of the value of a key; of others nothing does."""
@@ -122,7 +127,7 @@ class _Lift:
             return [*pair, 0]
         return _plain(self.plane[:, :2] @ np.array(pair, dtype=np.float64))
 
-    def normal(self, size: float = 1.0, frame: str = "global") -> list[float]:
+    def normal(self, size: float = 1, frame: str = "global") -> list[float]:
         """A vector along the normal."""
         if frame == "body" or not self.is_tilted:
             return [0, 0, size]

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import Result
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -16,6 +14,7 @@ from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import load_case, read_case
 from mdstopo.case.rotations import about_axis
+from mdstopo.cli.group import run_group
 from mdstopo.finalize.lift import lifted
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -160,7 +159,7 @@ def test_cases_of_the_project_are_lifted(name: str) -> None:
         (
             "points:\n",
             "motions: [{body: a, angle: {velocity: 3}}]\npoints:\n",
-            "x.yaml:13:21: motions[0].angle: prescribed rotations are not in space yet: it cannot be lifted",
+            "x.yaml:13:28: motions[0].angle: prescribed rotations are not in space yet: it cannot be lifted",
         ),
         (
             "points:\n",
@@ -195,21 +194,21 @@ def test_what_has_no_component_in_a_tilted_plane_is_refused() -> None:
     ]
 
 
-def test_the_command_writes_or_prints(run: Callable[..., Result], tmp_path: Path) -> None:
-    (tmp_path / "p.yaml").write_text(PLANAR)
-    printed = run("lift", str(tmp_path / "p.yaml"), "--tilt", "1", "0", "0", "0.5")
-    assert printed.exit_code == 0
-    assert read_case(printed.stdout).dimension == 3
-    out = tmp_path / "new" / "s.yaml"
-    done = run("lift", str(tmp_path / "p.yaml"), "--out", str(out))
-    assert done.stdout.splitlines() == [str(out), f"  mdstopo check {out}"]
+def test_the_command_writes_or_prints(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    planar, out = tmp_path / "p.yaml", tmp_path / "new" / "s.yaml"
+    planar.write_text(PLANAR)
+    assert run_group(["lift", str(planar), "--tilt", "1", "0", "0", "0.5"]) == 0
+    assert read_case(capsys.readouterr().out).dimension == 3
+    assert run_group(["lift", str(planar), "--out", str(out)]) == 0
+    assert capsys.readouterr().out.splitlines() == [str(out), f"  mdstopo check {out}"]
     assert load_case(out).dimension == 3
-    again = run("lift", str(tmp_path / "p.yaml"), "--out", str(out))
-    assert again.exit_code == 2
-    assert f"{out} exists already; it is left as it is" in again.stderr
-    assert run("lift", str(out)).exit_code == 2
-    assert "it cannot be lifted" in run("lift", str(out)).stderr
-    for wrong in (("0", "0", "0", "1"), ("nan", "0", "1", "1")):
-        refused = run("lift", str(tmp_path / "p.yaml"), "--tilt", *wrong)
-        assert refused.exit_code == 2
-        assert "--tilt" in refused.stderr
+    assert run_group(["lift", str(planar), "--out", str(out)]) == 2
+    assert f"{out} exists already; it is left as it is" in capsys.readouterr().err
+    assert run_group(["lift", str(planar), "--out", str(planar), "--overwrite"]) == 2
+    assert planar.read_text() == PLANAR
+    capsys.readouterr()
+    assert run_group(["lift", str(out)]) == 2
+    assert "is 3: the case is in space already: it cannot be lifted" in capsys.readouterr().err
+    for wrong in (["0", "0", "0", "1"], ["nan", "0", "1", "1"]):
+        assert run_group(["lift", str(planar), "--tilt", *wrong]) == 2
+        assert "--tilt" in capsys.readouterr().err

@@ -150,14 +150,13 @@ class SpatialDistanceJoint(SpatialJoint):
     length: float
 
     @classmethod
-    def own_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
+    def further_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
         """The length, that of the start; none is a mistake."""
         length = math.hypot(*(np.array(stated.second) - np.array(stated.first)).tolist())
         if not length > 0.0:
             reading.mistake(inside(stated.fields.path, "at"), "the two points coincide; a link needs a length")
             return None
-        axes = super(SpatialDistanceJoint, cls).own_values(stated, reading)
-        return None if axes is None else {**axes, "length": length}
+        return {"length": length}
 
 
 #: the joints in space by their word; their codes in kernels follow this order

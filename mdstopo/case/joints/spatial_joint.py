@@ -42,15 +42,21 @@ class SpatialJoint(Joint):
 
     @classmethod
     def own_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
-        """The axes on both bodies."""
+        """The axes on both bodies, and what a subclass adds."""
         both = _directions(cls.axis_key, stated, reading) if cls.axis_key else None
         if cls.axis_key and both is None:
             return None
-        triads = cls.triads(both, stated, reading)
-        if triads is None:
+        triads, further = cls.triads(both, stated, reading), cls.further_values(stated, reading)
+        if triads is None or further is None:
             return None
         first, second = (triad @ body.rotation for triad, body in zip(triads, stated.bodies, strict=True))
-        return {"axes_first": first, "axes_second": second}
+        return {"axes_first": first, "axes_second": second, **further}
+
+    @classmethod
+    def further_values(cls, stated: Stated, reading: Reading) -> dict[str, Any] | None:
+        """Values of the fields that a subclass adds; None where something is a mistake, which is noted."""
+        del stated, reading
+        return {}
 
     @classmethod
     def triads(
