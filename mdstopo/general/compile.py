@@ -324,8 +324,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
         over_time in ("mean", "rms", "integral") and kind_of(response).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
     )
-    gyroscopic = case.dimension > 2  # moments of inertia turn with the bodies
-    return forces or adds_damping(case) or bushed or looks or gyroscopic or bool(case.joints) or bool(case.contacts)
+    return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
 
 
 def _skipped(case: Case, load_case: LoadCase, dimension: Dimension, damped: bool) -> tuple[str, ...]:
