@@ -390,7 +390,8 @@ def accelerations_vjp(model, workspace, k, c, turn, z, y, bar_q, bar_v):
     Constant:
       model: the compiled scene.
       workspace: the workspace, with G_q and G_v.
-      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, `load_slopes`): slopes of the turning loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance.
+      turn (n, `load_slopes`): slopes of the loads by turns and turning rates.
       z (n,), y (n_row,): adjoint variables of the equations of motion (virtual displacements, driven parts 0) and of
         the joints' rows.
     Out:
@@ -520,7 +521,8 @@ def accelerations_jvp(model, workspace, k, c, turn, dq, dv, force, row):
     Constant:
       model: the compiled scene.
       workspace: the workspace, with G_q and G_v.
-      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance. turn (n, `load_slopes`): slopes of the turning loads.
+      k, c (n_pair, 2 D, 2 D): stiffness and damping of the balance.
+      turn (n, `load_slopes`): slopes of the loads by turns and turning rates.
       dq, dv (n,): changes of coordinates and velocities.
     Out:
       force (n,), row (n_row,): changes of the right side, added to.

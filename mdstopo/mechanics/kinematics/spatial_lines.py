@@ -78,7 +78,7 @@ def line_bias(one, at_one, two, at_two, s, c, e, length, v, a, b):
 def line_rate_slopes(one, at_one, two, at_two, s, c, e, length, v, a, b, row):
     """row (12,) = d(L')/dq at given velocities.
 
-    de . u' = e' . du with e' = (u' - L' e)/L, and d(u') = R (dtheta x (omega x c)), as turning rates are the body's own.
+    de . u' = e' . du with e' = (u' - L' e)/L, and d(u') = R (dtheta x (omega x c)): turning rates are the body's own.
 
     one, at_one, two, at_two, s, c: as of `line_between`. e, length: of it.
     v: velocities, of which those of the bodies begin at a and b.

@@ -331,7 +331,7 @@ def cubic(model, c, h, q0, v0, q1, v1, q, v):
 
     Turns follow the cubic p of the rotation vector from the start: q = q_0 exp(p), omega = J(p) p'.
     """
-    a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
+    a0, b0, a1, b1, _, db0, da1, db1 = hermite(c)
     for body in range(v.shape[0] // FREEDOMS):
         i = COORDINATES * body
         d = FREEDOMS * body
@@ -382,7 +382,7 @@ def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q
 @kernel
 def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
     """The change of a cubic; see `kinematics_interface.cubic_jvp`."""
-    a0, b0, a1, b1, da0, db0, da1, db1 = hermite(c)
+    a0, b0, a1, b1, _, db0, da1, db1 = hermite(c)
     for body in range(dq.shape[0] // FREEDOMS):
         i = COORDINATES * body
         d = FREEDOMS * body

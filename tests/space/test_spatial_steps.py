@@ -1,0 +1,162 @@
+"""Steps of bodies in space: the order of the method, and derivatives of a step and of the cubic between two states."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from mdstopo.integrators.runge_kutta_tables import GENERAL, STAGES, runge_kutta_tables
+from mdstopo.mechanics.kinematics import rotations
+from mdstopo.mechanics.kinematics.spatial import SPATIAL
+
+from .in_python import KERNELS, by_numbers, by_q, in_python, same
+
+__all__ = ["in_python"]
+pytestmark = pytest.mark.usefixtures("in_python")
+TABLE, S, N, N_Q = runge_kutta_tables()[GENERAL], STAGES[GENERAL], 12, 14
+RANDOM = np.random.default_rng(1)
+#: a made-up balance: accelerations as smooth functions of coordinates and velocities
+BY_Q, BY_V = 0.8 * RANDOM.normal(size=(N, N_Q)), 0.4 * RANDOM.normal(size=(N, N))
+START = SPATIAL.retract(np.tile(SPATIAL.at_home, 2), RANDOM.normal(size=N))
+SPEED = RANDOM.normal(size=N)
+
+
+def acceleration(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return 1.5 * np.sin(BY_Q @ q) + BY_V @ v
+
+
+def step(q0: np.ndarray, v0: np.ndarray, h: float) -> tuple[np.ndarray, ...]:
+    q, (v, a, slopes) = np.zeros((S, N_Q)), np.zeros((3, S, N))
+    for i in range(S):
+        KERNELS.stage_state(None, TABLE, h, i, q0, v0, q, v, a, slopes)
+        a[i] = acceleration(q[i], v[i])
+    end_q, end_v = np.zeros(N_Q), np.zeros(N)
+    KERNELS.end_state(None, TABLE, S, h, q0, v0, q, v, a, slopes, end_q, end_v)
+    return end_q, end_v, q, v
+
+
+def test_steps_are_of_the_order_of_their_method() -> None:
+    def end(count: int) -> tuple[np.ndarray, np.ndarray]:
+        q, v = START, SPEED
+        for _ in range(count):
+            q, v, *_ = step(q, v, 1.0 / count)
+        return q, v
+
+    exact = end(32)
+    errors = []
+    for count in (2, 4, 8):
+        q, v = end(count)
+        errors.append(max(np.abs(SPATIAL.difference(q, exact[0])).max(), np.abs(v - exact[1]).max()))
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders.min() > 7.0
+
+
+def test_a_body_that_turns_evenly_is_followed_exactly() -> None:
+    q, (v, a, slopes) = np.zeros((S, 7)), np.zeros((3, S, 6))
+    start, speed = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([1.0, 2.0, 3.0, 0.7, -0.5, 0.3])
+    for i in range(S):
+        KERNELS.stage_state(None, TABLE, 1.0, i, start, speed, q, v, a, slopes)
+    end_q, end_v = np.zeros(7), np.zeros(6)
+    KERNELS.end_state(None, TABLE, S, 1.0, start, speed, q, v, a, slopes, end_q, end_v)
+    same(end_q[3:], np.roll(Rotation.from_rotvec(speed[3:]).as_quat(), 1), 3e-15)
+
+
+def test_derivatives_of_a_step_both_ways() -> None:
+    h = 0.4
+    end_q, _, q, v = step(START, SPEED, h)
+    slopes = [by_q(lambda x, i=i: acceleration(x, v[i]), q[i], N) for i in range(S)]
+    random = np.random.default_rng(2)
+    dq, dv, bar_q, bar_v = random.normal(size=(4, N))
+    changes = np.zeros((S, 3, N))
+    for i in range(S):
+        KERNELS.stage_jvp(None, TABLE, h, i, q, v, dq, dv, changes)
+        changes[i, 2] = slopes[i] @ changes[i, 0] + BY_V @ changes[i, 1]
+    end_dq, end_dv = dq.copy(), dv.copy()
+    KERNELS.end_jvp(None, TABLE, S, h, q, v, changes, end_dq, end_dv)
+
+    def moved(e: np.ndarray) -> np.ndarray:
+        there = step(SPATIAL.retract(START, e[0] * dq), SPEED + e[0] * dv, h)
+        return np.concatenate([SPATIAL.difference(there[0], end_q), there[1]])
+
+    same(np.concatenate([end_dq, end_dv]), by_numbers(moved, np.zeros(1))[:, 0])
+    u, g, z = np.zeros((S, N)), np.zeros((S, N)), np.zeros(N)
+    start_q, start_v = bar_q.copy(), bar_v.copy()
+    for j in reversed(range(S)):
+        KERNELS.stage_vjp(None, TABLE, h, j, q, v, start_q, start_v, u, g, z)
+        u[j], g[j] = slopes[j].T @ z, BY_V.T @ z
+    KERNELS.start_vjp(None, TABLE, S, h, q, v, u, g, start_q, start_v)
+    assert start_q @ dq + start_v @ dv == pytest.approx(bar_q @ end_dq + bar_v @ end_dv, rel=1e-12)
+
+
+def test_derivatives_of_the_cubic_between_two_states() -> None:
+    c, h = 0.3, 0.37
+    random = np.random.default_rng(3)
+    ends = START, SPEED, SPATIAL.retract(START, 0.3 * random.normal(size=N)), random.normal(size=N)
+
+    def cubic(*given: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        q, v = np.empty(N_Q), np.empty(N)
+        KERNELS.cubic(None, c, h, *given, q, v)
+        return q, v
+
+    here, _ = cubic(*ends)
+    blocks = []
+    for k in range(4):
+
+        def at(x: np.ndarray, k: int = k) -> np.ndarray:
+            q, v = cubic(*ends[:k], x, *ends[k + 1 :])
+            return np.concatenate([SPATIAL.difference(q, here), v])
+
+        blocks.append(by_numbers(at, ends[k]) if k % 2 else by_q(at, ends[k], N))
+    bar_q, bar_v = random.normal(size=(2, N))
+    bars = np.empty((4, N))
+    KERNELS.cubic_vjp(None, c, h, *ends, bar_q, bar_v, *bars)
+    for block, bar in zip(blocks, bars, strict=True):
+        same(bar, block.T @ np.concatenate([bar_q, bar_v]), 1e-8)
+    changes = random.normal(size=(4, N))
+    dq, dv = changes[0].copy(), changes[1].copy()
+    KERNELS.cubic_jvp(None, c, h, *ends, dq, dv, changes[2], changes[3])
+    expected = sum(block @ change for block, change in zip(blocks, changes, strict=True))
+    same(np.concatenate([dq, dv]), expected, 1e-8)
+
+
+def test_a_quintic_has_the_states_and_accelerations_of_both_ends() -> None:
+    random = np.random.default_rng(6)
+    q1 = SPATIAL.retract(START, 0.3 * random.normal(size=N))
+    v1, a0, a1 = random.normal(size=(3, N))
+
+    def at(c: float) -> tuple[np.ndarray, np.ndarray]:
+        q, v = np.empty(N_Q), np.empty(N)
+        KERNELS.quintic(None, c, 0.4, START, SPEED, a0, q1, v1, a1, q, v)
+        return q, v
+
+    for c, q, v, a in ((0.0, START, SPEED, a0), (1.0, q1, v1, a1)):
+        same(SPATIAL.difference(at(c)[0], q), np.zeros(N), 1e-14)
+        same(at(c)[1], v, 1e-14)
+        same(by_numbers(lambda x, c=c: at(c + x[0])[1], np.zeros(1))[:, 0] / 0.4, a, 1e-8)
+    middle = by_numbers(lambda x: SPATIAL.difference(at(0.4 + x[0])[0], at(0.4)[0]), np.zeros(1))[:, 0] / 0.4
+    same(middle, at(0.4)[1], 1e-8)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-3, 0.1, 0.316, 0.317, 1.0, 3.0])
+def test_rotation_vectors_and_their_rates(size: float) -> None:
+    random = np.random.default_rng(7)
+    t, u, w, bar = random.normal(size=(4, 3))
+    t = tuple(size * t / np.linalg.norm(t))
+    quaternion = rotations.exponential(t)
+    same(quaternion, np.roll(Rotation.from_rotvec(t).as_quat(), 1), 3e-16)
+    same(rotations.logarithm(quaternion), t, 4e-16)
+    same(rotations.turn_rate(t, rotations.vector_rate(t, u)), u, 1e-14)
+    turned = by_numbers(lambda x: _between(t, tuple(np.array(t) + x[0] * u)), np.zeros(1))[:, 0]
+    same(rotations.turn_rate(t, u), turned)
+    for rate, change, back in (
+        (rotations.turn_rate, rotations.turn_rate_jvp, rotations.turn_rate_vjp),
+        (rotations.vector_rate, rotations.vector_rate_jvp, rotations.vector_rate_vjp),
+    ):
+        slopes = by_numbers(lambda x, rate=rate: rate(tuple(x), w), np.array(t))
+        same(change(t, w, u), slopes @ u, 1e-8)
+        same(back(t, w, bar), slopes.T @ bar, 1e-8)
+
+
+def _between(one: tuple[float, ...], two: tuple[float, ...]) -> np.ndarray:
+    return np.array(rotations.turn_between(rotations.exponential(one), rotations.exponential(two)))
