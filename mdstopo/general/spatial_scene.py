@@ -4,11 +4,12 @@ Arrays have points and axes of a body in its principal axes: there the masses ar
 R_home = R P, with the body's own axes R and the principal ones P among them (`scene.rotations.principal`).
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
+from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints.kernels import FITTED
@@ -164,7 +165,8 @@ class JointRows(NamedTuple):
 def _joint_kernels(joint: type[Joint]) -> JointRows:
     """Rows that put points together have constant slopes by shifts, and such that hold directions have none."""
     code = JOINTS[joint.type]
-    kinds = [row_of_joint.py_func(code, r)[0] for r in range(ROWS_OF[code])]
+    kind_of_row = cast(Kernel, row_of_joint).py_func
+    kinds = [kind_of_row(code, r)[0] for r in range(ROWS_OF[code])]
     shifts = tuple(range(SPATIAL.freedoms - SPATIAL.rotations))
     return JointRows(len(kinds), tuple(shifts if kind in (MEETS, ACROSS) else () for kind in kinds))
 

@@ -1,8 +1,8 @@
 """What joints in space transmit: the norms of their force and moment on the first body, with slopes.
 
-With the pull p = -Phi_q^T lam on the first body, F = p_0..2 is the force (global), and its moment at the joint's point s
-is m = p_3..5 - s x g, g = R_A^T F, in the body's axes, in which it is as long as in global ones. With e = m / |m|, and
-u = e x s,
+With the pull p = -Phi_q^T lam on the first body, F = p_0..2 is the force (global), and its moment at the joint's point
+s is m = p_3..5 - s x g, g = R_A^T F, in the body's axes, in which it is as long as in global ones. With e = m / |m|,
+and u = e x s,
 
     d|m| = e . dp_3..5 - (R_A u) . dF - (u x g) . dtheta_A,      dp = -d(Phi_q^T lam)/dq dq - Phi_q^T dlam
 """
