@@ -112,7 +112,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     steady = [dimension.joint_kernels(type(each)).steady for each in case.joints]
     layout = arrange(case, joint, joint_par, steady, free, mass, home, pair, bodies)
     _refuse_redundant(case, load_case, layout.redundant)
-    damped = _damped(case, responses, reductions)
+    damped = bodies.turns_couple or _damped(case, responses, reductions)
     model = GeneralModel(
         free=free, mass=mass, q0=np.tile(bodies.at_home, len(names)), v0=v0, home=home, pair=pair, reach=reach,
         **members, times=times, **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven,
@@ -324,8 +324,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
         over_time in ("mean", "rms", "integral") and kind_of(response).depends_on_rate
         for response, over_time in zip(responses, reductions, strict=True)
     )
-    gyroscopic = case.dimension > 2  # moments of inertia turn with the bodies
-    return forces or adds_damping(case) or bushed or looks or gyroscopic or bool(case.joints) or bool(case.contacts)
+    return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
 
 
 def _skipped(case: Case, load_case: LoadCase, dimension: Dimension, damped: bool) -> tuple[str, ...]:

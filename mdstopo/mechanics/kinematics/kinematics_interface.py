@@ -54,6 +54,11 @@ class Kinematics:
     kernels: Mapping[str, Kernel]
     entries: str
 
+    @property
+    def turns_couple(self) -> bool:
+        """Whether turning rates of a body act on each other: gyroscopic moments, which depend on velocity."""
+        return self.load_slopes > self.rotations
+
     def of_python(self, name: str) -> Callable[..., Any]:
         """A compiled function that Python calls, `slopes_of` or `reactions`."""
         found: Callable[..., Any] = getattr(importlib.import_module(self.entries), name)
