@@ -165,7 +165,8 @@ class JointRows(NamedTuple):
 def _joint_kernels(joint: type[Joint]) -> JointRows:
     """Rows that put points together have constant slopes by shifts, and such that hold directions have none."""
     code = JOINTS[joint.type]
-    kinds = [cast(Kernel, row_of_joint).py_func(code, r)[0] for r in range(ROWS_OF[code])]
+    kind_of_row = cast(Kernel, row_of_joint).py_func
+    kinds = [kind_of_row(code, r)[0] for r in range(ROWS_OF[code])]
     shifts = tuple(range(SPATIAL.freedoms - SPATIAL.rotations))
     return JointRows(len(kinds), tuple(shifts if kind in (MEETS, ACROSS) else () for kind in kinds))
 

@@ -53,7 +53,10 @@ Force = Annotated[
     FloatArray, Field("n_seg, n, 2", "generalised load at the segment's start, its slope; with gravity (N, N m)")
 ]
 LoadBody = Annotated[IndexArray, Field("n_load", "of loads whose effect depends on a body's rotation: the body")]
-LoadFollows = Annotated[IndexArray, Field("n_load", "1 where the load turns with it, else 0")]
+LoadFollows = Annotated[
+    IndexArray,
+    Field("n_load", "1 where the load turns with it, else 0; in space 2 where its moment is an angular acceleration"),
+]
 LoadArm = Annotated[FloatArray, Field("n_load, n_arm", "point of attack in the body's frame (m)")]
 LoadForce = Annotated[
     FloatArray,
