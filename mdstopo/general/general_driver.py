@@ -171,7 +171,7 @@ class GeneralDriver:
                     (joint, f"the start velocities tear {describe(joint)} apart at {rate:.3g} (m/s or rad/s)")
                 )
         if mistakes:
-            hint = "" if move else "; `solver: {assemble: true}` moves the start to the nearest that fits"
+            hint = "" if move or self.case.dimension == 3 else "; `solver: {assemble: true}` moves the start to the nearest that fits"
             raise CaseError(
                 [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
                 str(self.case.path or self.case.name),
