@@ -171,7 +171,8 @@ class GeneralDriver:
                     (joint, f"the start velocities tear {describe(joint)} apart at {rate:.3g} (m/s or rad/s)")
                 )
         if mistakes:
-            hint = "" if move or self.case.dimension == 3 else "; `solver: {assemble: true}` moves the start to the nearest that fits"
+            can_move = not move and self.case.dimension == 2
+            hint = "; `solver: {assemble: true}` moves the start to the nearest that fits" if can_move else ""
             raise CaseError(
                 [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
                 str(self.case.path or self.case.name),

@@ -446,12 +446,19 @@ def turning_rate(model, rel, p):
 
 
 def add_loads(model, segment, t, q, v, f):
-    """f (n,) += loads, and what inertia has of forces, in a segment at time t, at q (n_q,) and velocities v (n,)."""
+    """Add the applied loads, and forces that inertia has at given velocities, to f (n,).
+
+    model, segment, t: the compiled scene, a segment of its times, and the time (s). q (n_q,), v (n,): the state.
+    """
     raise NotImplementedError
 
 
 def load_tangent(model, segment, t, q, v, turn):
-    """turn (n, `load_slopes`): slopes of what `add_loads` adds, by the body's own turn and its turning rate."""
+    """Slopes of what `add_loads` adds.
+
+    model, segment, t, q, v: as of it.
+    turn (n, `load_slopes`): out, by the turn of the body that a freedom belongs to, then by its turning rate.
+    """
     raise NotImplementedError
 
 

@@ -92,13 +92,13 @@ def relative_pose(model, q, v, rel):
 
 @part
 def contact_rows(model, j, q, v, rows, rates):
-    """Not called: a case in space has no contacts yet (`case.reader`)."""
+    """Not called: a case in space has no contacts yet; see `kinematics_interface.contact_rows`."""
     return 0.0, 0.0
 
 
 @part
 def add_contact_curvature(model, j, q, rows, n, t, k):
-    """Not called, as `contact_rows`."""
+    """Not called, as `contact_rows`; see `kinematics_interface.add_contact_curvature`."""
 
 
 _KERNELS = (

@@ -442,12 +442,16 @@ def joint_is_point(model, j):
 
 @part
 def point_joint_vjp(model, j, w, wd, wdd, lam, z, y, bar_q, bar_v):
-    """Not called: `joint_is_point` is never true."""
+    """Not called: `joint_is_point` is never true; see `kinematics_interface.point_joint_vjp`."""
 
 
 @entry
 def slopes_of(joint, joint_par, home, q, phi, jac):
-    """Phi and Phi_q of joints at one configuration; see `planar_entry.slopes_of`."""
+    """Phi and Phi_q of joints at one configuration.
+
+    joint (n_joint, 5), joint_par (n_joint, WIDTH), home (n_body, HOME): as in `GeneralModel`. q (n_q,): coordinates.
+    phi (n_joint, rows), jac (n_joint, rows, 2 D): are written, as many rows as each joint has.
+    """
     w = np.empty(PLACES)
     for j in range(joint.shape[0]):
         _place_alone(home, joint[j, 1], joint[j, 2], q, w)

@@ -40,7 +40,10 @@ def line_between(one, at_one, two, at_two, s, c, apart):
 
 @part
 def line_speed(one, at_one, two, at_two, s, c, v, a, b):
-    """u' (m/s), from velocities v of which those of the bodies begin at a and b; other arguments as `line_between`."""
+    """u' (m/s).
+
+    one, at_one, two, at_two, s, c: as of `line_between`. v: velocities, of which those of the bodies begin at a and b.
+    """
     first = plus(vector_at(v, a), turned(one, at_one, cross(vector_at(v, a + 3), s)))
     second = plus(vector_at(v, b), turned(two, at_two, cross(vector_at(v, b + 3), c)))
     return minus(second, first)
@@ -54,7 +57,10 @@ def centripetal(s, omega):
 
 @part
 def line_row(one, at_one, two, at_two, s, c, e, row, first):
-    """row[first : first + 12] = dL/dq."""
+    """row[first : first + 12] = dL/dq.
+
+    one, at_one, two, at_two, s, c: as of `line_between`, which gives e.
+    """
     put(row, first, times(-1.0, e))
     put(row, first + 3, cross(turned_back(one, at_one, e), s))
     put(row, first + 6, e)
@@ -63,7 +69,11 @@ def line_row(one, at_one, two, at_two, s, c, e, row, first):
 
 @part
 def line_bias(one, at_one, two, at_two, s, c, e, length, v, a, b):
-    """L'' without accelerations (m/s^2): what turning evenly, and the line's own turning, give."""
+    """L'' without accelerations (m/s^2): what turning evenly, and the line's own turning, give.
+
+    one, at_one, two, at_two, s, c: as of `line_between`, which gives e and the length.
+    v: velocities, of which those of the bodies begin at a and b.
+    """
     speed = line_speed(one, at_one, two, at_two, s, c, v, a, b)
     push = minus(
         turned(two, at_two, centripetal(c, vector_at(v, b + 3))),

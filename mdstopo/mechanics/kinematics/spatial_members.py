@@ -296,7 +296,9 @@ def turn_of(model, body, q):
 
 @part
 def line_of(model, p, i, turn_one, turn_two, q):
-    """The line along member i of pair p as its bodies' attitudes (ATTITUDE,) place it.
+    """The line along member i of pair p of a model.
+
+    turn_one, turn_two (ATTITUDE,): attitudes of its bodies. q (n_q,): coordinates.
 
     Returns its direction, its length, and the elongation (m).
     """

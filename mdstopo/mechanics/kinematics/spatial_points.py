@@ -153,7 +153,10 @@ def point_motion(model, order, component, at, b, r, q, v, a, bars):
 
 @part
 def _add_turn_slopes(one, two, m, b, r, bars):
-    """bars (n_freedom,) += slopes of m . dphi, dphi = S dtheta_b - dtheta_r; bodies begin at b and r."""
+    """bars (n_freedom,) += slopes of m . dphi, dphi = S dtheta_b - dtheta_r; bodies begin at b and r.
+
+    one, two (ATTITUDE,): attitudes of r and b.
+    """
     add(bars, b + 3, turned_back(two, TURN, turned(one, TURN, m)))
     add(bars, r + 3, times(-1.0, m))
 

@@ -136,7 +136,7 @@ def add_gross_force(model, rel, p, force, out):
 
 @part
 def rounding_of_pairs(model, inverse, rel, v, load, stiffness, strain, noise):
-    """See `kinematics_interface.rounding_of_pairs` and `planar_scales.rounding_of_pairs`."""
+    """As `planar_scales.rounding_of_pairs`; see `kinematics_interface.rounding_of_pairs`."""
     span = model.times[model.times.shape[0] - 1] - model.times[0]
     for p in range(model.pair.shape[0]):
         arm = arm_of(model, rel, p)

@@ -69,7 +69,7 @@ def difference(model, after, before, out):
 
 @kernel
 def retract_vjp(model, q, moved, bar, bar_q, bar_shift):
-    """The cotangents of both: exp(-t) takes a turn before it along, and J(t) gives its own change."""
+    """exp(-t) takes a turn before it along, and J(t) gives its own change; see `kinematics_interface.retract_vjp`."""
     for body in range(bar.shape[0] // FREEDOMS):
         i = COORDINATES * body
         d = FREEDOMS * body
@@ -160,7 +160,10 @@ def end_state(model, table, s, h, q0, v0, q, v, a, slopes, q_end, v_end):
 
 @part
 def _end_turn(table, s, h, q, v, c, d):
-    """The rotation vector of the end of a step, from its stages q (s, n_q), v (s, n); c, d: the body's places."""
+    """The rotation vector of the end of a step.
+
+    table, s, h, q (s, n_q), v (s, n): as of `end_state`. c, d: where the body begins in coordinates and in velocities.
+    """
     turn = (0.0, 0.0, 0.0)
     start = quaternion_at(q[0], c + 3)
     for j in range(s):
@@ -171,7 +174,11 @@ def _end_turn(table, s, h, q, v, c, d):
 
 @part
 def _slope_bar(table, s, h, i, u, d, end_bar):
-    """bar k_i from bar t of the later stages, which stand in u, and that of the end."""
+    """bar k_i of a stage.
+
+    table, s, h, i: the method's table, number of its stages, length of the step, the stage.
+    u (s, n): of the later stages bar t, in the places of their turns. d: where the body begins. end_bar: bar t_end.
+    """
     bar = times(h * table[VECTORS, END_RATE, i], end_bar)
     for m in range(i + 1, s):
         w = h * table[BY_RATE, m, i]
@@ -210,7 +217,10 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
 
 @part
 def _stage_bars(table, h, i, q, v, end_bar, u, g, c, d):
-    """u, g (s, n) of stage i of the body at c, d: cotangents of its turn and turning rate become bar t, bar omega."""
+    """Cotangents of a turn and a turning rate, in u and g (s, n) of stage i, become bar t and bar omega.
+
+    table, h, q (s, n_q), v (s, n): as of `stage_vjp`. end_bar: bar t_end. c, d: where the body begins.
+    """
     t = turn_between(quaternion_at(q[0], c + 3), quaternion_at(q[i], c + 3))
     bar = _slope_bar(table, u.shape[0], h, i, u, d, end_bar)
     own = plus(turn_rate(times(-1.0, t), vector_at(u[i], d + 3)), vector_rate_vjp(t, vector_at(v[i], d + 3), bar))
@@ -282,7 +292,10 @@ def stage_jvp(model, table, h, i, q, v, dq, dv, changes):
 
 @part
 def _slope_change(start, q, v, dq, change, c, d):
-    """The change of k = J(t)^-1 omega of a stage, from changes (3, n) of its state and dq (n,) of the start's.
+    """The change of k = J(t)^-1 omega of a stage.
+
+    start: the quaternion of the step's start. q (n_q,), v (n,), change (3, n): the stage's state, and its change.
+    dq (n,): change of the start's coordinates. c, d: where the body begins in coordinates and in velocities.
 
     The change of its turn is that of t, by J(t), and the start's, seen behind the turn: what J(t)^-1 makes of the rest.
     """
@@ -320,7 +333,10 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
 
 @part
 def _ends(q0, q1, v0, v1, i, d):
-    """The rotation vector across a step and its rates at both ends, of the body at i of coordinates and d of others."""
+    """The rotation vector across a step and its rates at both ends.
+
+    q0, q1 (n_q,), v0, v1 (n,): both ends. i, d: where the body begins in coordinates and in velocities.
+    """
     way = turn_between(quaternion_at(q0, i + 3), quaternion_at(q1, i + 3))
     return way, vector_at(v0, d + 3), vector_rate(way, vector_at(v1, d + 3))
 
