@@ -7,6 +7,7 @@ settings (DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..._TLS__CLIENT__CERT, ..._TLS__
 The scheduler is Dask's, and so is what happens to pieces whose worker dies: they are given to another one.
 """
 
+import asyncio
 import logging
 import queue
 import threading
@@ -38,6 +39,32 @@ def _version() -> str:
     return str(found)
 
 
+def _is_no_lost_connection(record: logging.LogRecord) -> bool:
+    """Whether what Dask has to say is something else than that the scheduler does not answer any more.
+
+    What ends its attempts to connect again is an error that was raised from a lost connection, or the client's end.
+    """
+    from distributed.comm.core import CommClosedError
+
+    if str(record.msg).startswith("Failed to reconnect to scheduler"):
+        return False
+    error = record.exc_info[1] if record.exc_info else None
+    while error is not None:
+        if isinstance(error, CommClosedError | ConnectionError | TimeoutError | asyncio.CancelledError):
+            return False
+        error = error.__cause__ or error.__context__
+    return True
+
+
+def tell_lost_connections_in_our_words() -> None:
+    """Leave out what Dask's client logs of a lost scheduler, with tracebacks; all else it goes on to tell.
+
+    `distributed.batched` logs it only where something was being sent.
+    """
+    for name in ("distributed.client", "distributed.batched"):
+        logging.getLogger(name).addFilter(_is_no_lost_connection)
+
+
 class Cluster:
     """Workers of a running Dask cluster. They need this version of mdstopo."""
 
@@ -48,7 +75,7 @@ class Cluster:
             from distributed import Client
         except ImportError as error:
             raise StoreError("--cluster needs Dask: pip install 'mdstopo[cluster]'") from error
-        logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # a lost scheduler is told in our words
+        tell_lost_connections_in_our_words()
         self._stop = stop
         self._address = address
         if "://" not in address or ":" not in address.split("://")[1]:

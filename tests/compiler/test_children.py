@@ -1,4 +1,4 @@
-"""Processes that compile end with the one that started them, and take no modules from the current folder."""
+"""Processes that are started here end with the one that started them, and take modules from where they should."""
 
 import os
 import subprocess
@@ -12,6 +12,7 @@ import pytest
 from mdstopo import children
 from mdstopo.children import command
 
+PLACE = Path(children.__file__).parent.parent
 PARENT = textwrap.dedent(
     """
     import subprocess, sys, time
@@ -71,8 +72,23 @@ def test_modules_of_the_current_folder_are_not_taken(tmp_path: Path, monkeypatch
     assert "no such file" in done.stderr
 
 
+def test_a_child_has_the_package_of_its_parent_where_another_copy_is_installed(tmp_path: Path) -> None:
+    """A checkout is found through the first entry of sys.path, of which a child knows nothing."""
+    copy = tmp_path / "checkout" / "mdstopo"
+    copy.mkdir(parents=True)
+    (copy / "__init__.py").touch()
+    (copy / "children.py").write_bytes(Path(children.__file__).read_bytes())
+    (copy / "whose.py").write_text("import sys; print(__name__, __file__, *sys.argv[1:])")
+    program = (
+        f"import subprocess, sys; sys.path.insert(0, {str(copy.parent)!r}); "
+        "from mdstopo.children import command; subprocess.run(command('mdstopo.whose', 'a', 'b'), check=True)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["__main__", str(copy / "whose.py"), "a", "b"]
+
+
 def test_where_the_package_is_in_the_current_folder_it_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(Path(children.__file__).parent.parent)
+    monkeypatch.chdir(PLACE)
     assert "-P" not in command("mdstopo")
 
 
@@ -80,7 +96,7 @@ def test_a_folder_that_is_gone_is_no_hindrance(tmp_path: Path, monkeypatch: pyte
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     os.rmdir(tmp_path / "gone")
-    assert command("mdstopo.compile_responses", "gauss")[-3:] == ["-m", "mdstopo.compile_responses", "gauss"]
+    assert command("mdstopo.compile_responses", "gauss")[-3:] == [str(PLACE), "mdstopo.compile_responses", "gauss"]
 
 
 def test_vectors_are_those_of_the_processor_that_numba_compiles_for(tmp_path: Path) -> None:

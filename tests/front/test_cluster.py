@@ -1,6 +1,8 @@
 """A real Dask cluster on loopback, one of whose workers dies in the middle."""
 
+import asyncio
 import json
+import logging
 import subprocess
 import sys
 import time
@@ -9,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from mdstopo.cli.group import run_group
+from mdstopo.front.cluster import tell_lost_connections_in_our_words
 from tests.front.support import CASE
 from tests.front.test_fronts import assert_equal, contents
 
@@ -95,3 +98,70 @@ def test_a_scheduler_that_dies_leaves_a_front_that_goes_on_without_it(cluster):
     assert f"the Dask scheduler at {address} is gone" in said
     assert "Traceback" not in said
     assert subprocess.run([*command, "--resume", "--quiet"], check=False).returncode == 0
+
+
+class BrokenComm:
+    """A connection on which nothing can be sent."""
+
+    def __init__(self, error):
+        self.error = error
+
+    async def write(self, *payload, **more):
+        raise self.error
+
+    def closed(self):
+        return False
+
+    def abort(self):
+        pass
+
+
+class Noted(logging.Handler):
+    def __init__(self):
+        super().__init__()
+        self.records = []
+
+    def emit(self, record):
+        self.records.append(record)
+
+
+@pytest.fixture
+def logged():
+    """What Dask's client logs; its loggers pass nothing on to pytest."""
+    handler = Noted()
+    logger = logging.getLogger("distributed")
+    logger.addHandler(handler)
+    yield handler.records
+    logger.removeHandler(handler)
+
+
+def test_a_connection_that_is_lost_while_sending_is_told_once_and_other_errors_as_dask_does(logged):
+    """The scheduler of the test above seldom dies at just that moment."""
+    from distributed.batched import BatchedSend
+    from distributed.comm import CommClosedError
+
+    async def send(error):
+        sender = BatchedSend(interval="1ms")
+        sender.start(BrokenComm(error))
+        sender.send("a task")
+        await sender.stopped.wait()
+
+    tell_lost_connections_in_our_words()
+    asyncio.run(send(CommClosedError("closed")))
+    client = logging.getLogger("distributed.client")
+    client.error("Failed to reconnect to scheduler after %.2f seconds", 10.0)
+    try:
+        raise OSError("cannot connect") from CommClosedError("refused")
+    except OSError as error:
+        client.exception(error)
+    try:
+        raise asyncio.CancelledError
+    except asyncio.CancelledError as error:
+        client.exception(error)
+    assert not logged
+    asyncio.run(send(TypeError("cannot be sent")))
+    try:
+        raise KeyError("callback")
+    except KeyError:
+        client.exception("Error in callback")
+    assert [record.getMessage() for record in logged] == ["Error in batched write", "Error in callback"]

@@ -1,0 +1,26 @@
+"""What holds for all tests."""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import pytest
+
+_WHERE = "import importlib.util as u; found = u.find_spec('mdstopo'); print(found and found.origin or '')"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Refuse to begin where programs that tests start would be those of another checkout."""
+    if hasattr(config, "workerinput"):
+        return  # the process that gives the tests out has asked
+    asked = [sys.executable, "-P", "-c", _WHERE]
+    with tempfile.TemporaryDirectory() as elsewhere:
+        found = subprocess.run(asked, cwd=elsewhere, capture_output=True, text=True, check=True).stdout.strip()
+    own = Path(__file__).parent.parent / "mdstopo" / "__init__.py"
+    if os.path.realpath(found) != os.path.realpath(own):
+        raise pytest.UsageError(
+            f"{sys.executable} has {found or 'no mdstopo'} installed, not {own}: "
+            f"install this checkout (pip install --editable .), or set PYTHONPATH={own.parent.parent}"
+        )
