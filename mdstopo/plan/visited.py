@@ -22,6 +22,8 @@ Place = tuple[int, int]
 #: distance from every point of the front from which a visited design fills a gap, in spacings of an even front; share
 #: of its distance by which it has to be better than each of them in something, lest it lie on the gap's upper side
 GAP, SLIVER = 0.5, 0.1
+#: how far below the line through the front's points a visited design belongs to it however near a point is, in spacings
+DEEP = 0.05
 
 
 @dataclass(frozen=True)
@@ -76,8 +78,10 @@ def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, sp
 
     First those that dominate a point, the best of them first (the least sum of scaled objectives), each in the place of
     all that it dominates. Then those that fill gaps: not dominated, and farther than `GAP` spacings from every point
-    (`_apart`), the farthest first, each a point from then on. Objectives are scaled so that lowest and highest (m,),
-    utopia and maxima, are 0 and 1.
+    (`_apart`), the farthest first, each a point from then on. Then those that are near a point, but farther than `DEEP`
+    spacings below the line through the points (`_depth`): beside a steep end of the front a design may be near the
+    end and still much better in one objective for little of another. The deepest first, each a point from then on.
+    Objectives are scaled so that lowest and highest (m,), utopia and maxima, are 0 and 1.
     """
     front = points[~dominated(points)]
     if not len(front):
@@ -92,15 +96,45 @@ def belonging(points: Floats, table: Floats, lowest: Floats, highest: Floats, sp
             taken.append(k)
             front = np.concatenate([front[~beaten], table[k][None]])
     left = [k for k in left if k not in taken]
-    own = scaled(table[left], lowest, highest)
+    own, placed = scaled(table[left], lowest, highest), scaled(front, lowest, highest)
     apart = np.full(len(left), np.inf)
-    for point in scaled(front, lowest, highest):
+    for point in placed:
         apart = np.minimum(apart, _apart(own, point))
     while len(left) and apart.max() > GAP * spacing:
         k = int(np.argmax(apart))
         taken.append(left[k])
+        placed = np.concatenate([placed, own[k][None]])
         apart = np.minimum(apart, _apart(own, own[k]))
+    while len(left) and (depth := _depth(own, placed)).max() > DEEP * spacing:
+        k = int(np.argmax(depth))
+        taken.append(left.pop(k))
+        placed, own = np.concatenate([placed, own[k][None]]), np.delete(own, k, axis=0)
     return taken
+
+
+def _depth(designs: Floats, points: Floats) -> Floats:
+    """By how much (K,) designs (K, m) lie below the line through points (W, m), the same in every objective; -inf
+    where there is no line: beyond the ends, or where the points do not span a surface.
+
+    Seen along the direction in which all objectives change alike, points that do not dominate each other lie side by
+    side, m - 1 coordinates apart. Over these the sum of the objectives is interpolated linearly between neighbours: of
+    two objectives the line that a picture of the front shows, of more a surface of triangles (Delaunay's).
+    """
+    m = points.shape[1]
+    across, over = points[:, :-1] - points[:, -1:], points.sum(axis=1)
+    own = designs[:, :-1] - designs[:, -1:]
+    if m == 2:
+        order = np.argsort(across[:, 0], kind="stable")
+        line = np.interp(own[:, 0], across[order, 0], over[order], left=-np.inf, right=-np.inf)
+    else:
+        from scipy.interpolate import LinearNDInterpolator
+        from scipy.spatial import QhullError
+
+        try:
+            line = LinearNDInterpolator(across, over, fill_value=-np.inf)(own)
+        except QhullError:
+            return np.full(len(designs), -np.inf)
+    return np.asarray((line - designs.sum(axis=1)) / m)
 
 
 def _apart(designs: Floats, point: Floats) -> Floats:

@@ -3,6 +3,7 @@
 import csv
 import json
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from mdstopo.front.directions import weights_of_first
 from mdstopo.front.run_front import Ask, run_front
 from mdstopo.plan import visited
 from mdstopo.plan.front_measures import dominated, scaled
-from mdstopo.plan.visited import GAP, SLIVER, even_spacing
+from mdstopo.plan.visited import DEEP, GAP, SLIVER, even_spacing
 from mdstopo.status import RunStatus
 from mdstopo.store.result_reader import read_result
 from tests.front.support import CASE
@@ -54,6 +55,36 @@ def test_the_upper_side_of_a_gap_is_left_empty() -> None:
     ends = np.array([[0.0, 1.0], [1.0, 0.0]])
     assert belonging(ends, np.array([[0.97, 0.9]]), spacing=0.1) == []
     assert belonging(ends, np.array([[0.4, 0.7]]), spacing=0.1) == [0]
+
+
+def test_what_lies_below_the_line_belongs_to_the_front_however_near_a_point_is() -> None:
+    """The first, near a steep end, gives up little of one objective for a quarter of the other (as in a mooring's
+    front); the second is above the line, the third hardly below it, the fourth beyond the end."""
+    steep = np.array([[0.0, 1.0], [0.24, 0.24], [1.0, 0.0]])
+    table = np.array([[0.022, 0.74], [0.022, 0.95], [0.17, 0.45], [-0.01, 1.02]])
+    spacing = even_spacing(3, 2)
+    assert np.linalg.norm(steep[0] - table[0]) < GAP * spacing
+    assert belonging(steep, table, spacing) == [0]
+    assert belonging(steep[:, ::-1], table[:, ::-1], spacing) == [0]
+
+
+def test_the_first_one_taken_bends_the_line() -> None:
+    """What lies below the new line by less than a twentieth of a spacing is left out."""
+    ends = np.array([[0.0, 1.0], [1.0, 0.0]])
+    table = np.array([[0.31, 0.45], [0.22, 0.53], [0.44, 0.34]])
+    assert belonging(ends, table, 2.0) == [1]  # the deepest
+    assert belonging(ends, table, 0.9) == [2, 1]  # the third is the farthest from the ends
+
+
+def test_of_three_objectives_what_lies_below_the_triangles_belongs() -> None:
+    corners = np.eye(3)
+    middle = np.full((1, 3), 1 / 3)
+    points = np.concatenate([corners, middle])
+    table = np.array([[0.5, 0.1, 0.1], [0.1, 0.5, 0.3], [0.55, 0.45, 0.1]])
+    assert belonging(points, table, 2.0) == [0]
+    assert belonging(corners[:2], table, 2.0) == []  # no surface
+    line = np.array([[1.0, 0.0, 0.5], [0.5, 0.5, 0.5], [0.0, 1.0, 0.5]])
+    assert belonging(line, table[2:], 2.0) == []  # no surface either
 
 
 def test_a_cloud_of_designs_does_not_flood_the_front() -> None:
@@ -174,7 +205,15 @@ def test_no_visited_design_beats_the_front_or_lies_alone_in_a_gap_of_it(method: 
     ideal, nadir = view.array("pareto/utopia")[0], view.array("pareto/maxima")[0]
     seen = everything_visited(view)
     assert not dominated(np.concatenate([front[~beaten], seen]))[: len(front[~beaten])].any()
+    line = scaled(front[~beaten], ideal, nadir)
+    line = line[np.argsort(line[:, 0])]
     for values in seen[~dominated(seen)]:
+        below = scaled(values[None], ideal, nadir)[0]
+        for (x, y), (dx, dy) in ((left, right - left) for left, right in pairwise(line)):
+            # how far along both axes at once the design would have to move to meet the line, and where it would
+            share = (below[0] - below[1] - x + y) / (dx - dy)
+            deep = ((y - below[1]) * dx - (x - below[0]) * dy) / (dx - dy)
+            assert not 0.0 < share < 1.0 or deep <= DEEP * even_spacing(5, 2) * (1.0 + 1e-9)
         way = scaled(front, ideal, nadir) - scaled(values[None], ideal, nadir)
         apart = np.linalg.norm(way, axis=1)
         sliver = way.max(axis=1) < SLIVER * apart
