@@ -185,7 +185,7 @@ class Scene:
             if body < 0:
                 continue
             wrench = sum(pulls[i] * rows[i, 6 * body : 6 * body + 6] for i in mine)
-            spot = next((self.rows[i][2] for i in mine if self.rows[i][0] != "square"))
+            spot = next(self.rows[i][2] for i in mine if self.rows[i][0] != "square")
             wrench[3:] -= np.cross(turns[body] @ spot, wrench[:3])
             wrenches[number] = wrench
         return (free + yields @ pulls).reshape(n, 6), wrenches

@@ -62,7 +62,8 @@ def applied(scene: Scene, turns):
     moment = np.cross(arm, follower) + turns[0] @ [0.1, -0.2, 0.3] + inertia @ [1.0, 2.0, -3.0]
     push = np.array([3.0, -2.0, 1.0])
     arm = turns[1] @ scene.point(1, [1.2, 0.7, 0.2])
-    return np.array([[*first, *moment], [*push, *(np.cross(arm, push) + [0.3, 0.2, -0.5])]])
+    couple = np.cross(arm, push) + np.array([0.3, 0.2, -0.5])
+    return np.array([[*first, *moment], [*push, *couple]])
 
 
 def with_fitting_velocities(content, seed: int) -> Scene:
