@@ -25,6 +25,7 @@ import numpy as np
 
 import mdstopo
 from benchmarks.hunt_model import Model
+from benchmarks.hunt_reductions import SMALLEST
 from benchmarks.hunt_scenes import CHANGES, scene
 from mdstopo.bench.tables import Table, significant, verdict
 from mdstopo.case.reader import read_case
@@ -35,8 +36,6 @@ TOLERANCE, FINE = 1e-8, 1e-12
 STEPS = (4e-3, 1e-3, 2.5e-4)
 #: what the second model is good to, relative and, where it rounds what is zero, absolute: smaller errors cannot be told
 RESOLVED, ROUNDED = 1e-11, 1e-13
-#: the smallest size that a response counts with: what joints hold at zero is zero to rounding
-SMALLEST = 1e-6
 
 
 @dataclass

@@ -17,6 +17,8 @@ Vector = np.ndarray[Any, np.dtype[np.float64]]
 Look = Callable[[float], Vector]
 #: panels of an integral over a piece at first and their nodes, how well they are to agree with their halves
 PANELS, NODES, AGREE, DEPTH = 6, 10, 1e-13, 12
+#: the smallest size that a response counts with: what joints hold at zero is zero to rounding
+SMALLEST = 1e-6
 #: of a norm, as a share of the largest: below it, minima are cut at
 LOW = 0.3
 
@@ -125,13 +127,13 @@ def integral(f: Callable[[float], float], edges: list[float]) -> float:
 
     cuts = [t for a, b in pairwise(edges) for t in np.linspace(a, b, PANELS + 1)[:-1].tolist()] + [edges[-1]]
     left = [(a, b, panel(a, b), 0) for a, b in pairwise(cuts)]
-    whole = sum(abs(single_precision) for _, _, single_precision, _ in left)
+    whole = sum(abs(value) for _, _, value, _ in left)
     total = 0.0
     while left:
-        a, b, single_precision, depth = left.pop()
+        a, b, value, depth = left.pop()
         middle = 0.5 * (a + b)
         one, two = panel(a, middle), panel(middle, b)
-        if abs(one + two - single_precision) <= AGREE * max(whole, 1e-300) or depth == DEPTH or b - a <= 1e-13:
+        if abs(one + two - value) <= AGREE * max(whole, SMALLEST) or depth == DEPTH or b - a <= 1e-13:
             total += one + two
         else:
             left += [(a, middle, one, depth + 1), (middle, b, two, depth + 1)]

@@ -311,6 +311,9 @@ def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows,
                     da = rate
                 else:
                     continue
+            elif da > 0.0 and db == 0.0 and i + 2 < SAMPLES and sign * seen[w, i + 2, DG] < 0.0:
+                high = (i + 2) / LAST
+                db = sign * seen[w, i + 2, DG]
             elif not (da > 0.0 and db < 0.0):
                 continue
             c = refine(tag, motion, j, who, pieces, w, low, high, da, db, sign, sample)
@@ -365,6 +368,12 @@ def peaks_between(t, seen, plain, sign, limit, rows, found):
         d_right = sign * seen[b, 0, DG] if b < m else -1.0
         if b == 0 and d_right == 0.0:
             d_right = moves_off(seen, plain, sign, size)
+        if 0 < b < m and d_left == 0.0 and d_right == 0.0:
+            # as where something sticks: what the samples beside it rise and fall by tells
+            d_left = sign * seen[b - 1, 0 if plain[b - 1] != 0 else LAST - 1, DG]
+            d_right = sign * seen[b, LAST if plain[b] != 0 else 1, DG]
+            if d_left <= 0.0 or d_right >= 0.0:
+                d_left = d_right = 0.0
         jump = 0 < b < m and abs(left - right) > JUMP * size
         level_right = d_left > flat and d_right <= flat
         level_left = d_right < -flat and d_left >= -flat

@@ -301,10 +301,10 @@ def means_by_quadrature(case):
     left = [(low, high, panel(low, high)) for low, high in pairwise(edges)]
     total = np.zeros(3)
     while left:
-        low, high, single_precision = left.pop()
+        low, high, whole = left.pop()
         middle = 0.5 * (low + high)
         halves = panel(low, middle), panel(middle, high)
-        if np.abs(sum(halves) - single_precision).max() < 1e-14 or high - low < 1e-7:
+        if np.abs(sum(halves) - whole).max() < 1e-14 or high - low < 1e-7:
             total += sum(halves)
         else:
             left += [(low, middle, halves[0]), (middle, high, halves[1])]

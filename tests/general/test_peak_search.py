@@ -5,10 +5,14 @@ import pytest
 
 from mdstopo.engine import Evaluator
 from mdstopo.evaluation import Rows
-from mdstopo.general.extremes import COLUMNS, RATE, SIGN, TIME, VALUE
+from mdstopo.general import peak_search
+from mdstopo.general.extremes import COLUMNS, RATE, SAMPLES, SIGN, TIME, VALUE
 from mdstopo.general.general_driver import PEAKS
 from tests.general.support import design_of
 from tests.general.test_row_sweep import CASES, IMPLICIT
+from tests.space.in_python import in_python
+
+__all__ = ["in_python"]
 
 ALL = Rows(window=1.0, most=8)
 SOLVERS = pytest.mark.parametrize("solver", [{}, IMPLICIT], ids=["rk", "alpha"])
@@ -93,3 +97,43 @@ def test_inside_steps_rates_vanish_at_peaks_and_none_is_told_twice(name, solver)
             span = driver.scene.load_case.end - driver.scene.load_case.start
             inside = (rows[:, 3] > 0.0) & (rows[:, 3] < 1.0)
             assert np.all(np.abs(rows[inside, RATE]) * span <= 1e-4 * np.abs(rows[:, VALUE]).max())
+
+
+def places_of_peaks(values: np.ndarray, rates: np.ndarray) -> list[tuple[float, float]]:
+    """Time and value of the peaks between steps of 1 s, from values and rates (m, SAMPLES) on them."""
+    m = len(values)
+    seen = np.stack([values, rates, np.full(values.shape, -1.0)], axis=2)
+    rows = np.zeros((4 * m, COLUMNS))
+    found = peak_search.peaks_between(np.arange(m + 1.0), seen, np.zeros(m, np.int64), 1.0, -1.0, rows, 0)
+    return [(float(row[TIME]), float(row[VALUE])) for row in rows[:found]]
+
+
+@pytest.mark.parametrize(
+    ("before", "behind", "peaks"),
+    [
+        (1.0, -1.0, [(1.0, 0.0)]),  # rises into the end of a step, where it sticks, and falls out of it
+        (1.0, 1.0, [(2.0, 0.5)]),  # goes on
+        (-1.0, -1.0, [(0.0, 0.5)]),
+    ],
+)
+def test_a_peak_between_steps_may_have_a_rate_of_exactly_zero(before, behind, peaks, in_python):
+    back = np.linspace(-1.0, 0.0, SAMPLES)
+    times = np.stack([back, back + 1.0])
+    side = np.array([[before], [behind]])
+    values = side * np.where(times < 0.0, -1.0, 1.0) * 0.5 * times**2
+    assert places_of_peaks(values, side * np.abs(times)) == peaks
+
+
+def test_a_peak_may_lie_at_a_sample_within_a_step(in_python, monkeypatch):
+    def evaluate(tag, motion, j, who, pieces, w, c, sample):
+        sample[:] = -((2.0 * c - 1.0) ** 2), -2.0 * (2.0 * c - 1.0), -1.0
+
+    monkeypatch.setattr(peak_search, "evaluate_piece", evaluate)
+    seen, rows = np.zeros((1, SAMPLES, 3)), np.zeros((8, COLUMNS))
+    for i in range(SAMPLES):
+        evaluate(0, None, 0, -1, None, 0, i / (SAMPLES - 1), seen[0, i])
+    assert seen[0, SAMPLES // 2, 1] == 0.0
+    steps, nobody = np.array([-1.0, 1.0]), np.zeros(1, np.int64)
+    assert peak_search.peaks_inside(0, None, 0, -1, None, steps, seen, nobody, 1.0, -1.0, rows, 0) == 1
+    assert rows[0, TIME] == pytest.approx(0.0, abs=1e-12)
+    assert rows[0, VALUE] == pytest.approx(0.0, abs=1e-12)
