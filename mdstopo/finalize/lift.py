@@ -274,6 +274,9 @@ class _Lift:
         if word in _SAME:
             return {word: keys}
         if word in _ANGLES:
+            if kind.is_position and self.angle_at_start(keys) != 0.0:
+                words = "it is not 0 at the start, from which a rotation in space counts"
+                self.refuse(here, words)
             component = "norm" if from_ground else "z"
             if from_ground and over_time not in _UNSIGNED:
                 words = f"in a tilted plane only its size is a component, and over_time {over_time} needs its sign"
@@ -285,6 +288,11 @@ class _Lift:
         if from_ground and keys.get("component", "norm") != "norm":
             self.refuse(inside(here, "component"), "in a tilted plane it is no single component")
         return {word: {**keys, "at": self.vector(keys["at"], _frame(keys))} if "at" in keys else keys}
+
+    def angle_at_start(self, keys: Plain) -> float:
+        """By what angle a body is turned at the start against the one that it is seen from, rad."""
+        angles = {body.name: body.angle for body in self.case.bodies} | {GROUND: 0.0}
+        return float(angles[keys["body"]] - angles[keys.get("relative_to", GROUND)])
 
     def solver(self, old: Plain, path: str) -> Plain:
         """What is not in space yet."""

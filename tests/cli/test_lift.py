@@ -25,7 +25,7 @@ gravity: [0, -9.8]
 time: {start: 0, end: 0.2}
 bodies:
   a: {mass: 60, inertia: 10, position: [1, 2], angle: 0.5, angular_velocity: 3}
-  b: {mass: 20, inertia: 6, position: [0, -1], velocity: [0.25, 0.5]}
+  b: {mass: 20, inertia: 6, position: [0, -1], angle: 0.5, velocity: [0.25, 0.5]}
 joints:
   - {name: hip, type: revolute, bodies: [a, ground], at: [0, 0.25]}
   - {type: prismatic, bodies: [a, b], at: {a: [1, 0], b: [1, 0]}, axis: [2, 1]}
@@ -172,6 +172,7 @@ def test_cases_of_the_project_are_lifted(name: str) -> None:
             "x.yaml:13:22: solver.integrator: generalized_alpha is not in space yet: it cannot be lifted",
         ),
         ("points:\n", "solver: {settle: true}\npoints:\n", "solver.settle: true is not in space yet"),
+        ("position: [0, -1], angle: 0.5", "position: [0, -1]", "response.angle: it is not 0 at the start"),
     ],
 )
 def test_what_cannot_be_lifted_is_refused_at_its_place(old: str, new: str, message: str) -> None:
