@@ -85,6 +85,10 @@ class Fields:
         """All fields, in the order of the class."""
         return tuple(self.fields)
 
+    def place_of(self, size: str) -> int:
+        """Where a size, or a field that is a single integer, stands among the flat integers."""
+        return [*self.first, *self.numbers].index(size)
+
     def _first_axes(self) -> dict[str, tuple[str, int]]:
         """Of each size the field and axis that it is read from."""
         found: dict[str, tuple[str, int]] = {}

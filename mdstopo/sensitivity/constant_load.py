@@ -23,7 +23,7 @@ from mdstopo.mechanics.passes import (
 )
 from mdstopo.responses.energy import energy_slope
 from mdstopo.scene.model import FloatArray
-from mdstopo.scene.packing import Packed, unpack
+from mdstopo.scene.packing import FIELDS, Packed, unpack
 
 #: singular values below this times the largest are dropped
 DROPPED = 1e-10
@@ -100,7 +100,7 @@ def constant_load(packed: Packed, alpha: FloatArray, poses: FloatArray, weights:
     """
     count, n = poses.shape
     moving = np.flatnonzero(packed.floats[:n] > 0.0)  # ground does not answer
-    members = int(packed.ints[3])
+    members = int(packed.ints[FIELDS.place_of("padded")])
     states = np.zeros((count, 2, n))
     states[:, 0] = poses
     stiffness, slope, z = np.zeros((count, n, n)), np.zeros((count, n)), np.zeros((count, n))

@@ -311,10 +311,10 @@ def test_a_warm_process_gives_the_same_without_importing_numba(case, tmp_path):
 def test_types_of_general_scenes_are_found_by_processes_that_have_springs_only():
     """A kernel's disk cache lists all the types that it was compiled for, and reading it asks for each of them."""
     script = (
-        "import mdstopo.general.structures as s; print(s.ModelViewStructure.__name__, s.WorkspaceStructure.__name__)"
+        "import mdstopo.general.structures as s; print(s.PlanarViewStructure.__name__, s.WorkspaceStructure.__name__)"
     )
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, cwd=ROOT)
-    assert done.stdout.split() == ["ModelViewStructure", "WorkspaceStructure"]
+    assert done.stdout.split() == ["PlanarViewStructure", "WorkspaceStructure"]
 
 
 INSIDE = """

@@ -10,10 +10,14 @@ from mdstopo.engine import Evaluator
 from mdstopo.mechanics import passes
 from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.scene.model import CHUNK, MANY
-from mdstopo.scene.packing import pack, unpack
+from mdstopo.scene.packing import FIELDS, pack, unpack
 from tests.engine.scenes import read
 
 with_kernels()
+
+
+#: where packed scenes have the number of chunks, and that of threads
+COUNT, THREADS = FIELDS.place_of("n_chunk"), FIELDS.place_of("threads")
 
 
 def scene(count, **changes):
@@ -85,8 +89,8 @@ def test_chunks_add_up_to_what_one_sum_over_all_gives(tangent):
     model = Evaluator(case).scenes["default"].model
     packed = pack(model, threads=3)
     whole = packed.ints.copy()
-    assert whole[6] > 6
-    whole[7] = 0  # in whole blocks
+    assert whole[COUNT] > 6
+    whole[THREADS] = 0  # in whole blocks
     rng = np.random.default_rng(5)
     alpha = rng.uniform(0.0, 1.0, case.n_design)
     turn = rng.normal(size=4)
@@ -106,9 +110,9 @@ def test_few_members_are_not_cut_into_chunks():
     few, many = read(scene(1000)), read(scene(MANY))
     model = Evaluator(few).scenes["default"].model
     packed = pack(model, threads=3).ints
-    assert packed[6] == len(model.block)
-    assert packed[7] == 0
+    assert packed[COUNT] == len(model.block)
+    assert packed[THREADS] == 0
     model = Evaluator(many).scenes["default"].model
     packed = pack(model, threads=3).ints
-    assert packed[7] == 3
-    assert packed[6] > 2 * len(model.block)
+    assert packed[THREADS] == 3
+    assert packed[COUNT] > 2 * len(model.block)

@@ -295,7 +295,7 @@ def test_the_pool_asks_for_no_more_than_it_needs(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(worker_pool.subprocess, "Popen", popen)
     with pytest.raises(AskedError):
         pool(2).results(1, lambda place: place)
-    assert seen["words"][-2:] == ["-m", "mdstopo.workers.worker_program"]
+    assert seen["words"][-1] == "mdstopo.workers.worker_program"
     assert {key: value for key, value in seen["env"].items() if key not in (VARIABLE, "NUMBA_NUM_THREADS")} == {
         key: value for key, value in os.environ.items() if key not in (VARIABLE, "NUMBA_NUM_THREADS")
     }
