@@ -1,7 +1,7 @@
 """A case in space as arrays of a general scene: what is spatial about them (`dimension`).
 
 Arrays have points and axes of a body in its principal axes: there the masses are a diagonal. At home these stand as
-R_home = R P, with the body's own axes R and the principal ones P among them (`scene.rotations.principal`).
+R_home = R P, with the body's own axes R and the principal ones P among them (`scene.quaternions.principal`).
 """
 
 from typing import Any, NamedTuple, cast
@@ -14,37 +14,44 @@ from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints.kernels import FITTED
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
+from mdstopo.mechanics.kinematics.spatial_bushings import WIDTH as BUSHING
+from mdstopo.mechanics.kinematics.spatial_forces import ACCELERATES, FOLLOWS, GLOBAL
 from mdstopo.mechanics.kinematics.spatial_joints import (
     ACROSS,
     CYLINDRICAL,
     DISTANCE,
+    FIRST_AXES,
+    FIRST_POINT,
     FIXED,
+    LENGTH,
     PLANAR,
     PRISMATIC,
     REVOLUTE,
     ROWS_OF,
+    SECOND_AXES,
+    SECOND_POINT,
     SPHERICAL,
     UNIVERSAL,
+    WIDTH,
     row_of_joint,
 )
+from mdstopo.mechanics.kinematics.spatial_joints import APART as APART_FIRST
 from mdstopo.mechanics.kinematics.spatial_joints import AT as MEETS
-from mdstopo.mechanics.kinematics.spatial_poses import HOME
+from mdstopo.mechanics.kinematics.spatial_poses import HOME, HOME_AXES, HOME_PLACE, HOME_TURN
 from mdstopo.scene.loads import Loads
 from mdstopo.scene.model import FloatArray, IndexArray
-from mdstopo.scene.rotations import principal
+from mdstopo.scene.quaternions import principal
 from mdstopo.scene.signals import segment_values
 
 #: columns of `GeneralModel.home`: a body's place, then R_home by rows, then P by rows
-PLACE, TURN, AXES = slice(0, 3), slice(3, 12), slice(12, 21)
+PLACE, TURN, AXES = slice(HOME_PLACE, HOME_TURN), slice(HOME_TURN, HOME_AXES), slice(HOME_AXES, HOME)
 #: columns of `GeneralModel.response_par`: the point, then a response's own numbers
 AT, NUMBERS, RESPONSE_PAR = slice(0, 3), slice(3, 8), 8
 #: columns of `GeneralModel.joint_par`: the points on both bodies, the axes on both by rows, the vector from the first
 #: point to the second at home (global), of a distance joint its length
-AT_FIRST, AT_SECOND, AXES_FIRST, AXES_SECOND = slice(0, 3), slice(3, 6), slice(6, 15), slice(15, 24)
-APART, LENGTH, JOINT_PAR = slice(24, 27), 27, 30
-#: `GeneralModel.load_follows`: a force and a moment in global axes; both turn with the body; a force and an angular
-#: acceleration in global axes
-STAYS, FOLLOWS, ACCELERATES = range(3)
+AT_FIRST, AT_SECOND = slice(FIRST_POINT, SECOND_POINT), slice(SECOND_POINT, FIRST_AXES)
+AXES_FIRST, AXES_SECOND = slice(FIRST_AXES, SECOND_AXES), slice(SECOND_AXES, APART_FIRST)
+APART = slice(APART_FIRST, LENGTH)
 #: the codes of joints by their words
 JOINTS = {
     "spherical": SPHERICAL,
@@ -56,8 +63,6 @@ JOINTS = {
     "fixed": FIXED,
     "distance": DISTANCE,
 }
-#: numbers of a bushing (`GeneralModel.bushing`), of which there is none yet
-BUSHING = 12
 
 
 def _home(load_case: LoadCase, count: int) -> FloatArray:
@@ -129,7 +134,7 @@ def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames
             force[:, b, PLACE] += own
             own = np.zeros_like(own)
         for follows, part, couple in (
-            (STAYS, own, moment),
+            (GLOBAL, own, moment),
             (ACCELERATES, np.zeros_like(own), _three(load.angular_acceleration, times)),
         ):
             if np.any(part) or np.any(couple):
@@ -172,8 +177,8 @@ def _joint_kernels(joint: type[Joint]) -> JointRows:
 
 
 def _joint_row(joint: Any, home: FloatArray, first: int, second: int, frames: Frames) -> list[float]:
-    """See `JOINT_PAR`."""
-    row = np.zeros(JOINT_PAR)
+    """See `spatial_joints.WIDTH`."""
+    row = np.zeros(WIDTH)
     ends, size = [], 0.0
     for name, body, at, axes, point, own in (
         (joint.bodies[0], first, AT_FIRST, AXES_FIRST, joint.at_first, joint.axes_first),

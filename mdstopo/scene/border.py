@@ -12,7 +12,7 @@ import numpy as np
 from mdstopo.case.model import Case
 from mdstopo.scene.bodies import is_spatial
 from mdstopo.scene.model import FloatArray
-from mdstopo.scene.rotations import principal, product, quaternions_of, rotations_of
+from mdstopo.scene.quaternions import principal, product, quaternions_of, rotations_of
 
 
 class Border(Protocol):

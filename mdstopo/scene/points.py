@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.scene.bodies import is_spatial
 from mdstopo.scene.model import FloatArray
-from mdstopo.scene.rotations import rotations_of
+from mdstopo.scene.quaternions import rotations_of
 
 #: numbers of a body in q
 PLANAR, SPATIAL = 3, 7

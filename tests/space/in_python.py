@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,10 +30,9 @@ def _call(kernel: Any, *arguments: Any) -> Any:
     return (_branches(kernel) if isinstance(kernel, Choice) else kernel.py_func)(*arguments)
 
 
-def _branches(choice: Any, made: dict[int, Any] = {}) -> Any:  # noqa: B006  (kept on purpose: made once)
-    if id(choice) not in made:
-        made[id(choice)] = choice._branches()
-    return made[id(choice)]
+@cache
+def _branches(choice: Any) -> Any:
+    return choice._branches()
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from mdstopo.case.model import SpatialBody
 from mdstopo.scene.border import SpatialBorder, border_of
-from mdstopo.scene.rotations import principal, product, quaternions_of, rotations_of
+from mdstopo.scene.quaternions import principal, product, quaternions_of, rotations_of
 
 RANDOM = np.random.default_rng(7)
 

@@ -13,7 +13,7 @@ from mdstopo.mechanics.kinematics.rotations import logarithm, vector_rate, vecto
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
 from mdstopo.mechanics.kinematics.spatial_lines import add_column
 from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, FREEDOMS, HOME_AXES, S_SINCE, S, W
-from mdstopo.mechanics.kinematics.vectors import add, cross, plus, times, turned, turned_back, vector_at
+from mdstopo.mechanics.kinematics.vectors import add, cross, plus, times, turned, turned_back, unit, vector_at
 
 #: columns of `GeneralModel.bushing`: both points, the stretch at home (axes of the first body), stiffness and damping
 FIRST, SECOND, APART, STIFFNESS, DAMPING = 0, 3, 6, 9, 15
@@ -95,21 +95,21 @@ def add_bushings(model, rel, q, tangent, sums):
         k = o[K : K + FREEDOMS * FREEDOMS].reshape(FREEDOMS, FREEDOMS)
         for m in range(FREEDOMS):
             i = m % 3
-            unit = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
-            moved = unit if m < 3 else cross(unit, arm)
+            axis = unit(i)
+            moved = axis if m < 3 else cross(axis, arm)
             df = _along_axes(home, b, STIFFNESS, moved)
             by_rate = _along_axes(home, b, DAMPING, moved)
             dm = cross(arm, df)
             if m >= 3:
                 df = plus(df, _along_axes(home, b, DAMPING, cross(w, moved)))
-                change = vector_rate(times(-1.0, theta), unit)
+                change = vector_rate(times(-1.0, theta), axis)
                 dm = plus(plus(cross(moved, f), cross(arm, df)), vector_rate_jvp(theta, bent, change))
                 dm = plus(dm, vector_rate(theta, _along_axes(home, b, STIFFNESS + 3, change)))
             add_column(k, 0, m, df)
             add_column(k, 3, m, dm)
             damped = cross(arm, by_rate)
             if m >= 3:
-                damped = plus(damped, _along_axes(home, b, DAMPING + 3, unit))
+                damped = plus(damped, _along_axes(home, b, DAMPING + 3, axis))
             for i in range(m + 1):
                 x = by_rate if i < 3 else damped
                 o[C + m * (m + 1) // 2 + i] += x[0] if i % 3 == 0 else x[1] if i % 3 == 1 else x[2]

@@ -26,6 +26,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     plus,
     turned,
     turned_back,
+    unit,
     vector_at,
 )
 
@@ -98,7 +99,7 @@ def load_tangent(model, segment, t, q, v, turn):
         omega = vector_at(v, d + 3)
         spin = _inertia_times(model, d, omega)
         for c in range(3):
-            e = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+            e = unit(c)
             slope = minus(cross(spin, e), cross(omega, _inertia_times(model, d, e)))
             for i in range(3):
                 turn[d + 3 + i, ROTATIONS + c] = slope[i]
@@ -117,7 +118,7 @@ def load_tangent(model, segment, t, q, v, turn):
             push = turned_back(attitude, TURN, push)
             moment = turned_back(attitude, TURN, moment)
         for c in range(3):
-            e = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+            e = unit(c)
             if follows == FOLLOWS:
                 slope = turned(attitude, TURN, cross(e, push))
                 for i in range(3):
@@ -176,7 +177,7 @@ def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
         second = turned_back(r, S, cross(moment, dphi))
         force = (0.0, 0.0, 0.0)
         if c >= 3 and c < 6:
-            e = (1.0 if c == 3 else 0.0, 1.0 if c == 4 else 0.0, 1.0 if c == 5 else 0.0)
+            e = unit(c - 3)
             force = turned(r, TURN_A, cross(e, push))
         for i in range(3):
             k[i, c] += force[i]
@@ -191,7 +192,7 @@ def _slopes_of_pose(r, t):
     t[:] = 0.0
     d = vector_at(r, D)
     for c in range(3):
-        e = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+        e = unit(c)
         arm = cross(d, e)
         for i in range(3):
             t[i, c] = -r[TURN_A + 3 * c + i]
@@ -211,7 +212,7 @@ def _slopes_of_rates(r, t, n):
         move = cross((t[0, c], t[1, c], t[2, c]), omega)
         turn = cross((t[3, c], t[4, c], t[5, c]), spin)
         if c >= 3 and c < 6:
-            e = (1.0 if c == 3 else 0.0, 1.0 if c == 4 else 0.0, 1.0 if c == 5 else 0.0)
+            e = unit(c - 3)
             move = plus(move, cross(speed, e))
         for i in range(3):
             n[i, c] = move[i]

@@ -45,6 +45,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     times,
     turned,
     turned_back,
+    unit,
     vector_at,
 )
 
@@ -66,15 +67,7 @@ PLACES = 6 + 2 * ATTITUDE
 @part
 def rows_of(code):
     """How many rows a joint has."""
-    if code == FIXED:
-        return 6
-    if code in (REVOLUTE, PRISMATIC):
-        return 5
-    if code in (UNIVERSAL, CYLINDRICAL):
-        return 4
-    if code == DISTANCE:
-        return 1
-    return 3
+    return ROWS_OF[code]
 
 
 @part
@@ -202,7 +195,7 @@ def rows_at(code, par, w, phi, jac):
             line_row(w, ONE, w, TWO, s, c, e, row, 0)
         elif kind == AT:
             d = _apart(par, w)
-            e = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
+            e = unit(i)
             phi[r] = dot(d, e)
             add_term(w, e, False, none, c, True, 1.0, jac, r)
             add_term(w, s, True, none, e, False, -1.0, jac, r)
@@ -282,7 +275,7 @@ def joint_velocity_slope(model, j, w, wd, out):
             _, e, length = _line(par, w)
             line_rate_slopes(w, ONE, w, TWO, s, c, e, length, wd, 0, FREEDOMS, row)
         elif kind == AT:
-            e = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
+            e = unit(i)
             add_term(w, e, False, none, cross(omega_b, c), True, 1.0, out, r)
             add_term(w, cross(omega_a, s), True, none, e, False, -1.0, out, r)
         else:
@@ -319,7 +312,7 @@ def joint_acceleration_slopes(model, j, w, wd, wdd, by_q, by_v):
             _, e, length = _line(par, w)
             line_slopes(w, ONE, w, TWO, s, c, e, length, wd, wdd, 0, FREEDOMS, row, rate)
         elif kind == AT:
-            e = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
+            e = unit(i)
             add_term(w, e, False, none, _second(omega_b, vector_at(wdd, 9), c), True, 1.0, by_q, r)
             add_term(w, _second(omega_a, vector_at(wdd, 3), s), True, none, e, False, -1.0, by_q, r)
             y = turned_back(w, TWO + TURN, e)
@@ -394,13 +387,13 @@ def joint_stiffness(model, j, w, lam, k):
             _, e, length = _line(par, w)
             add_line_stiffness(w, ONE, w, TWO, s, c, e, length, f, k)
         elif kind == AT:
-            e = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
+            e = unit(i)
             seen_one = turned_back(w, ONE + TURN, e)
             seen_two = turned_back(w, TWO + TURN, e)
             for d in range(3):
-                unit = (1.0 if d == 0 else 0.0, 1.0 if d == 1 else 0.0, 1.0 if d == 2 else 0.0)
-                add_column(k, 3, 3 + d, times(-f, cross(s, cross(seen_one, unit))))
-                add_column(k, 9, 9 + d, times(f, cross(c, cross(seen_two, unit))))
+                axis = unit(d)
+                add_column(k, 3, 3 + d, times(-f, cross(s, cross(seen_one, axis))))
+                add_column(k, 9, 9 + d, times(f, cross(c, cross(seen_two, axis))))
         elif kind == ALONG:
             _stiffness_along(w, vector_at(par, FIRST_AXES + 3 * i), vector_at(w, BETWEEN), c, True, f, k)
         else:
@@ -417,19 +410,19 @@ def _stiffness_along(w, n, between, m, moves, f, k):
     z = turned_back(w, ONE + TURN, plus(between, turned(w, TWO + TURN, m)))
     y = turned_back(w, TWO + TURN, turned(w, ONE + TURN, n))
     for d in range(3):
-        unit = (1.0 if d == 0 else 0.0, 1.0 if d == 1 else 0.0, 1.0 if d == 2 else 0.0)
-        # by turns of the first body: a changes by R_A (unit x n), z by z x unit
-        a = turned(w, ONE + TURN, cross(unit, n))
-        add_column(k, 3, 3 + d, times(f, cross(n, cross(z, unit))))
+        axis = unit(d)
+        # by turns of the first body: a changes by R_A (axis x n), z by z x axis
+        a = turned(w, ONE + TURN, cross(axis, n))
+        add_column(k, 3, 3 + d, times(f, cross(n, cross(z, axis))))
         add_column(k, 9, 3 + d, times(f, cross(m, turned_back(w, TWO + TURN, a))))
-        # by turns of the second: z by R_A^T R_B (unit x m), y by y x unit
-        x = turned_back(w, ONE + TURN, turned(w, TWO + TURN, cross(unit, m)))
+        # by turns of the second: z by R_A^T R_B (axis x m), y by y x axis
+        x = turned_back(w, ONE + TURN, turned(w, TWO + TURN, cross(axis, m)))
         add_column(k, 3, 9 + d, times(f, cross(n, x)))
-        add_column(k, 9, 9 + d, times(f, cross(m, cross(y, unit))))
+        add_column(k, 9, 9 + d, times(f, cross(m, cross(y, axis))))
         if moves:
             add_column(k, 0, 3 + d, times(-f, a))
             add_column(k, 6, 3 + d, times(f, a))
-            x = times(f, cross(n, turned_back(w, ONE + TURN, unit)))
+            x = times(f, cross(n, turned_back(w, ONE + TURN, axis)))
             add_column(k, 3, d, times(-1.0, x))
             add_column(k, 3, 6 + d, x)
 

@@ -19,6 +19,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     times,
     turned,
     turned_back,
+    unit,
     vector_at,
 )
 
@@ -170,23 +171,23 @@ def add_line_stiffness(one, at_one, two, at_two, s, c, e, length, f, k):
     seen_two = turned_back(two, at_two, e)
     for j in range(12):
         i = j % 3
-        unit = (1.0 if i == 0 else 0.0, 1.0 if i == 1 else 0.0, 1.0 if i == 2 else 0.0)
+        axis = unit(i)
         block = j // 3
         if block == 0:
-            du = times(-1.0, unit)
+            du = times(-1.0, axis)
         elif block == 1:
-            du = times(-1.0, turned(one, at_one, cross(unit, s)))
+            du = times(-1.0, turned(one, at_one, cross(axis, s)))
         elif block == 2:
-            du = unit
+            du = axis
         else:
-            du = turned(two, at_two, cross(unit, c))
+            du = turned(two, at_two, cross(axis, c))
         de = times(f * y, minus(du, times(dot(e, du), e)))
         first = turned_back(one, at_one, de)
         second = turned_back(two, at_two, de)
         if block == 1:
-            first = plus(first, times(f, cross(seen_one, unit)))
+            first = plus(first, times(f, cross(seen_one, axis)))
         if block == 3:
-            second = plus(second, times(f, cross(seen_two, unit)))
+            second = plus(second, times(f, cross(seen_two, axis)))
         add_column(k, 0, j, times(-1.0, de))
         add_column(k, 3, j, cross(first, s))
         add_column(k, 6, j, de)

@@ -49,6 +49,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     plus,
     times,
     turned,
+    unit,
     vector_at,
 )
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
@@ -179,10 +180,10 @@ def _add_tangent(e, arm, lever, y, speed, rate, w, f, fd, fr, o):
     by_turn = cross(arm, plus(turning, cross(e, w)))
     for j in range(FREEDOMS):
         c = j % 3
-        unit = (1.0 if c == 0 else 0.0, 1.0 if c == 1 else 0.0, 1.0 if c == 2 else 0.0)
+        axis = unit(c)
         along = e[c] if j < 3 else lever[c]
         by = fd * along + fr * (turning[c] if j < 3 else by_turn[c])
-        moved = unit if j < 3 else cross(unit, arm)
+        moved = axis if j < 3 else cross(axis, arm)
         de = times(f * y, minus(moved, times(dot(e, moved), e)))
         dl = cross(arm, de)
         if j >= 3:

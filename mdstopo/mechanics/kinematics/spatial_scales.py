@@ -4,6 +4,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import part
 from mdstopo.mechanics.kinematics.rotations import quaternion_at, turn_between
+from mdstopo.mechanics.kinematics.spatial_forces import ACCELERATES
 from mdstopo.mechanics.kinematics.spatial_poses import COORDINATES, FREEDOMS, HOME_PLACE, D, W, deflection_of
 from mdstopo.mechanics.kinematics.vectors import norm, vector_at
 
@@ -113,7 +114,7 @@ def gross_loads(model, out):
                 size = max(abs(start), abs(start + length * model.load_force[segment, k, axis, 1]))
                 if axis < 3:
                     most = max(most, size)
-                elif model.load_follows[k] == 2:  # an angular acceleration
+                elif model.load_follows[k] == ACCELERATES:
                     couple = max(couple, size * max(model.mass[b + 3], model.mass[b + 4], model.mass[b + 5]))
                 else:
                     couple = max(couple, size)

@@ -341,6 +341,17 @@ def _ends(q0, q1, v0, v1, i, d):
     return way, vector_at(v0, d + 3), vector_rate(way, vector_at(v1, d + 3))
 
 
+@part
+def _cubic_vector(c, h, way, first, last):
+    """The cubic of a rotation vector that is 0 at the start of a step, and its derivative.
+
+    c, h: fraction of the step, and its length (s). way: what it is at the end. first, last: its rates at both ends.
+    """
+    _, b0, a1, b1, _, db0, da1, db1 = hermite(c)
+    p = plus(times(a1, way), plus(times(h * b0, first), times(h * b1, last)))
+    return p, plus(times(da1 / h, way), plus(times(db0, first), times(db1, last)))
+
+
 @kernel
 def cubic(model, c, h, q0, v0, q1, v1, q, v):
     """The cubic through both ends of a step; see `kinematics_interface.cubic`.
@@ -358,8 +369,7 @@ def cubic(model, c, h, q0, v0, q1, v1, q, v):
         put(q, i, plus(plus(times(a0, one), times(a1, two)), plus(times(h * b0, first), times(h * b1, last))))
         put(v, d, plus(times(da1 / h, minus(two, one)), plus(times(db0, first), times(db1, last))))
         way, first, last = _ends(q0, q1, v0, v1, i, d)
-        p = plus(times(a1, way), plus(times(h * b0, first), times(h * b1, last)))
-        rate = plus(times(da1 / h, way), plus(times(db0, first), times(db1, last)))
+        p, rate = _cubic_vector(c, h, way, first, last)
         put_quaternion(q, i + 3, turn_by(quaternion_at(q0, i + 3), p))
         put(v, d + 3, turn_rate(p, rate))
 
@@ -378,8 +388,7 @@ def cubic_vjp(model, c, h, q0, v0, q1, v1, bar_q, bar_v, start_q, start_v, end_q
         put(end_q, d, plus(times(a1, place), times(da1 / h, speed)))
         put(end_v, d, plus(times(h * b1, place), times(db1, speed)))
         way, first, last = _ends(q0, q1, v0, v1, i, d)
-        p = plus(times(a1, way), plus(times(h * b0, first), times(h * b1, last)))
-        rate = plus(times(da1 / h, way), plus(times(db0, first), times(db1, last)))
+        p, rate = _cubic_vector(c, h, way, first, last)
         seen = vector_at(bar_q, d + 3)
         spin = vector_at(bar_v, d + 3)
         bar_p = plus(turn_rate(times(-1.0, p), seen), turn_rate_vjp(p, rate, spin))
@@ -409,8 +418,7 @@ def cubic_jvp(model, c, h, q0, v0, q1, v1, dq, dv, end_dq, end_dv):
         put(dq, d, plus(plus(times(a0, one), times(a1, two)), plus(times(h * b0, first), times(h * b1, last))))
         put(dv, d, plus(times(da1 / h, minus(two, one)), plus(times(db0, first), times(db1, last))))
         way, start, end = _ends(q0, q1, v0, v1, i, d)
-        p = plus(times(a1, way), plus(times(h * b0, start), times(h * b1, end)))
-        rate = plus(times(da1 / h, way), plus(times(db0, start), times(db1, end)))
+        p, rate = _cubic_vector(c, h, way, start, end)
         turn = vector_at(dq, d + 3)
         first = vector_at(dv, d + 3)
         dway = vector_rate(way, minus(vector_at(end_dq, d + 3), back_turned(way, turn)))
