@@ -118,7 +118,7 @@ class Entry(Kernel):
         """Machine code for these types, from the disk or from Numba; nothing where only Numba itself can call it."""
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
             return None
-        from mdstopo.compiler import store
+        from mdstopo.compiler import store, tried
         from mdstopo.compiler.call import Native, arrays_are_known
 
         if not arrays_are_known():
@@ -126,7 +126,7 @@ class Entry(Kernel):
         path = store.path_of(self.py_func.__module__, self.py_func.__qualname__, types)
         code = store.read(path)
         if code is None:
-            with store.alone(path):
+            with store.alone(path), tried.interruptible():
                 code = store.read(path) or self._built(path, types)
         return None if code is None else Native(self.py_func.__qualname__, code, types)
 

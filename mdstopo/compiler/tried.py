@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Iterator
 from types import ModuleType
+from typing import ClassVar
 
 from mdstopo.installed import version_of
 
@@ -36,6 +37,8 @@ class _Way:
     module: ModuleType | None = None
     #: whether nobody else uses Numba in this process, so that it may be changed
     alone = False
+    #: what interrupts have come out of, see `interruptible`
+    broken_off: ClassVar[list[BaseException]] = []
 
 
 def versions() -> tuple[str, str]:
@@ -130,13 +133,36 @@ def without_private(error: Exception) -> Iterator[None]:
     give_up(error)
 
 
+@contextlib.contextmanager
+def interruptible() -> Iterator[None]:
+    """Compile what an interrupt may break off.
+
+    One that falls between LLVM's taking a module and llvmlite's note of it leaves a module with two owners. To free it
+    for the second of them ends the process by a segmentation fault, so what the interrupted functions refer to is kept
+    for good.
+    """
+    try:
+        yield
+    except BaseException as error:
+        if _is_interrupt(error):
+            _Way.broken_off.append(error)
+        raise
+
+
 def _raise_if_interrupted(error: Exception) -> None:
     """Raise an error that a KeyboardInterrupt has led to: one that falls into the compiler may come out as another."""
+    if _is_interrupt(error):
+        raise error
+
+
+def _is_interrupt(error: BaseException) -> bool:
+    """Whether an error is a KeyboardInterrupt, or one has led to it."""
     cause: BaseException | None = error
     while cause is not None:
         if isinstance(cause, KeyboardInterrupt):
-            raise error
+            return True
         cause = cause.__cause__ or cause.__context__
+    return False
 
 
 def notice(error: Exception) -> str:

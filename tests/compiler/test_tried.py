@@ -1,10 +1,12 @@
 """Numba's private parts: in one module, with versions that were tried; with anything unexpected Numba's own way."""
 
 import ast
+import gc
 import os
 import subprocess
 import sys
 import tomllib
+import weakref
 from pathlib import Path
 
 import pytest
@@ -147,6 +149,25 @@ def test_an_interrupt_that_comes_out_as_another_error_is_not_taken_for_a_fault_o
         with pytest.raises(RuntimeError, match="no compiled"):
             tried.give_up(error)
     assert tried.private() is not None
+
+
+class Half:
+    """Stands for a module that LLVM has taken, and that llvmlite would free all the same."""
+
+
+def test_what_an_interrupt_broke_off_in_the_compiler_is_not_freed() -> None:
+    kept = []
+
+    def link(error: type[BaseException]) -> None:
+        half = Half()
+        kept.append(weakref.ref(half))
+        raise error
+
+    for error in (KeyboardInterrupt, ValueError):
+        with pytest.raises(error), tried.interruptible():
+            link(error)
+    gc.collect()
+    assert [each() is not None for each in kept] == [True, False]
 
 
 def imported(path: Path) -> set[str]:
