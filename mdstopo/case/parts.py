@@ -216,15 +216,16 @@ class Contact(Value):
 class Bushing(Value):
     """An elastic joint: forces along the first body's axes and a couple.
 
-    stiffness (N/m, N/m, N m/rad), damping (N s/m, N s/m, N m s/rad); points in body coordinates.
+    stiffness (N/m, then N m/rad), damping (N s/m, then N m s/rad): of two axes and the angle, in space of three axes
+    and the three components of the rotation vector; points in body coordinates.
     """
 
     index: int
     bodies: tuple[str, str]
-    at_first: Pair
-    at_second: Pair
-    stiffness: Triple
-    damping: Triple = (0.0, 0.0, 0.0)
+    at_first: Components
+    at_second: Components
+    stiffness: tuple[float, ...]
+    damping: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
 @frozen

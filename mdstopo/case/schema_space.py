@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from mdstopo.case.joints.joint import record_of
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
-from mdstopo.case.joints.spatial_keys import DIRECTION, TRIPLE
-from mdstopo.case.kinds import NUMBER, POSITIVE, Flag, Kind, explained
+from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Kind, explained
 from mdstopo.case.mesh_files import MeshFile
 from mdstopo.case.not_yet import NotYet, NotYetAs
 from mdstopo.case.number_rows import Rows, Signals
@@ -16,6 +16,7 @@ from mdstopo.case.responses import key_of
 from mdstopo.case.schema_case import CONSTRAINT, FORMAT, OBJECTIVE, SOLVER
 from mdstopo.case.schema_scene import (
     BODY,
+    BUSHING,
     COORDINATE,
     COUNT,
     FRAME,
@@ -96,7 +97,22 @@ BODY_KEYS = Record(
     doc="A rigid body at the start. The fixed body `ground` is there without being declared.",
     elsewhere=(("angle", "in space it is `orientation`"),),
 )
+
+# Joints and bushings.
 JOINT = Tagged("a joint", "type", {word: record_of(joint) for word, joint in SPATIAL_JOINTS.items()})
+_SIX = Vector(6, NOT_NEGATIVE, ((3, "in space it is six: along the first body's x, y and z, about them"),))
+BUSHING_KEYS = with_keys(
+    BUSHING,
+    with_kind(BUSHING, "at", POINT),
+    Key(
+        "stiffness",
+        _SIX,
+        "along the first body's x, y and z, then of the rotation vector's components in its axes",
+        required=True,
+        unit="N/m, N m/rad",
+    ),
+    Key("damping", _SIX, "the same of the rates", default=(*ZERO, *ZERO), unit="N s/m, N m s/rad"),
+)
 
 # Prescribed motion.
 _MOVED = "of the centre of mass"
@@ -300,7 +316,7 @@ SPACE_FORMAT = with_keys(
     Key("gravity", TRIPLE, "acceleration of free fall, [x, y, z]", default=ZERO, unit="m/s^2"),
     with_kind(FORMAT, "bodies", Named(BODY_KEYS, "body", 1)),
     with_kind(FORMAT, "joints", ListOf(JOINT, what="joints")),
-    with_kind(FORMAT, "bushings", NotYet("bushings")),
+    with_kind(FORMAT, "bushings", ListOf(BUSHING_KEYS, what="bushings")),
     _MOTIONS,
     with_kind(FORMAT, "points", Named(POINTS_KEYS, "point grid")),
     with_kind(FORMAT, "contacts", NotYet("contacts")),

@@ -81,7 +81,7 @@ class _Lift:
             "gravity": lambda value, _: self.vector(value),
             "bodies": self.each(self.body),
             "joints": self.each(self.joint),
-            "bushings": self.not_yet("bushings"),
+            "bushings": self.each(self.bushing),
             "contacts": self.not_yet("contacts"),
             "uncertainty": self.not_yet("uncertain values"),
             "motions": self.each(self.motion),
@@ -173,14 +173,29 @@ class _Lift:
         at = old.get("at")
         if at is None and old["type"] == "fixed" and old["bodies"][1] == GROUND:
             at = [0, 0]
-        if isinstance(at, Mapping):
-            new["at"] = {body: self.vector(point) for body, point in at.items()}
-        elif at is not None:
-            new["at"] = [self.vector(point) for point in at] if isinstance(at[0], list) else self.vector(at)
+        if at is not None:
+            new["at"] = self.place(at)
         if old["type"] == "prismatic":
             new["axis"] = self.vector(old["axis"])
         if old["type"] == "revolute":
             new["axis"] = self.normal()
+        return new
+
+    def place(self, at: Any) -> Any:
+        """A point, one of each body, or a list of two."""
+        if isinstance(at, Mapping):
+            return {body: self.vector(point) for body, point in at.items()}
+        return [self.vector(point) for point in at] if isinstance(at[0], list) else self.vector(at)
+
+    def bushing(self, old: Plain, path: str) -> Plain:
+        """Along the normal it is as stiff as along x, and against tipping as against turning in the plane."""
+        new = {**old, "at": self.place(old["at"])}
+        for key in ("stiffness", "damping"):
+            if key in old:
+                x, y, turn = old[key]
+                new[key] = [x, y, x, turn, turn, turn]
+                if x != y and self.is_tilted and old["bodies"][0] == GROUND:
+                    self.refuse(inside(path, key), "along axes of ground it differs, and the plane's are tilted")
         return new
 
     def motion(self, old: Plain, path: str) -> Plain:

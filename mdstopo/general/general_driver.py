@@ -14,6 +14,7 @@ from mdstopo.case.model import Case
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.competing_members import compete, members_peaks
 from mdstopo.general.compile import GeneralScene, compile_general
+from mdstopo.general.dimension import dimension_of
 from mdstopo.general.extremes import (
     COLUMNS,
     FRACTION,
@@ -35,7 +36,17 @@ from mdstopo.general.step_history import GRAZES, history_room
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
 from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
-from mdstopo.integrators.steps import CHATTERING, NEEDS_ROOM, OK, SINGULAR, STEP_LIMIT, UNSETTLED, WORK, status_of
+from mdstopo.integrators.steps import (
+    CHATTERING,
+    HALF_TURN,
+    NEEDS_ROOM,
+    OK,
+    SINGULAR,
+    STEP_LIMIT,
+    UNSETTLED,
+    WORK,
+    status_of,
+)
 from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.model import FloatArray, IndexArray
@@ -397,12 +408,25 @@ class GeneralDriver:
                 self.settings, self.limits, self.room, self.room_ints, self.member_state, self.work, self.where,
             )  # fmt: skip
             if code != NEEDS_ROOM:
+                code, count, time = self._up_to_half_a_turn(code, count, time)
                 self._message = self._explain(code, time)
                 return code, count, time
             if not holds_steps(2 * len(self.room)):
                 self._message = self._explain(STEP_LIMIT, time)
                 return STEP_LIMIT, count, time
             self._make_room(*(2 * int(size) for size in self.limits[1:4]))
+
+    def _up_to_half_a_turn(self, code: int, count: int, time: float) -> tuple[int, int, float]:
+        """How a run ended, or that a bushing turned too far before: code, number of steps, time reached."""
+        if not self.case.bushings:
+            return code, count, time
+        t, q, _ = self.states()
+        model = self.scene.model
+        found = dimension_of(self.case).half_turn(model.pair[model.bushing_pair], model.home, q[: count + 1])
+        if found is None:
+            return code, count, time
+        state, self.where[0] = found
+        return HALF_TURN, max(state - 1, 0), float(t[state])
 
     def met(self, count: int) -> int:
         """A member (padded) whose ends meet under force within the steps of the last run, or -1."""
@@ -492,6 +516,9 @@ class GeneralDriver:
         if code == SINGULAR:
             steps = f", in steps of {self.settings[2]:.3g} s" if self.settings[2] > 0.0 else ""
             return f"{self._singular(int(self.where[0]))}, {when}{steps}"
+        if code == HALF_TURN:
+            bushing = self.case.bushings[int(self.where[0])]
+            return f"bushings[{bushing.index}] (between {bushing.bodies[0]} and {bushing.bodies[1]}), {when}"
         if code == CHATTERING:
             return f"{self.member(int(self.where[0]))}, {when}"
         if code == STEP_LIMIT and self.where[0] >= 0:

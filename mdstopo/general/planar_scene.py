@@ -87,6 +87,7 @@ PLANE = Dimension(
     places=_places,
     loads=_loads,
     bushings=_bushings,
+    half_turn=lambda pairs, home, q: None,
     contacts=contact_rows,
     reaches=_reaches,
     joint_code=joints.code_of,

@@ -13,9 +13,11 @@ from mdstopo.compiler.kernel import Kernel
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
 from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints.kernels import FITTED
+from mdstopo.mechanics.kinematics import spatial_bushings
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.mechanics.kinematics.spatial_bushings import WIDTH as BUSHING
 from mdstopo.mechanics.kinematics.spatial_forces import ACCELERATES, FOLLOWS, GLOBAL
+from mdstopo.mechanics.kinematics.spatial_half_turns import half_turn
 from mdstopo.mechanics.kinematics.spatial_joints import (
     ACROSS,
     CYLINDRICAL,
@@ -52,6 +54,12 @@ AT, NUMBERS, RESPONSE_PAR = slice(0, 3), slice(3, 8), 8
 AT_FIRST, AT_SECOND = slice(FIRST_POINT, SECOND_POINT), slice(SECOND_POINT, FIRST_AXES)
 AXES_FIRST, AXES_SECOND = slice(FIRST_AXES, SECOND_AXES), slice(SECOND_AXES, APART_FIRST)
 APART = slice(APART_FIRST, LENGTH)
+#: columns of `GeneralModel.bushing`: the points on both bodies, the stretch at home along the first body's principal
+#: axes, stiffness and damping
+AT_A = slice(spatial_bushings.FIRST, spatial_bushings.SECOND)
+AT_B = slice(spatial_bushings.SECOND, spatial_bushings.APART)
+STRETCH = slice(spatial_bushings.APART, spatial_bushings.STIFFNESS)
+ELASTIC = slice(spatial_bushings.STIFFNESS, BUSHING)
 #: the codes of joints by their words
 JOINTS = {
     "spherical": SPHERICAL,
@@ -150,9 +158,29 @@ def _loads(load_case: LoadCase, index: dict[str, int], times: FloatArray, frames
     )
 
 
-def _no_bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray) -> tuple[IndexArray, FloatArray]:
-    del case, index, pairs, home
-    return np.zeros(0, dtype=np.int64), np.zeros((0, BUSHING))
+def _bushings(case: Case, index: dict[str, int], pairs: Pairs, home: FloatArray) -> tuple[IndexArray, FloatArray]:
+    """The pair (n_bushing,) and the parameters (n_bushing, WIDTH) of each bushing (`spatial_bushings`)."""
+    where = np.zeros(len(case.bushings), dtype=np.int64)
+    rows = np.zeros((len(case.bushings), BUSHING))
+    for k, (bushing, row) in enumerate(zip(case.bushings, rows, strict=True)):
+        pair = index[bushing.bodies[0]], index[bushing.bodies[1]]
+        where[k] = pairs.setdefault(pair, len(pairs))
+        for body, columns, at in zip(pair, (AT_A, AT_B), (bushing.at_first, bushing.at_second), strict=True):
+            row[columns] = np.array(at) @ home[body, AXES].reshape(3, 3)
+        apart = _apart(home, pair, (row[AT_A], row[AT_B]))
+        row[STRETCH] = apart @ home[pair[0], TURN].reshape(3, 3)
+        row[ELASTIC] = *bushing.stiffness, *bushing.damping
+    return where, rows
+
+
+def _apart(home: FloatArray, pair: tuple[int, int], points: tuple[FloatArray, FloatArray]) -> FloatArray:
+    """(3,) from a point of a body to one of another at home, global; what only rounding has left of it is zero."""
+    ends = [_places(home, body, point) for body, point in zip(pair, points, strict=True)]
+    size = sum(
+        float(np.abs(point).sum() + np.abs(home[body, PLACE]).sum()) for body, point in zip(pair, points, strict=True)
+    )
+    apart = ends[1] - ends[0]
+    return np.where(np.abs(apart) > FITTED * size, apart, 0.0)
 
 
 def _no_contacts(case: Case, index: dict[str, int], pairs: Pairs) -> tuple[IndexArray, FloatArray, tuple[str, ...]]:
@@ -179,17 +207,13 @@ def _joint_kernels(joint: type[Joint]) -> JointRows:
 def _joint_row(joint: Any, home: FloatArray, first: int, second: int, frames: Frames) -> list[float]:
     """See `spatial_joints.WIDTH`."""
     row = np.zeros(WIDTH)
-    ends, size = [], 0.0
-    for name, body, at, axes, point, own in (
-        (joint.bodies[0], first, AT_FIRST, AXES_FIRST, joint.at_first, joint.axes_first),
-        (joint.bodies[1], second, AT_SECOND, AXES_SECOND, joint.at_second, joint.axes_second),
+    for name, at, axes, point, own in (
+        (joint.bodies[0], AT_FIRST, AXES_FIRST, joint.at_first, joint.axes_first),
+        (joint.bodies[1], AT_SECOND, AXES_SECOND, joint.at_second, joint.axes_second),
     ):
         row[at] = in_frame(frames, name, np.array(point, dtype=np.float64))
         row[axes] = in_frame(frames, name, np.asarray(own)).ravel()
-        ends.append(_places(home, body, row[at]))
-        size += float(np.abs(row[at]).sum() + np.abs(home[body, PLACE]).sum())
-    apart = ends[1] - ends[0]
-    row[APART] = np.where(np.abs(apart) > FITTED * size, apart, 0.0)
+    row[APART] = _apart(home, (first, second), (row[AT_FIRST], row[AT_SECOND]))
     row[LENGTH] = getattr(joint, "length", 0.0)
     return [float(value) for value in row]
 
@@ -219,7 +243,8 @@ SPACE = Dimension(
     stated=_stated,
     places=_places,
     loads=_loads,
-    bushings=_no_bushings,
+    bushings=_bushings,
+    half_turn=half_turn,
     contacts=_no_contacts,
     reaches=lambda contact: np.zeros(len(contact)),
     joint_code=lambda kind: JOINTS[kind.type],

@@ -19,6 +19,8 @@ from mdstopo.status import Status
 
 #: codes that kernels return; `status_of` gives the sentence (NEEDS_ROOM never leaves the engine)
 OK, NON_FINITE, STEP_LIMIT, STEP_TOO_SMALL, NEWTON_FAILED, NEEDS_ROOM, SINGULAR, CHATTERING, UNSETTLED = range(9)
+#: found in the states of a run that has ended (`spatial_half_turns`)
+HALF_TURN = 9
 
 _STATUS = {
     OK: Status.OK,
@@ -29,6 +31,7 @@ _STATUS = {
     SINGULAR: Status.SINGULAR,
     CHATTERING: Status.CHATTERING,
     UNSETTLED: Status.NO_EQUILIBRIUM,
+    HALF_TURN: Status.HALF_TURN,
 }
 
 #: positions in the array of work counts: states at which forces were summed, those of them with tangents, accepted

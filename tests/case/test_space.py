@@ -300,7 +300,6 @@ def test_a_spatial_key_in_the_plane_names_the_planar_one(old: str, new: str, mes
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("joints: []", "bushings: [{bodies: [a, b], at: [0, 0, 0]}]", "bushings: bushings are not in space yet"),
         ("joints: []", "contacts: [{points: p, on: {}}]", "contacts: contacts are not in space yet"),
         (
             "joints: []",

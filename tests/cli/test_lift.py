@@ -163,11 +163,6 @@ def test_cases_of_the_project_are_lifted(name: str) -> None:
         ),
         (
             "points:\n",
-            "bushings: [{bodies: [a, b], at: [0, 0], stiffness: [1, 1, 1]}]\npoints:\n",
-            "x.yaml:13:11: bushings: bushings are not in space yet: it cannot be lifted",
-        ),
-        (
-            "points:\n",
             "solver: {integrator: generalized_alpha}\npoints:\n",
             "x.yaml:13:22: solver.integrator: generalized_alpha is not in space yet: it cannot be lifted",
         ),

@@ -15,7 +15,8 @@ from mdstopo.mechanics.kinematics.spatial_lines import add_column
 from mdstopo.mechanics.kinematics.spatial_poses import D_RATE, D_SINCE, FREEDOMS, HOME_AXES, S_SINCE, S, W
 from mdstopo.mechanics.kinematics.vectors import add, cross, plus, times, turned, turned_back, unit, vector_at
 
-#: columns of `GeneralModel.bushing`: both points, the stretch at home (axes of the first body), stiffness and damping
+#: columns of `GeneralModel.bushing`: both points and the stretch at home, in principal axes (of the first body), then
+#: stiffness and damping along the axes that the case gives the first body
 FIRST, SECOND, APART, STIFFNESS, DAMPING = 0, 3, 6, 9, 15
 WIDTH = 21
 
