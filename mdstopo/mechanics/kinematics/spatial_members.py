@@ -15,6 +15,7 @@ import math
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.compiler.padding import whole_vectors
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
 from mdstopo.mechanics.kinematics.spatial_lines import (
     NO_LENGTH,
@@ -41,6 +42,19 @@ from mdstopo.mechanics.kinematics.spatial_poses import (
     W,
     fill_attitude,
 )
+from mdstopo.mechanics.kinematics.spatial_springs import (
+    ENERGY,
+    EXCESS,
+    L0,
+    PULL,
+    P,
+    Q,
+    alike_damping,
+    alike_sums,
+    alike_tangent,
+    elastic_designs,
+    far,
+)
 from mdstopo.mechanics.kinematics.vectors import (
     add,
     cross,
@@ -54,11 +68,6 @@ from mdstopo.mechanics.kinematics.vectors import (
 )
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
 from mdstopo.mechanics.laws.table import SPRING, law
-
-#: rows of `GeneralModel.member`: the ends P and Q in body frames, l0, and L^2 - l0^2 at home
-P, Q, L0, EXCESS = 0, 3, 6, 7
-#: columns of sums over members: the energy, and its slopes
-ENERGY, PULL = FREEDOMS, FREEDOMS + 1
 
 
 @part
@@ -199,7 +208,15 @@ def _add_tangent(e, arm, lever, y, speed, rate, w, f, fd, fr, o):
 @kernel
 def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
     """Forces, energy and tangents of springs; see `kinematics_interface.spring_sums`."""
-    member_sums(model, SPRING, p, start, count, counted, 0.0, 0.0, member_state, r, tangent, o)
+    stop = start + whole_vectors(count)
+    width = model.member.shape[1]
+    rows = model.member.reshape(model.member.size)
+    scale = member_state.reshape(member_state.size)
+    alike_sums(rows, width, scale, start, stop, p, r, counted, o)
+    if tangent:
+        alike_tangent(rows, width, scale, start, stop, p, r, o)
+        if p[1] != 0.0:
+            alike_damping(rows, width, scale, start, stop, p, r, o)
 
 
 @kernel
@@ -223,14 +240,8 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
 @part
 def spring_designs(model, p, lo, count, rel, u, pair, out):
     """`member_designs` of springs at many poses; see `kinematics_interface.spring_designs`."""
-    for s in range(rel.shape[0]):
-        r = rel[s, pair]
-        move = vector_at(u[s, pair], 0)
-        turn = vector_at(u[s, pair], 3)
-        for i in range(lo, lo + count):
-            x, arm, length, y = vector_of(model, i, r)
-            stretch = stretched(model, i, r, x, length)
-            out[i] += p[0] * stretch * (y * dot(x, plus(move, cross(turn, arm))))
+    rows = model.member.reshape(model.member.size)
+    elastic_designs(rows, model.member.shape[1], lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 
 
 @part
@@ -267,12 +278,8 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
 @part
 def keep_apart(model, lo, count, before, after):
     """Whether no member's ends can meet between two poses; see `kinematics_interface.keep_apart`."""
-    for i in range(lo, lo + count):
-        x, _, length, _ = vector_of(model, i, before)
-        moved = minus(vector_of(model, i, after)[0], x)
-        if not dot(moved, moved) < length * length:
-            return False
-    return True
+    rows = model.member.reshape(model.member.size)
+    return far(rows, model.member.shape[1], lo, lo + whole_vectors(count), before, after)
 
 
 @part
