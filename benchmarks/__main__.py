@@ -19,6 +19,7 @@ SECTIONS = {
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
+    "space": "objective and exact gradient of one scene in the plane and in space",
     "rows": "cost of many competing peaks and members, whose gradients are pulled back in one sweep",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
@@ -50,6 +51,7 @@ PAGES = {
     "bars": "docs/performance.md",
     "orders": "docs/accuracy.md",
     "chain": "docs/performance.md",
+    "space": "docs/performance.md",
     "fronts": "docs/performance.md",
 }
 
