@@ -33,10 +33,11 @@ from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, 
 from mdstopo.integrators.steps import FORCES
 from mdstopo.mechanics.kinematics.kinematics_interface import difference, retract
 
-#: an integrand that is a norm has no direction at a stage where it is below ASIDE of its value inside the step; below
+#: an integrand that is a norm has no direction at a stage where it is below ASIDE of its value inside the step: it is
+#: given that of a state which is INWARDS of the way from there, where even one that has passed zero has not; below
 #: VANISHING, any that has kinks may have turned round; and two forces may differ by VANISHING, relative, where one
 #: takes over from the other as the largest
-ASIDE, VANISHING = 1e-6, 0.02
+ASIDE, INWARDS, VANISHING = 1e-6, 4e-6, 0.02
 
 
 @kernel
@@ -433,12 +434,12 @@ def one_sided(
         way = np.empty(n)
         difference(model, history.stage_q[inside], history.stage_q[at], way)
         for d in range(n):
-            way[d] *= ASIDE
-            v[d] = history.stage_v[at, d] + ASIDE * (history.stage_v[inside, d] - history.stage_v[at, d])
-            a[d] = history.stage_a[at, d] + ASIDE * (history.stage_a[inside, d] - history.stage_a[at, d])
+            way[d] *= INWARDS
+            v[d] = history.stage_v[at, d] + INWARDS * (history.stage_v[inside, d] - history.stage_v[at, d])
+            a[d] = history.stage_a[at, d] + INWARDS * (history.stage_a[inside, d] - history.stage_a[at, d])
         retract(model, history.stage_q[at], way, q)
         for r in range(model.size[0]):
-            lam[r] = history.lam[at, r] + ASIDE * (history.lam[inside, r] - history.lam[at, r])
+            lam[r] = history.lam[at, r] + INWARDS * (history.lam[inside, r] - history.lam[at, r])
         t = history.when[at]
         response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, own, own_rows)
         return value, who, same

@@ -3,7 +3,9 @@
 A quadrature is of high order only where the integrand is smooth. So where such a response is integrated, the motion is
 first looked at, and computed once more with steps that end at its kinks (and around bends that are nearly such, where
 derivatives bend more sharply than values; for values see `quadrature_breakpoints`). The
-integrand is continuous there, so that its derivatives need no term of their own.
+integrand is continuous there, so that its derivatives need no term of their own. They jump there, and at the end of a
+step beside a norm's zero they belong to a vector that all but vanishes: what the last stages of a long step are off by,
+which is more than the step is, would turn it anywhere. Steps beside a zero are therefore short (`BESIDE`).
 """
 
 from collections.abc import Sequence
@@ -14,10 +16,15 @@ import numpy as np
 from mdstopo.general.extremes import FRACTION, STEP, VALUE, EvaluateAt
 from mdstopo.general.minima import LOW, Pieces
 from mdstopo.general.model import GeneralModel
+from mdstopo.general.responses import has_norm
 from mdstopo.scene.model import FloatArray
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
+
+#: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
+#: off by its length to the sixth power or so
+BESIDE = 0.1
 
 
 def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
@@ -36,7 +43,11 @@ def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
         w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
         time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
         found.append(time)
-        found += _around(time, low, rate, float(t[0]), float(t[-1]))
+        around = _around(time, low, rate, float(t[0]), float(t[-1]))
+        if not around and has_norm(driver.scene.model, j):
+            beside = BESIDE * float(pieces.t[w + 1] - pieces.t[w])
+            around = [each for each in (time - beside, time + beside) if t[0] < each < t[-1]]
+        found += around
     return found
 
 

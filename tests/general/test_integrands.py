@@ -435,3 +435,36 @@ def test_rounding_is_not_halved_on_and_on():
     t = np.linspace(0.0, 1.0, 11)
     found = halves(t, t, lambda places: rng.normal(size=len(places)), np.stack([nodes + 1, weights]) / 2, 1e-9)
     assert len(found) < 1000
+
+
+#: an arm that swings there and back: every point of it comes to rest at the turns
+ARM = """
+format: 1
+time: {end: 0.8}
+bodies:
+  arm: {mass: 0.94, inertia: 0.138, position: [0, -0.14]}
+joints:
+  - {name: p, type: revolute, bodies: [ground, arm], at: [-0.22, 0.115]}
+loads:
+  - {body: arm, moment: {table: [[0, -2.4], [0.2, 7.2], [0.5, 2.2], [0.8, 2.4]]}}
+points:
+  p: {body: ground, grid: {list: [[0.49, 0.5], [-1.75, 0.74], [-1.53, 0.16]]}}
+  q: {body: arm, grid: {list: [[-0.135, -0.285], [-0.087, 0.13], [-0.07, 0]]}}
+members:
+  g: {from: p, to: q, connect: pairs, law: {type: spring, stiffness: 92, damping: 3.3}}
+design: {initial: 1}
+objectives:
+  F: {response: {velocity: {body: arm, at: [0.37, 0.07]}}, over_time: integral}
+solver: {integrator: runge_kutta}
+"""
+
+
+@pytest.mark.parametrize("alpha", [[0.865, 1.436, 0.387], [0.54, 0.588, 1.258], [0.311, 0.508, 1.242]])
+def test_a_vector_that_passes_zero_has_its_direction_on_either_side_at_any_tolerance(alpha):
+    """The last stages of a step are off by more than the step: long steps beside the zero were wrong by thousands."""
+    alpha = np.array(alpha)
+    exact = evaluate(read_case(ARM, overrides={"solver.tolerance": 1e-12}), alpha).gradients["F"]
+    for tolerance in (1e-6, 1e-7, 1e-8, 1e-9):
+        found = evaluate(read_case(ARM, overrides={"solver.tolerance": tolerance}), alpha).gradients["F"]
+        assert np.abs(found - exact).max() <= 10.0 * tolerance * np.abs(exact).max()
+    assert exact == pytest.approx(differences(read_case(ARM), "F", alpha, 1e-3), rel=1e-6)
