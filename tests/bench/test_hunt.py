@@ -277,3 +277,20 @@ def test_a_scene_written_in_another_way_is_the_same_to_the_second_model(model, s
         again = model(scene(seed, change), alpha, values(scene(seed, change))).pieces[-1](0.8)
         for at in range(0, len(places) // 2, 3):
             assert again[at : at + 2] == pytest.approx(change.point(*places[at : at + 2]), abs=1e-9)
+
+
+def test_a_vector_that_passes_zero_is_seen_to_be_zero_there(monkeypatch):
+    """A search for the lowest length knows the time to half the digits: 1e-8 of an acceleration were taken for true."""
+    from tests.test_project import ROOT
+
+    monkeypatch.syspath_prepend(str(ROOT))
+    from benchmarks.hunt_reductions import kinks
+
+    way = np.array([0.7, -0.4])
+
+    def look(t):
+        return way * np.sin(3.0 * (t - 0.3137))
+
+    grid = np.linspace(0.0, 0.8, 41)
+    (t,) = kinks(look, grid, np.array([look(each) for each in grid]), False)
+    assert np.linalg.norm(look(t)) < 1e-14
