@@ -7,7 +7,7 @@ from dataclasses import replace
 from mdstopo.case.joints.joint import record_of
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
 from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
-from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Flag, Kind, explained
+from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, explained
 from mdstopo.case.mesh_files import MeshFile
 from mdstopo.case.not_yet import NotYet, NotYetAs
 from mdstopo.case.number_rows import Rows, Signals
@@ -308,8 +308,6 @@ SPATIAL_SOLVER = with_keys(
     SOLVER,
     replace(_INTEGRATOR, kind=NotYetAs(_INTEGRATOR.kind, ("gauss", "generalized_alpha"))),
     replace(_SENSITIVITY, kind=NotYetAs(_SENSITIVITY.kind, ("iterative",))),
-    with_kind(SOLVER, "assemble", NotYetAs(Flag(), (True,))),
-    with_kind(SOLVER, "settle", NotYetAs(Flag(), (True,))),
 )
 SPACE_FORMAT = with_keys(
     FORMAT,

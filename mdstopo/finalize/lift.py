@@ -314,8 +314,6 @@ class _Lift:
         refused = {
             "integrator": ("gauss", "generalized_alpha"),
             "sensitivity": ("iterative",),
-            "assemble": (True,),
-            "settle": (True,),
         }
         for key, values in refused.items():
             if old.get(key) in values:

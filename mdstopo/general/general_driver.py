@@ -182,13 +182,12 @@ class GeneralDriver:
                     (joint, f"the start velocities tear {describe(joint)} apart at {rate:.3g} (m/s or rad/s)")
                 )
         if mistakes:
-            can_move = not move and self.case.dimension == 2
-            hint = "; `solver: {assemble: true}` moves the start to the nearest that fits" if can_move else ""
+            hint = "" if move else "; `solver: {assemble: true}` moves the start to the nearest that fits"
             raise CaseError(
                 [self.case.marks.mistake(f"joints[{joint.index}]", text + hint) for joint, text in mistakes],
                 str(self.case.path or self.case.name),
             )
-        self.moved = float(np.abs(q - model.q0).max())
+        self.moved = float(np.abs(self.scene.kinematics.difference(q, model.q0)).max())
         if move:
             self._start = q, v
             self._place()

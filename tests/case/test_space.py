@@ -321,8 +321,6 @@ def test_a_spatial_key_in_the_plane_names_the_planar_one(old: str, new: str, mes
             "solver: {sensitivity: iterative}",
             "solver.sensitivity: found the text 'iterative', which is not in space yet",
         ),
-        ("joints: []", "solver: {assemble: true}", "solver.assemble: found true, which is not in space yet"),
-        ("joints: []", "solver: {settle: true}", "solver.settle: found true, which is not in space yet"),
     ],
 )
 def test_what_is_not_in_space_yet_is_refused_by_name(old: str, new: str, message: str) -> None:

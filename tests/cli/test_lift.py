@@ -166,7 +166,6 @@ def test_cases_of_the_project_are_lifted(name: str) -> None:
             "solver: {integrator: generalized_alpha}\npoints:\n",
             "x.yaml:13:22: solver.integrator: generalized_alpha is not in space yet: it cannot be lifted",
         ),
-        ("points:\n", "solver: {settle: true}\npoints:\n", "solver.settle: true is not in space yet"),
         ("position: [0, -1], angle: 0.5", "position: [0, -1]", "response.angle: it is not 0 at the start"),
     ],
 )
