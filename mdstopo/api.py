@@ -131,8 +131,6 @@ def evaluate(
     """
     if method not in METHODS:
         raise ValueError(f"no sensitivity method {method!r}; there are: {', '.join(METHODS)}")
-    if method == "iterative" and case.dimension == 3:
-        raise ValueError("the iterative method is not in space yet; adjoint and direct are")
     evaluator, design = _evaluator(case), _design(case, alpha, variables)
     chosen = None if method == "auto" else method
     found = evaluator.evaluate(design, gradient, chosen)

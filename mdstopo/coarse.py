@@ -47,6 +47,8 @@ def _largest(driver: SceneDriver, alpha: FloatArray) -> list[float] | None:
     status, steps = driver.simulate(alpha)
     if status is not Status.OK:
         return None
-    moved = np.abs(np.stack([steps.q - steps.q[0], steps.v], axis=1))
-    along, turned = moved.reshape(len(moved), 2, -1, 3)[..., :2], moved[..., 2::3]
+    moved = driver.displacements(steps.q)
+    both = np.abs(np.stack([moved, steps.v.reshape(moved.shape)], axis=1))
+    each = both.shape[-1]  # three in a plane, two of them places; six in space, three of them
+    along, turned = np.split(both, [each - each // 2], axis=-1)
     return [float(along[:, 0].max()), float(turned[:, 0].max()), float(along[:, 1].max()), float(turned[:, 1].max())]

@@ -303,11 +303,9 @@ _CONSTRAINT = with_keys(CONSTRAINT, with_kind(CONSTRAINT, "response", _RESPONSE)
 
 # How it is computed: what is not in space yet.
 _INTEGRATOR = next(key for key in SOLVER.keys if key.name == "integrator")
-_SENSITIVITY = next(key for key in SOLVER.keys if key.name == "sensitivity")
 SPATIAL_SOLVER = with_keys(
     SOLVER,
-    replace(_INTEGRATOR, kind=NotYetAs(_INTEGRATOR.kind, ("gauss", "generalized_alpha"))),
-    replace(_SENSITIVITY, kind=NotYetAs(_SENSITIVITY.kind, ("iterative",))),
+    replace(_INTEGRATOR, kind=NotYetAs(_INTEGRATOR.kind, ("gauss",))),
 )
 SPACE_FORMAT = with_keys(
     FORMAT,

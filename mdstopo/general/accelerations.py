@@ -52,6 +52,10 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     point_joint_vjp,
     pose_size,
     rotations,
+    shift_size,
+    shift_tangents,
+    slope_by_shift,
+    turn_slope_by_shift,
 )
 
 #: what the solution at one state needs and leaves: attitudes, relative poses, sums, forces, K, C, slope
@@ -59,10 +63,12 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 #: right side and the scales of its unknowns, which make every row about 1 whatever the masses; of the joints' matrix
 #: the inverse masses, by coordinates and by slopes, Phi_q M^-1, the factors and the diagonal; one joint's own
 #: coordinates, their derivatives and multipliers; the known accelerations of what is driven; which pairs carry more
-#: than joints, and the switches (`switches`); what kinematics keep of the stages of a step (`stage_state`)
+#: than joints, and the switches (`switches`); what kinematics keep of the stages of a step (`stage_state`); how turns
+#: change with a shift of none, and with that of an implicit step (`shift_tangents`)
 FIELDS = (
     "turned", "rel", "sums", "f", "k", "c", "turn", "mass", "phi", "jac", "gamma", "by_q", "by_v", "band", "pivots",
     "x", "scale", "inverse", "spread", "pull", "gram", "diagonal", "own", "known", "carries", "switches", "slopes",
+    "tangents",
 )  # fmt: skip
 
 
@@ -73,6 +79,8 @@ class Workspace:
 
 
 bundle(Workspace, FIELDS)
+#: of `tangents`: coordinates that change by themselves, and by the shift of an implicit step
+NO_SHIFT, OF_STEP = range(2)
 
 
 @kernel
@@ -84,6 +92,8 @@ def make_workspace(model):
     total = model.place.shape[0]
     both = pair_freedoms(model)
     rows = most_rows(model)
+    tangents = np.zeros((2, n // freedoms(model), shift_size(model)))
+    shift_tangents(model, model.q0, model.q0, tangents[NO_SHIFT])
     return Workspace(
         np.zeros((model.home.shape[0], attitude(model))),
         np.zeros((n_pair, pose_size(model))),
@@ -112,6 +122,7 @@ def make_workspace(model):
         carriers(model),
         switches_of(model),
         np.zeros((max(STAGES) if coordinates(model) != freedoms(model) else 0, n)),
+        tangents,
     )
 
 
@@ -171,7 +182,7 @@ def joint_slopes(model, q, v, a, lam, workspace):
 
 
 @kernel
-def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
+def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, tangents, transposed):
     """Factorise W(w_q, w_v), or its transpose, for `solve_unknowns`.
 
     Constant:
@@ -180,6 +191,7 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
       turn (n, `load_slopes`): slopes of the turning loads by the turns of their bodies.
       mass (n_pair, 2 D, 2 D): mass of the inerters (kg, kg m, kg m^2).
       w_q, w_v: weights of K with G_q (s^2), and of C with G_v (s).
+      tangents (n_body, SHIFT): K and G_q are those by a shift whose turns change so (`shift_tangents`).
       transposed: whether the transpose is meant.
     In and out:
       workspace: the workspace, with the joints' Phi_q, G_q and G_v; the factors come onto it.
@@ -224,8 +236,9 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
         if tangent and model.free[d] != 0:
             for r in range(rotations(model)):
                 angle = place_of_turn(model, d, r)
-                if model.free[angle] != 0 and turn[d, r] != 0.0:
-                    put(band, half, scale, p, model.place[angle], -w_q * turn[d, r], transposed)
+                slope = turn_slope_by_shift(model, turn, d, r, tangents, d // freedoms(model))
+                if model.free[angle] != 0 and slope != 0.0:
+                    put(band, half, scale, p, model.place[angle], -w_q * slope, transposed)
             for r in range(rotations(model), load_slopes(model)):
                 angle = place_of_turn(model, d, r - rotations(model))
                 if model.free[angle] != 0 and turn[d, r] != 0.0:
@@ -241,7 +254,7 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
                     continue
                 value = mass[p, i, j]
                 if tangent:
-                    value += w_q * k[p, i, j]
+                    value += w_q * slope_by_shift(model, k, p, i, j, tangents, column // freedoms(model))
                     if damped:
                         value += w_v * c[p, i, j]
                 if value != 0.0:
@@ -260,7 +273,9 @@ def factor_matrix(model, workspace, k, c, turn, mass, w_q, w_v, transposed):
                 force = workspace.jac[j, r, i]
                 value = force
                 if tangent:
-                    value += w_q * workspace.by_q[j, r, i] + w_v * workspace.by_v[j, r, i]
+                    body = column // freedoms(model)
+                    by_q = slope_by_shift(model, workspace.by_q, j, r, i, tangents, body)
+                    value += w_q * by_q + w_v * workspace.by_v[j, r, i]
                 put(band, half, scale, there, at, force, transposed)
                 put(band, half, scale, at, there, value, transposed)
     return factorise_at(band, half, workspace.pivots, tangent)
@@ -342,7 +357,16 @@ def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspac
         add_inerters(model, segment, member_state, q, v, workspace.mass, workspace.f)
     joint_state(model, q, v, workspace)
     singular = factor_matrix(
-        model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, np.bool_(False)
+        model,
+        workspace,
+        workspace.k,
+        workspace.c,
+        workspace.turn,
+        workspace.mass,
+        0.0,
+        0.0,
+        workspace.tangents[NO_SHIFT],
+        np.bool_(False),
     )
     if singular >= 0:
         return singular

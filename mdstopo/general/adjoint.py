@@ -10,7 +10,13 @@ T z). An event on the way changes the cotangents by saltation (`events`); a peak
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.accelerations import accelerations_vjp, factor_matrix, solve_accelerations, solve_unknowns
+from mdstopo.general.accelerations import (
+    NO_SHIFT,
+    accelerations_vjp,
+    factor_matrix,
+    solve_accelerations,
+    solve_unknowns,
+)
 from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.method_interface import point_of, step_back, weights_of
@@ -210,7 +216,18 @@ def row_cotangents(
         bar_set[:] = 0.0
         add_looked_sets(model, member_state, segment, j, who, t, q, v, a, bars, 1.0, bar_set)
     z = bars[2]
-    factor_matrix(model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, np.bool_(True))
+    factor_matrix(
+        model,
+        workspace,
+        workspace.k,
+        workspace.c,
+        workspace.turn,
+        workspace.mass,
+        0.0,
+        0.0,
+        workspace.tangents[NO_SHIFT],
+        np.bool_(True),
+    )
     solve_unknowns(model, workspace, z, row_bar)
     accelerations_vjp(model, workspace, workspace.k, workspace.c, workspace.turn, z, row_bar, bars[0], bars[1])
     free_only(model, bars[0])

@@ -560,6 +560,11 @@ class GeneralDriver:
                 return member_in_words(group, i + block[OFFSET])
         return "a member"
 
+    def displacements(self, q: FloatArray) -> FloatArray:
+        """(T, n_body, D): by how much bodies have moved and turned (m, rad) at q (T, n_q) since its first row."""
+        bodies = self.scene.kinematics
+        return bodies.differences(q, q[0]).reshape(len(q), -1, bodies.freedoms)
+
     def simulate(self, alpha: FloatArray) -> tuple[Status, "GeneralSteps"]:
         """Simulate alpha (N,); the steps come back in arrays of their own."""
         code, count, _ = self.run(alpha, False)

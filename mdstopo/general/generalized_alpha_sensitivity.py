@@ -8,6 +8,7 @@ beside q and v are the acceleration and the auxiliary one (rows 0 and 1 of lam_x
 import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
+from mdstopo.general.accelerations import OF_STEP
 from mdstopo.general.generalized_alpha import TAG
 from mdstopo.general.method_interface import implement
 from mdstopo.general.projection import project_back, project_forward
@@ -15,7 +16,15 @@ from mdstopo.general.step_history import FIRST
 from mdstopo.general.step_linear import prepare_stage_back, stage_back, stage_forward
 from mdstopo.integrators.generalized_alpha import weights_of as alpha_weights
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.mechanics.kinematics.kinematics_interface import cubic, cubic_jvp, cubic_vjp, retract_jvp, retract_vjp
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    add_shift,
+    cubic,
+    cubic_jvp,
+    cubic_vjp,
+    retract_jvp,
+    retract_vjp,
+    shift_tangents,
+)
 
 
 @kernel
@@ -124,6 +133,8 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
         e1, _, _, beta, gamma, _ = weights
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
+        if j == last:
+            shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
         prepare_stage_back(model, history, o + j, w_q, w_v, workspace)
         for m in range(count):
             _stage_row_back(
@@ -271,10 +282,13 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
                 u[d] = 0.0
         w_q = h * h * beta * e1 if j == last else 0.0
         w_v = h * gamma * e1 if j == last else 0.0
+        if j == last:
+            shift_tangents(model, history.q[w], history.stage_q[o + j], workspace.tangents[OF_STEP])
         settled = stage_forward(model, history, o + j, w_q, w_v, sweeps, workspace, x, u, f, rows[j]) and settled
+        if j == last:
+            add_shift(model, workspace.tangents[OF_STEP], w_q, f, x)
         for d in range(n):
             if j == last:
-                x[d] += w_q * f[d]
                 u[d] += w_v * f[d]
                 aux[d] = e1 * f[d] + e2 * da[d] - e3 * aux[d]
                 da[d] = f[d]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.accelerations import factor_matrix, solve_accelerations, solve_unknowns, subtract_matrices
+from mdstopo.general.accelerations import OF_STEP, factor_matrix, solve_accelerations, solve_unknowns, subtract_matrices
 from mdstopo.general.projection import project
 from mdstopo.general.step_history import copy_vector, keep_stage
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
@@ -18,6 +18,8 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     motion_weights,
     noise_of,
     retract,
+    shift_further,
+    shift_tangents,
     turned_pose,
 )
 
@@ -118,6 +120,7 @@ def advance(
     v0 = state[VELOCITY]
     a = state[ACCELERATION]
     x = state[AUXILIARY]
+    way = np.empty(n)
     shift = np.empty(n)
     now = np.empty(n)
     x_now = np.empty(n)
@@ -164,9 +167,9 @@ def advance(
                 if newton == 0 and not starting:
                     x_now[d] = 4.0 * (x[d] + guess[1, d]) - 6.0 * guess[0, d] - guess[2, d]
                 now[d] = (x_now[d] - e2 * a[d] + e3 * x[d]) / e1
-                shift[d] = h * (v0[d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
+                way[d] = h * (v0[d] + h * ((0.5 - beta) * x[d] + beta * x_now[d]))
                 v[d] = v0[d] + h * ((1.0 - gamma) * x[d] + gamma * x_now[d])
-            retract(model, q0, shift, q)
+            retract(model, q0, way, q)
             previous = np.inf
         singular = solve_accelerations(model, member_state, segment, t + h, q, v, yes, workspace, balanced, lam)
         work[FORCES] += 1
@@ -192,6 +195,7 @@ def advance(
                     for i in range(pair_freedoms(model)):
                         column = place_in_joint(model, j, i)
                         row[model.row[j, r]] += workspace.jac[j, r, i] * balanced[column]
+        shift_tangents(model, q0, q, workspace.tangents[OF_STEP])
         factor_matrix(
             model,
             workspace,
@@ -201,6 +205,7 @@ def advance(
             workspace.mass,
             h * h * beta * e1,
             h * gamma * e1,
+            workspace.tangents[OF_STEP],
             np.bool_(False),
         )
         solve_unknowns(model, workspace, delta, row)
@@ -221,7 +226,7 @@ def advance(
             change = weight[d] * abs(shift[d])
             if not change <= e and not np.isnan(e):
                 e = change
-        retract(model, q, shift, q)
+        shift_further(model, q0, way, shift, q)
         if e <= newton_tolerance or (e >= 0.5 * previous and e < rounding):
             break
         previous = e

@@ -2,14 +2,17 @@
 
     M (q+ - q-) + Phi_q(q+)^T mu = 0,  Phi(q+) = 0;      M (v+ - v-) + Phi_q(q+)^T nu = 0,  Phi_q(q+) v+ = 0
 
-What a step has drifted is of the order of its error, so mu and nu are small; their terms are kept in the derivatives
-all the same, so that these belong to what was computed. Driven coordinates are in place already and stay.
+where q- - q+ is the shift e that leads from q+ to q- (`difference`). What a step has drifted is of the order of its
+error, so mu and nu are small; their terms are kept in the derivatives all the same, so that these belong to what was
+computed. In space that includes how the shift itself turns: M de = M J(e)^-1 dq- - M J(e)^-T dq+ of its turns
+(`add_shift_curvature`, `turn_back`). Driven coordinates are in place already and stay.
 """
 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import (
+    NO_SHIFT,
     factor_matrix,
     gather,
     gather_multipliers,
@@ -17,11 +20,13 @@ from mdstopo.general.accelerations import (
     matrices_vjp,
     solve_unknowns,
 )
-from mdstopo.general.model import JOINT_PAIR, JOINT_ROWS
+from mdstopo.general.model import JOINT_FIRST, JOINT_PAIR, JOINT_ROWS
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.switches import DIAGONAL
 from mdstopo.mechanics.kinematics.kinematics_interface import (
+    add_shift_curvature,
     difference,
+    freedoms,
     joint_places,
     joint_stiffness,
     joint_velocity_slope,
@@ -30,6 +35,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     moved_most,
     place_joint,
     retract,
+    turn_back,
     turn_bodies,
 )
 
@@ -92,7 +98,9 @@ def project(model, scale, q, v, workspace, mu, nu):
         if worst <= 1e-15 * min(moved, scale) or not worst < last:
             break
         last = worst
-        singular = factor_matrix(model, workspace, none, none, workspace.turn, none, 0.0, 0.0, np.bool_(False))
+        singular = factor_matrix(
+            model, workspace, none, none, workspace.turn, none, 0.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(False)
+        )
         if singular >= 0:
             return singular
         difference(model, start, q, shift)
@@ -107,7 +115,9 @@ def project(model, scale, q, v, workspace, mu, nu):
     else:
         turn_bodies(model, q, workspace.turned)
         joint_state(model, q, v, workspace)
-    singular = factor_matrix(model, workspace, none, none, workspace.turn, none, 0.0, 0.0, np.bool_(False))
+    singular = factor_matrix(
+        model, workspace, none, none, workspace.turn, none, 0.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(False)
+    )
     if singular >= 0:
         return singular
     for d in range(n):
@@ -127,18 +137,20 @@ def project(model, scale, q, v, workspace, mu, nu):
 
 
 @kernel
-def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope):
-    """How the products of Phi_q with mu, nu and v change with the coordinates.
+def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope, shift):
+    """How the products of Phi_q with mu, nu and v, and of the mass with the shift, change with the coordinates.
 
     Constant:
       model: the compiled scene.
     In:
       q, v (n,): the projected state (m, rad; m/s, rad/s).
       mu, nu (n_row,): multipliers that moved it there.
-      workspace: workspace of a balance, with the bodies turned (`forces.turn_bodies`).
+      workspace: workspace of a balance, with the bodies turned (`forces.turn_bodies`) and Phi_q.
     Out:
-      h_mu, h_nu (n_pair, 2 D, 2 D): d(Phi_q^T mu)/dq and d(Phi_q^T nu)/dq of the joints of each pair.
+      h_mu, h_nu (n_pair, 2 D, 2 D): d(Phi_q^T mu)/dq and d(Phi_q^T nu)/dq of the joints of each pair; with the first
+        what the shift's own turns add.
       slope (n_joint, rows, 2 D): d(Phi_q v)/dq.
+      shift (n,): how far it is from here to where the state was before, M^-1 Phi_q^T mu.
     """
     w = np.empty(joint_places(model))
     wd = np.empty(pair_freedoms(model))
@@ -153,6 +165,23 @@ def _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope):
         gather_multipliers(model, j, nu, mine)
         joint_stiffness(model, j, w, mine, h_nu[model.joint[j, JOINT_PAIR]])
         joint_velocity_slope(model, j, w, wd, slope[j])
+    shift[:] = 0.0
+    for j in range(model.joint.shape[0]):
+        for r in range(most_rows(model)):
+            own = model.row[j, r]
+            if own >= 0:
+                for i in range(pair_freedoms(model)):
+                    shift[place_in_joint(model, j, i)] += workspace.jac[j, r, i] * mu[own]
+    for d in range(shift.shape[0]):
+        shift[d] = shift[d] / model.mass[d] if model.free[d] != 0 else 0.0
+    seen = np.zeros(model.home.shape[0], np.bool_)
+    for j in range(model.joint.shape[0]):
+        for side in range(2):
+            body = model.joint[j, JOINT_FIRST + side]
+            if not seen[body] and body < shift.shape[0] // freedoms(model):  # ground stands behind the bodies
+                seen[body] = True
+                first = freedoms(model) * side
+                add_shift_curvature(model, shift, model.mass, body, first, h_mu[model.joint[j, JOINT_PAIR]])
 
 
 @kernel
@@ -220,8 +249,11 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
         none[:] = 0.0
     turn_bodies(model, q, workspace.turned)
     joint_state(model, q, v, workspace)
-    _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)
-    factor_matrix(model, workspace, none, none, workspace.turn, none, 0.0, 0.0, np.bool_(True))
+    shift = np.empty(n)
+    _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope, shift)
+    factor_matrix(
+        model, workspace, none, none, workspace.turn, none, 0.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(True)
+    )
     left = 0
     unsettled = np.empty(count, np.int64)
     for m in range(count):
@@ -241,7 +273,18 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
     if left > 0:
         workspace.by_q[:] = 0.0
         workspace.by_v[:] = 0.0
-        factor_matrix(model, workspace, h_mu, none, np.zeros((n, load_slopes(model))), none, 1.0, 0.0, np.bool_(True))
+        factor_matrix(
+            model,
+            workspace,
+            h_mu,
+            none,
+            np.zeros((n, load_slopes(model))),
+            none,
+            1.0,
+            0.0,
+            workspace.tangents[NO_SHIFT],
+            np.bool_(True),
+        )
         for i in range(left):
             y[:] = 0.0
             solve_unknowns(model, workspace, bar_q[unsettled[i]], y)
@@ -249,6 +292,7 @@ def project_back(model, q, v, mu, nu, workspace, bar_q, bar_v):
         for d in range(n):
             bar_q[m, d] *= model.mass[d]
             bar_v[m, d] *= model.mass[d]
+        turn_back(model, shift, np.bool_(True), bar_q[m])
 
 
 @kernel
@@ -277,10 +321,12 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
     turn = np.zeros((n, load_slopes(model)))
     turn_bodies(model, q, workspace.turned)
     joint_state(model, q, v, workspace)
-    _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope)
+    shift = np.empty(n)
+    _stiffnesses(model, q, v, mu, nu, workspace, h_mu, h_nu, slope, shift)
     workspace.by_q[:] = 0.0
     workspace.by_v[:] = 0.0
-    factor_matrix(model, workspace, h_mu, none, turn, none, 1.0, 0.0, np.bool_(False))
+    factor_matrix(model, workspace, h_mu, none, turn, none, 1.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(False))
+    turn_back(model, shift, np.bool_(False), dq)
     for d in range(n):
         dq[d] *= model.mass[d]
         dv[d] *= model.mass[d]
@@ -299,5 +345,5 @@ def project_forward(model, q, v, mu, nu, workspace, dq, dv):
                 for i in range(pair_freedoms(model)):
                     value -= slope[j, r, i] * dq[place_in_joint(model, j, i)]
                 y[own] = value
-    factor_matrix(model, workspace, none, none, turn, none, 0.0, 0.0, np.bool_(False))
+    factor_matrix(model, workspace, none, none, turn, none, 0.0, 0.0, workspace.tangents[NO_SHIFT], np.bool_(False))
     solve_unknowns(model, workspace, dv, y)

@@ -4,6 +4,8 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.accelerations import (
+    NO_SHIFT,
+    OF_STEP,
     accelerations_jvp,
     accelerations_vjp,
     carried_vjp,
@@ -19,7 +21,14 @@ from mdstopo.general.step_history import FIRST, has_factors, mass_of
 from mdstopo.general.switches import DAMPED
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
-from mdstopo.mechanics.kinematics.kinematics_interface import end_jvp, stage_jvp, stage_vjp, start_vjp, turn_bodies
+from mdstopo.mechanics.kinematics.kinematics_interface import (
+    add_shift,
+    end_jvp,
+    stage_jvp,
+    stage_vjp,
+    start_vjp,
+    turn_bodies,
+)
 from mdstopo.mechanics.kinematics.planar_poses import copy_rows
 
 #: change of a sweep of the iterative method, relative, at which it has settled
@@ -73,8 +82,9 @@ def solve_stage(model, history, o, w_q, w_v, transposed, workspace, a, lam):
         )
         return
     factor_matrix(
-        model, workspace, history.K[o], history.C[o], history.turn[o], mass_of(history, o), w_q, w_v, transposed
-    )
+        model, workspace, history.K[o], history.C[o], history.turn[o], mass_of(history, o), w_q, w_v,
+        workspace.tangents[OF_STEP], transposed,
+    )  # fmt: skip
     solve_unknowns(model, workspace, a, lam)
 
 
@@ -92,7 +102,10 @@ def prepare_stage_back(model, history, o, w_q, w_v, workspace):
         copy_rows(history.turned[o], workspace.turned)
         return
     k, c = lay_out(model, history, o, workspace)
-    factor_matrix(model, workspace, k, c, history.turn[o], mass_of(history, o), w_q, w_v, np.bool_(True))
+    factor_matrix(
+        model, workspace, k, c, history.turn[o], mass_of(history, o), w_q, w_v,
+        workspace.tangents[OF_STEP], np.bool_(True),
+    )  # fmt: skip
 
 
 @kernel
@@ -299,7 +312,10 @@ def _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row):
     n = force.shape[0]
     n_row = row.shape[0]
     none = history.K[o]
-    factor_matrix(model, workspace, none, none, history.turn[o], mass_of(history, o), 0.0, 0.0, np.bool_(False))
+    factor_matrix(
+        model, workspace, none, none, history.turn[o], mass_of(history, o), 0.0, 0.0,
+        workspace.tangents[NO_SHIFT], np.bool_(False),
+    )  # fmt: skip
     x = np.zeros(n)
     y = np.zeros(n_row)
     dq = np.empty(n)
@@ -309,9 +325,10 @@ def _sweep(model, history, o, w_q, w_v, sweeps, workspace, force, row):
     last = np.inf
     for _ in range(sweeps):
         for d in range(n):
-            dq[d] = w_q * x[d]
+            dq[d] = 0.0
             dv[d] = w_v * x[d]
             force[d] = right[d]
+        add_shift(model, workspace.tangents[OF_STEP], w_q, x, dq)
         for r in range(n_row):
             row[r] = right_row[r]
         accelerations_jvp(model, workspace, history.K[o], history.C[o], history.turn[o], dq, dv, force, row)

@@ -26,10 +26,12 @@ FEWEST = 16
 
 @dataclass(frozen=True)
 class _Run:
-    """One try. rows: per objective the peak times, values and gradients; states: (T, n) at times t (T,)."""
+    """One try. rows: per objective the peak times, values and gradients; moved (T, n_body, D): where
+    bodies are at times t (T,), as they have moved since the start.
+    """
 
     t: FloatArray
-    states: FloatArray
+    moved: FloatArray
     rows: tuple[tuple[FloatArray, FloatArray, FloatArray], ...]
 
 
@@ -69,7 +71,7 @@ def _run(driver: SceneDriver, alpha: FloatArray, step: float) -> _Run | None:
     try:
         if not driver.shapes:
             status, steps = driver.simulate(alpha)
-            return _Run(steps.t.copy(), steps.q.copy(), ()) if status is Status.OK else None
+            return _Run(steps.t.copy(), driver.displacements(steps.q), ()) if status is Status.OK else None
         looked = driver.evaluate(alpha, True)
         if looked.status is not Status.OK:
             return None
@@ -77,7 +79,7 @@ def _run(driver: SceneDriver, alpha: FloatArray, step: float) -> _Run | None:
         for j, count in enumerate(looked.found.tolist()):
             values = looked.rows[j, :count]
             rows.append((values[:, 0].copy(), values[:, 1].copy(), looked.gradients[j, :count].copy()))
-        return _Run(np.zeros(0), np.zeros((0, 0)), tuple(rows))
+        return _Run(np.zeros(0), np.zeros((0, 0, 0)), tuple(rows))
     finally:
         driver.settings[2] = kept
 
@@ -93,10 +95,8 @@ def _difference(coarse: _Run, fine: _Run) -> float:
         places = np.minimum(places, len(fine.t) - 1)
         places -= (places > 0) & (np.abs(fine.t[places - 1] - coarse.t) < np.abs(fine.t[places] - coarse.t))
         same = np.abs(fine.t[places] - coarse.t) <= 1e-9 * (fine.t[-1] - fine.t[0])
-        moved = fine.states[places] - fine.states[0]
-        for part in range(3):
-            a = (coarse.states - coarse.states[0])[same, part::3]
-            worst = max(worst, _relative(a, moved[same, part::3]))
+        for part in range(coarse.moved.shape[-1]):
+            worst = max(worst, _relative(coarse.moved[same, :, part], fine.moved[places][same, :, part]))
     return worst
 
 

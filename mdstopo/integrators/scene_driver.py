@@ -161,6 +161,9 @@ class SceneDriver(Protocol):
     def simulate(self, alpha: FloatArray) -> tuple[Status, Steps]:
         """Simulate a design; the steps come back in arrays of their own."""
 
+    def displacements(self, q: FloatArray) -> FloatArray:
+        """(T, n_body, D): by how much bodies have moved and turned (m, rad) at q (T, n_q) since its first row."""
+
     def response_history(self, alpha: FloatArray, times: FloatArray) -> FloatArray:
         """(n_resp, T): every response of a design at times (T,), which its motion reaches."""
 

@@ -57,6 +57,10 @@ class SpringsDriver(Driver):
         """A member in words, from its place in the padded arrays."""
         return self._diagnosis.member(padded)
 
+    def displacements(self, q: FloatArray) -> FloatArray:
+        """(T, n_body, 3): by how much bodies have moved and turned (m, rad) at q (T, n) since its first row."""
+        return (q - q[0]).reshape(len(q), -1, 3)
+
     def explain(
         self, alpha: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray
     ) -> tuple[Status, str]:

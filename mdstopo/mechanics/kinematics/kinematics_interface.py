@@ -82,9 +82,11 @@ class Kinematics:
 
     def difference(self, after: FloatArray, before: FloatArray) -> FloatArray:
         """`difference` in Python: the shift (n,) between coordinates (n_q,)."""
-        out = np.empty(len(after) // self.coordinates * self.freedoms)
-        self.kernels["difference"].py_func(None, after, before, out)
-        return out
+        return self.differences(after[None], before)[0]
+
+    def differences(self, after: FloatArray, before: FloatArray) -> FloatArray:
+        """Of many states: the shifts (T, n) that lead from coordinates (n_q,) to others (T, n_q)."""
+        return after - before
 
 
 # Sizes, which are constants where a kernel is compiled
@@ -172,6 +174,92 @@ def retract_jvp(model, q, moved, dq, dshift, out):
       dq, dshift (n,): changes of those before it and of the shift.
     Out:
       out (n,): change of those behind it.
+    """
+    raise NotImplementedError
+
+
+def shift_size(model):
+    """SHIFT: numbers of a body in `shift_tangents`."""
+    raise NotImplementedError
+
+
+def shift_tangents(model, q, moved, out):
+    """How turns of `retract` change with its shift, for `slope_by_shift` and what else takes `tangents`.
+
+    In:
+      model: the compiled scene.
+      q, moved (n_q,): coordinates before and behind a shift.
+    Out:
+      out (n_body, SHIFT): of each body.
+    """
+    raise NotImplementedError
+
+
+def slope_by_shift(model, slopes, m, r, i, tangents, body):
+    """The slope by a component of a shift, from those by what coordinates behind it change by.
+
+    model: the compiled scene.
+    slopes (., ., 2 D), m, r: an array, and where in it the slopes by two bodies stand.
+    i: the component, as a place among these.
+    tangents (n_body, SHIFT), body: as of `shift_tangents`, and the body that the component belongs to.
+    """
+    raise NotImplementedError
+
+
+def turn_slope_by_shift(model, slopes, d, r, tangents, body):
+    """`slope_by_shift` of slopes (., T or more) by the turn of one body: by component r of its turn, in row d."""
+    raise NotImplementedError
+
+
+def add_shift(model, tangents, w, shift, dq):
+    """Add to changes of coordinates what a change of a shift makes.
+
+    In:
+      model: the compiled scene.
+      tangents (n_body, SHIFT): as of `shift_tangents`.
+      w, shift (n,): the change of the shift is their product.
+    In and out:
+      dq (n,): changes of the coordinates behind it.
+    """
+    raise NotImplementedError
+
+
+def add_shift_curvature(model, shift, mass, body, first, k):
+    """Add how the mass of a body times a shift changes with the coordinates that the shift begins at, less the mass.
+
+    In:
+      model: the compiled scene.
+      shift, mass (n,): the shift, and the masses of all freedoms.
+      body, first: the body, and the place of its first freedom in k.
+    In and out:
+      k (2 D, 2 D): added to.
+    """
+    raise NotImplementedError
+
+
+def turn_back(model, shift, transposed, x):
+    """Changes of coordinates behind a shift become the change of the shift that they make, where it begins stays.
+
+    In:
+      model: the compiled scene.
+      shift (n,): the shift.
+      transposed: whether the transpose of that linear map is meant.
+    In and out:
+      x (n,): changes of coordinates, then of the shift.
+    """
+    raise NotImplementedError
+
+
+def shift_further(model, start, shift, change, q):
+    """Change a shift, and coordinates with it.
+
+    In:
+      model: the compiled scene.
+      start (n_q,): coordinates before the shift.
+      change (n,): by how much the shift changes.
+    In and out:
+      shift (n,): the shift; where coordinates are added to as numbers it is not needed and may stay.
+      q (n_q,): coordinates behind it.
     """
     raise NotImplementedError
 

@@ -390,7 +390,10 @@ def transmitted(model, j, which, q, lam, by_lam, by_q):
 
 _KERNELS = (
     coordinates, freedoms, rotations, load_slopes, attitude, most_rows, pose_size, joint_places,
-    retract, difference, retract_vjp, retract_jvp, planar_steps.advance_coordinates, moved_most,
+    retract, difference, retract_vjp, retract_jvp, planar_steps.shift_size, planar_steps.shift_tangents,
+    planar_steps.slope_by_shift, planar_steps.turn_slope_by_shift, planar_steps.add_shift,
+    planar_steps.add_shift_curvature, planar_steps.turn_back, planar_steps.shift_further,
+    planar_steps.advance_coordinates, moved_most,
     planar_steps.stage_state, planar_steps.end_state, planar_steps.stage_vjp, planar_steps.start_vjp,
     planar_steps.stage_jvp, planar_steps.end_jvp, planar_steps.cubic, planar_steps.cubic_vjp, planar_steps.cubic_jvp,
     planar_steps.quintic, planar_drives.drive_state, planar_drives.drive_acceleration,

@@ -98,6 +98,53 @@ def end_jvp(model, table, s, h, q, v, changes, dq, dv):
 
 
 @part
+def shift_size(model):
+    """A shift is added to coordinates: its tangent is 1 and needs no numbers."""
+    return 0
+
+
+@part
+def shift_tangents(model, q, moved, out):
+    """Nothing to say; see `kinematics_interface.shift_tangents`."""
+
+
+@part
+def slope_by_shift(model, slopes, m, r, i, tangents, body):
+    """As it is; see `kinematics_interface.slope_by_shift`."""
+    return slopes[m, r, i]
+
+
+@part
+def turn_slope_by_shift(model, slopes, d, r, tangents, body):
+    """As it is; see `kinematics_interface.turn_slope_by_shift`."""
+    return slopes[d, r]
+
+
+@part
+def add_shift(model, tangents, w, shift, dq):
+    """See `kinematics_interface.add_shift`."""
+    for d in range(dq.shape[0]):
+        dq[d] += w * shift[d]
+
+
+@part
+def add_shift_curvature(model, shift, mass, body, first, k):
+    """There is none; see `kinematics_interface.add_shift_curvature`."""
+
+
+@part
+def turn_back(model, shift, transposed, x):
+    """As they are; see `kinematics_interface.turn_back`."""
+
+
+@part
+def shift_further(model, start, shift, change, q):
+    """See `kinematics_interface.shift_further`."""
+    for d in range(q.shape[0]):
+        q[d] += change[d]
+
+
+@part
 def advance_coordinates(model, q, v, a, e, out):
     """Where bodies are after a time e at constant accelerations; see `kinematics_interface.advance_coordinates`."""
     for d in range(q.shape[0]):

@@ -104,6 +104,9 @@ def add_contact_curvature(model, j, q, rows, n, t, k):
 _KERNELS = (
     coordinates, freedoms, rotations, load_slopes, attitude, most_rows, pose_size, joint_places,
     spatial_steps.retract, spatial_steps.difference, spatial_steps.retract_vjp, spatial_steps.retract_jvp,
+    spatial_steps.shift_size, spatial_steps.shift_tangents, spatial_steps.slope_by_shift,
+    spatial_steps.turn_slope_by_shift, spatial_steps.add_shift,
+    spatial_steps.add_shift_curvature, spatial_steps.turn_back, spatial_steps.shift_further,
     spatial_steps.advance_coordinates, spatial_scales.moved_most,
     spatial_steps.stage_state, spatial_steps.end_state, spatial_steps.stage_vjp, spatial_steps.start_vjp,
     spatial_steps.stage_jvp, spatial_steps.end_jvp, spatial_steps.cubic, spatial_steps.cubic_vjp,
@@ -141,11 +144,12 @@ class SpatialKinematics(Kinematics):
         out[:, 3:] = (_turns(out[:, 3:]) * _rotation().from_rotvec(by_body[:, 3:])).as_quat()[:, [3, 0, 1, 2]]
         return out.ravel()
 
-    def difference(self, after: FloatArray, before: FloatArray) -> FloatArray:
-        """The shift (n,) between coordinates (n_q,)."""
-        one, two = (x.reshape(-1, COORDINATES) for x in (before, after))
+    def differences(self, after: FloatArray, before: FloatArray) -> FloatArray:
+        """The shifts (T, n) that lead from coordinates (n_q,) to others (T, n_q)."""
+        one = np.tile(before, len(after)).reshape(-1, COORDINATES)
+        two = after.reshape(-1, COORDINATES)
         turn = (_turns(one[:, 3:]).inv() * _turns(two[:, 3:])).as_rotvec()
-        return np.hstack([two[:, :3] - one[:, :3], turn]).ravel()
+        return np.hstack([two[:, :3] - one[:, :3], turn]).reshape(len(after), -1)
 
 
 def _rotation() -> Any:

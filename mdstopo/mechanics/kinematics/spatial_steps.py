@@ -93,6 +93,94 @@ def retract_jvp(model, q, moved, dq, dshift, out):
         put(out, d + 3, plus(back_turned(t, vector_at(dq, d + 3)), turn_rate(t, vector_at(dshift, d + 3))))
 
 
+@part
+def shift_size(model):
+    """J(t) of a body, by rows."""
+    return 9
+
+
+@kernel
+def shift_tangents(model, q, moved, out):
+    """J(t) of the turns between q and moved; see `kinematics_interface.shift_tangents`."""
+    for body in range(out.shape[0]):
+        i = COORDINATES * body + 3
+        t = turn_between(quaternion_at(q, i), quaternion_at(moved, i))
+        for r in range(3):
+            u = (1.0 if r == 0 else 0.0, 1.0 if r == 1 else 0.0, 1.0 if r == 2 else 0.0)
+            x, y, z = turn_rate(t, u)
+            out[body, r] = x
+            out[body, 3 + r] = y
+            out[body, 6 + r] = z
+
+
+@part
+def slope_by_shift(model, slopes, m, r, i, tangents, body):
+    """See `kinematics_interface.slope_by_shift`."""
+    k = i % FREEDOMS - 3
+    if k < 0:
+        return slopes[m, r, i]
+    at = i - k
+    return (
+        slopes[m, r, at] * tangents[body, k]
+        + slopes[m, r, at + 1] * tangents[body, 3 + k]
+        + slopes[m, r, at + 2] * tangents[body, 6 + k]
+    )
+
+
+@part
+def turn_slope_by_shift(model, slopes, d, r, tangents, body):
+    """See `kinematics_interface.turn_slope_by_shift`."""
+    return (
+        slopes[d, 0] * tangents[body, r] + slopes[d, 1] * tangents[body, 3 + r] + slopes[d, 2] * tangents[body, 6 + r]
+    )
+
+
+@kernel
+def add_shift(model, tangents, w, shift, dq):
+    """See `kinematics_interface.add_shift`."""
+    for body in range(tangents.shape[0]):
+        d = FREEDOMS * body
+        turn = vector_at(shift, d + 3)
+        add(dq, d, times(w, vector_at(shift, d)))
+        for r in range(3):
+            row = vector_at(tangents[body], 3 * r)
+            dq[d + 3 + r] += w * dot(row, turn)
+
+
+@kernel
+def add_shift_curvature(model, shift, mass, body, first, k):
+    """M (J(t)^-T - 1) of the turn t; see `kinematics_interface.add_shift_curvature`.
+
+    With exp(t) = E_0^-1 E_1 and turns a, b of both ends, J(t) dt = b - exp(-t) a: dt = J(t)^-1 b - J(t)^-T a.
+    """
+    d = FREEDOMS * body + 3
+    t = times(-1.0, vector_at(shift, d))
+    for r in range(3):
+        u = (1.0 if r == 0 else 0.0, 1.0 if r == 1 else 0.0, 1.0 if r == 2 else 0.0)
+        change = minus(vector_rate(t, u), u)
+        at = first + 3
+        k[at, at + r] += mass[d] * change[0]
+        k[at + 1, at + r] += mass[d + 1] * change[1]
+        k[at + 2, at + r] += mass[d + 2] * change[2]
+
+
+@kernel
+def turn_back(model, shift, transposed, x):
+    """J(t)^-1 of each body's turn t; see `kinematics_interface.turn_back`."""
+    for body in range(x.shape[0] // FREEDOMS):
+        d = FREEDOMS * body + 3
+        t = vector_at(shift, d)
+        put(x, d, vector_rate(times(-1.0, t) if transposed else t, vector_at(x, d)))
+
+
+@kernel
+def shift_further(model, start, shift, change, q):
+    """See `kinematics_interface.shift_further`."""
+    for d in range(shift.shape[0]):
+        shift[d] += change[d]
+    retract(model, start, shift, q)
+
+
 @kernel
 def advance_coordinates(model, q, v, a, e, out):
     """A parabola of places, and of rotation vectors from here; see `kinematics_interface.advance_coordinates`."""
