@@ -153,8 +153,6 @@ def _prepared(output: Output, case: "Case", case_path: Path, methods: tuple[str,
         raise CaseError([case.marks.mistake(key, words)], str(case_path))
     if history and "direct" not in methods:
         raise click.UsageError("--history needs --method direct")
-    if "iterative" in methods and case.dimension == 3:
-        raise CaseError([case.marks.mistake("dimension", "the iterative method is not in space yet")], str(case_path))
     if "iterative" in methods and case.solver.integrator not in (AUTO, *having("iterative")):
         words = f"the iterative method does not go with {case.solver.integrator}, only with generalized_alpha"
         raise CaseError([case.marks.mistake("solver.integrator", words)], str(case_path))

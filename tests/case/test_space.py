@@ -311,16 +311,6 @@ def test_a_spatial_key_in_the_plane_names_the_planar_one(old: str, new: str, mes
             "solver: {integrator: gauss}",
             "solver.integrator: found the text 'gauss', which is not in space yet",
         ),
-        (
-            "joints: []",
-            "solver: {integrator: generalized_alpha}",
-            "solver.integrator: found the text 'generalized_alpha', which is not in space yet",
-        ),
-        (
-            "joints: []",
-            "solver: {sensitivity: iterative}",
-            "solver.sensitivity: found the text 'iterative', which is not in space yet",
-        ),
     ],
 )
 def test_what_is_not_in_space_yet_is_refused_by_name(old: str, new: str, message: str) -> None:

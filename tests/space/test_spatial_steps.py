@@ -89,6 +89,43 @@ def test_derivatives_of_a_step_both_ways() -> None:
     assert start_q @ dq + start_v @ dv == pytest.approx(bar_q @ end_dq + bar_v @ end_dv, rel=1e-12)
 
 
+def test_slopes_by_a_shift_are_those_of_the_coordinates_behind_it() -> None:
+    random = np.random.default_rng(4)
+    shift, change, rows = random.normal(size=N), random.normal(size=N), random.normal(size=(1, 1, N))
+    there = SPATIAL.retract(START, shift)
+    tangents = np.empty((2, KERNELS.shift_size(None)))
+    KERNELS.shift_tangents(None, START, there, tangents)
+    exact = by_numbers(lambda s: SPATIAL.difference(SPATIAL.retract(START, s), there), shift)
+    moved = np.zeros(N)
+    KERNELS.add_shift(None, tangents, 0.7, change, moved)
+    same(moved, 0.7 * exact @ change)
+    found = [KERNELS.slope_by_shift(None, rows, 0, 0, i, tangents, i // 6) for i in range(N)]
+    same(found, rows[0, 0] @ exact)
+    turn = rows[0, :, 3:6]
+    found = [KERNELS.turn_slope_by_shift(None, turn, 0, r, tangents, 0) for r in range(3)]
+    same(found, turn[0] @ exact[3:6, 3:6])
+    total, q = shift.copy(), there.copy()
+    KERNELS.shift_further(None, START, total, change, q)
+    same(SPATIAL.difference(q, SPATIAL.retract(START, shift + change)), np.zeros(N))
+
+
+def test_how_a_shift_changes_with_the_coordinates_at_its_ends() -> None:
+    random = np.random.default_rng(5)
+    shift, mass = 0.6 * random.normal(size=N), random.uniform(1.0, 2.0, size=N)
+    there = SPATIAL.retract(START, shift)
+    by_end = by_q(lambda q: SPATIAL.difference(q, START), there, N)
+    by_start = by_q(lambda q: SPATIAL.difference(there, q), START, N)
+    k = np.diag(mass)
+    for body in range(2):
+        KERNELS.add_shift_curvature(None, shift, mass, body, 6 * body, k)
+    same(k, -mass[:, None] * by_start)
+    for transposed, exact in ((False, by_end), (True, by_end.T)):
+        x = random.normal(size=N)
+        expected = exact @ x
+        KERNELS.turn_back(None, shift, np.bool_(transposed), x)
+        same(x, expected)
+
+
 def test_derivatives_of_the_cubic_between_two_states() -> None:
     c, h = 0.3, 0.37
     random = np.random.default_rng(3)
