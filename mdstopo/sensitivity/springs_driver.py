@@ -59,7 +59,8 @@ class SpringsDriver(Driver):
 
     def displacements(self, q: FloatArray) -> FloatArray:
         """(T, n_body, 3): by how much bodies have moved and turned (m, rad) at q (T, n) since its first row."""
-        return (q - q[0]).reshape(len(q), -1, 3)
+        moved: FloatArray = (q - q[0]).reshape(len(q), -1, 3)
+        return moved
 
     def explain(
         self, alpha: FloatArray, status: Status, time: float, q: FloatArray, v: FloatArray

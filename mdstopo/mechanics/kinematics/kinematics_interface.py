@@ -82,7 +82,8 @@ class Kinematics:
 
     def difference(self, after: FloatArray, before: FloatArray) -> FloatArray:
         """`difference` in Python: the shift (n,) between coordinates (n_q,)."""
-        return self.differences(after[None], before)[0]
+        shift: FloatArray = self.differences(after[None], before)[0]
+        return shift
 
     def differences(self, after: FloatArray, before: FloatArray) -> FloatArray:
         """Of many states: the shifts (T, n) that lead from coordinates (n_q,) to others (T, n_q)."""
