@@ -1,22 +1,18 @@
 """The system: bodies, points, and members drawn by how much of them there is."""
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from mdstopo.case.model import GROUND
-from mdstopo.plots.scenery import edge_at, ends_at, outline, sizes, start_state
+from mdstopo.plots.member_lines import draw_members
+from mdstopo.plots.scenery import edge_at, ends_at, outline, start_state
 from mdstopo.plots.source import Floats, Source
-from mdstopo.plots.style import COLOURS, MOST_NAMED, WIDTH
+from mdstopo.plots.space_layout import draw_space
+from mdstopo.plots.style import COLOURS, WIDTH
 from mdstopo.scene.points import points_at
-from mdstopo.store.store_errors import StoreError
 
-#: of the range of alpha: what is thinner is not drawn
-FAINT = 0.02
-#: points: the widest member, the narrowest
-WIDEST, NARROWEST = 1.6, 0.15
-#: members of one group that are drawn, the strongest first
-MOST = 20_000
 #: how many times larger than the design a scene may be before its far ends (of contacts, say) are left out of the view
 FAR, MARGIN = 2.0, 0.12
 _CONTACT = "#222222"
@@ -25,19 +21,19 @@ _CONTACT = "#222222"
 def draw(module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = ()) -> Any:
     """One panel a time, the start where none is given."""
     case = source.case
-    if case.dimension > 2:
-        raise StoreError(f"{source.view.path}: bodies in space are not drawn yet; other pictures of them are")
     panels: list[tuple[float | None, Floats]] = [(None, start_state(case))]
     if times:
         name = load_case or source.load_cases[0]
         motion = source.motion(name, np.array(times))
         panels = list(zip(times, motion.q, strict=True))
+    if case.dimension > 2:
+        return draw_space(module, source, panels)
     figure = module.Figure(figsize=(WIDTH, min(0.4 + 2.9 * len(panels), 9.0)))
     axes = figure.subplots(len(panels), 1, squeeze=False)[:, 0]
     for axis, (t, q) in zip(axes, panels, strict=True):
         _bodies(axis, source, q)
         _contacts(axis, source, q)
-        _members(axis, source, q)
+        draw_members(axis, source, partial(ends_at, case, q=q))
         axis.set_aspect("equal", adjustable="datalim")
         axis.set_xlabel("x, m")
         axis.set_ylabel("y, m")
@@ -77,30 +73,6 @@ def _contacts(axis: Any, source: Source, q: Floats) -> None:
         axis.plot(*edge_at(case, contact, q).T, "-", color=_CONTACT, linewidth=1.8, alpha=0.6, label=label)
         places = points_at(case, contact.body, contact.points, q[None])[0]
         axis.plot(*places.T, "o", color=_CONTACT, markersize=3, markerfacecolor="none", markeredgewidth=0.6)
-
-
-def _members(axis: Any, source: Source, q: Floats) -> None:
-    from matplotlib.collections import LineCollection
-
-    case = source.case
-    slices = case.group_slices
-    for k, group in enumerate(case.members):
-        ends = ends_at(case, group, q)
-        colour = COLOURS[k % len(COLOURS)]
-        style = "-"
-        if group.design:
-            share = sizes(group, source.alpha[slices[group.name]])
-        else:
-            share, style = np.full(len(group), 0.5), "--"
-        order = np.argsort(share)[-MOST:]
-        order = order[share[order] > FAINT]
-        widths = NARROWEST + (WIDEST - NARROWEST) * share[order]
-        axis.add_collection(
-            LineCollection(list(ends[order]), colors=colour, linewidths=widths, alpha=0.8, linestyles=style),
-            autolim=True,
-        )
-        if len(case.members) <= MOST_NAMED:
-            axis.plot([], [], style, color=colour, label=group.name)
 
 
 def _look_at_design(axis: Any, source: Source, q: Floats) -> None:

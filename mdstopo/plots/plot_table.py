@@ -53,6 +53,4 @@ def fitting(view: ResultView) -> list[str]:
         found.append("sensitivity-histories")
     if motions and view.lines("objectives"):
         found.append("histories")
-    if view.arrays.get("members/p", np.zeros((0, 2))).shape[1:] == (3,):
-        found = [name for name in found if name != "layout"]  # bodies in space are not drawn yet
     return found

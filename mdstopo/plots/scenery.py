@@ -1,10 +1,11 @@
-"""Bodies and members in the plane: outlines from the points that stand on bodies, places of ends at any time."""
+"""Bodies and members: outlines from the points that stand on bodies, places of ends at any time."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.model import GROUND, Case, Contact, MemberGroup
 from mdstopo.scene.points import points_at
+from mdstopo.scene.quaternions import quaternions_of
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +26,13 @@ def sizes(group: MemberGroup, alpha: Floats) -> Floats:
 
 def outline(case: Case, body: str) -> Floats:
     """(K, 2) corners of the convex hull of a body's points and its centre of mass, in body coordinates."""
-    pieces = [np.zeros((1, 2))] if body != GROUND else []
+    points = points_of(case, body)
+    return hull(points) if len(points) else points
+
+
+def points_of(case: Case, body: str) -> Floats:
+    """(K, d) a body's points and its centre of mass, in body coordinates; of ground its points only."""
+    pieces = [np.zeros((1 if body != GROUND else 0, case.dimension))]
     pieces += [grid.local for grid in case.points.values() if grid.body == body]
     for group in case.members:
         pieces += [group.from_local] if group.body_from == body else []
@@ -34,7 +41,7 @@ def outline(case: Case, body: str) -> Floats:
         ends = zip(joint.bodies, (joint.at_first, joint.at_second), strict=True)
         pieces += [np.array([at]) for name, at in ends if name == body]
     pieces += [contact.points for contact in case.contacts if contact.body == body]
-    return hull(np.concatenate(pieces)) if pieces else np.zeros((0, 2))
+    return np.concatenate(pieces)
 
 
 def hull(points: Floats) -> Floats:
@@ -58,7 +65,7 @@ def hull(points: Floats) -> Floats:
 
 
 def ends_at(case: Case, group: MemberGroup, q: Floats) -> Floats:
-    """(M, 2, 2) both ends of a group's members at a state q (3 n_bodies,)."""
+    """(M, 2, d) both ends of a group's members at a state q (3 n_bodies or 7 n_bodies,)."""
     state = q[None]
     p = points_at(case, group.body_from, group.from_local, state)[0][group.from_index]
     return np.stack([p, points_at(case, group.body_to, group.to_local, state)[0][group.to_index]], axis=1)
@@ -71,5 +78,7 @@ def edge_at(case: Case, contact: Contact, q: Floats) -> Floats:
 
 
 def start_state(case: Case) -> Floats:
-    """q (3 n_bodies,) as the case draws it."""
+    """q (3 n_bodies,), in space (7 n_bodies,), as the case draws it."""
+    if case.dimension > 2:
+        return np.concatenate([(*body.position, *quaternions_of(body.rotation)) for body in case.bodies])
     return np.array([value for body in case.bodies for value in (*body.position, body.angle)])
