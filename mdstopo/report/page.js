@@ -10,32 +10,7 @@
   const text = (id, value) => { at(id).textContent = value; };
   const motion = () => (data.designs[state.design].motions || {})[state.load];
 
-  // places: body coordinates to global ones
-  const place = (body, x, y, q) => {
-    if (body >= q.length / 3) return [x, y];
-    const c = Math.cos(q[3 * body + 2]), s = Math.sin(q[3 * body + 2]);
-    return [q[3 * body] + c * x - s * y, q[3 * body + 1] + s * x + c * y];
-  };
   const current = () => { const m = motion(); return m ? m.q[state.frame] : data.start; };
-
-  // one window for all frames of a motion, so that it stands still
-  let view = null;
-  const fit = () => {
-    const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-    const m = motion();
-    const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
-    for (const q of frames) data.bodies.forEach((body, b) => {
-      const index = body.name === "ground" ? q.length : b;
-      for (const [x, y] of body.outline.concat(body.points)) {
-        const p = place(index, x, y, q);
-        for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
-      }
-    });
-    const canvas = at("layout"), room = 30;
-    const scale = Math.min((canvas.width - 2 * room) / Math.max(high[0] - low[0], 1e-9), (canvas.height - 2 * room) / Math.max(high[1] - low[1], 1e-9));
-    view = { scale, x: canvas.width / 2 - scale * (low[0] + high[0]) / 2, y: canvas.height / 2 + scale * (low[1] + high[1]) / 2 };
-  };
-  const screen = (p) => [view.x + view.scale * p[0], view.y - view.scale * p[1]];
 
   const shade = (share) => { // blue (push) over grey to orange (pull)
     const t = Math.max(-1, Math.min(1, share));
@@ -44,42 +19,19 @@
   };
 
   const draw = () => {
-    const canvas = at("layout"), g = canvas.getContext("2d"), q = current(), m = motion();
-    g.clearRect(0, 0, canvas.width, canvas.height);
-    const named = [];
-    const name = (text, x, y) => {  // below the names that would be written over
-      while (named.some(([x0, y0, w]) => x < x0 + w && x0 < x + g.measureText(text).width && Math.abs(y - y0) < 12)) y += 12;
-      named.push([x, y, g.measureText(text).width]);
-      g.fillText(text, x, y);
-    };
-    data.bodies.forEach((body, b) => {
-      const ground = body.name === "ground", index = ground ? q.length : b;
-      g.beginPath();
-      body.outline.forEach(([x, y], k) => { const p = screen(place(index, x, y, q)); k ? g.lineTo(...p) : g.moveTo(...p); });
-      g.closePath();
-      const colour = ground ? "#555555" : COLOURS[(b + 2) % COLOURS.length];
-      g.globalAlpha = 0.12; g.fillStyle = colour; g.fill(); g.globalAlpha = 1; g.strokeStyle = colour; g.lineWidth = 1; g.stroke();
-      g.fillStyle = colour;
-      for (const [x, y] of body.points) { const p = screen(place(index, x, y, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
-      if (!ground) { const p = screen(place(index, 0, 0, q)); name(body.name, p[0] + 5, p[1] - 5); g.fillRect(p[0] - 3, p[1] - 0.5, 6, 1); g.fillRect(p[0] - 0.5, p[1] - 3, 1, 6); }
-    });
+    const q = current(), m = motion();
     const rows = data.designs[state.design].members.rows;
     const forces = state.colour === "force" && m && m.force ? m.force[state.frame] : null;
     const most = forces ? Math.max(1e-12, ...m.force.map((row) => row.reduce((a, f) => Math.max(a, Math.abs(f)), 0))) : 1;
-    rows.forEach((row, k) => {
-      const p = screen(place(row[1], row[3], row[4], q)), r = screen(place(row[2], row[5], row[6], q));
-      g.strokeStyle = forces ? shade(forces[k] / most) : COLOURS[row[0] % 2];
-      g.globalAlpha = forces ? 0.9 : 0.25 + 0.65 * row[7];
-      g.lineWidth = 0.4 + 2 * row[7];
-      g.beginPath(); g.moveTo(...p); g.lineTo(...r); g.stroke();
-    });
-    g.globalAlpha = 1;
+    scene.draw(q, rows, (row, k) => (forces ? shade(forces[k] / most) : COLOURS[row[0] % (data.dimension === 3 ? COLOURS.length : 2)]), Boolean(forces));
     text("clock", m ? `t = ${number(m.t[state.frame], 4)} s` : "at the start");
     const shown = `${rows.length} of ${data.designs[state.design].members.all} members are thick enough to be drawn.`;
     text("legend", forces ? `${shown} Orange pulls, blue pushes; up to ${number(most, 3)} N.`
       : state.colour === "force" ? `${shown} Forces are shown for springs and gaps only.` : `${shown} Width by design value; groups: ${data.designs[state.design].members.groups.join(", ")}.`);
     for (const move of cursors) move();
   };
+
+  const scene = makeScene({ canvas: at("layout"), tools: at("views"), data, motion, colours: COLOURS, redraw: draw });
 
   // small charts
   const SVG = "http://www.w3.org/2000/svg";
@@ -193,7 +145,7 @@
     slider.value = state.frame;
     marks.forEach((mark, j) => mark && mark.setAttribute("stroke-width", j === state.design ? 4 : 1.5));
     document.body.dataset.design = state.design;
-    fit(); responses(); draw();
+    scene.fit(); responses(); draw();
   };
   const show = (frame) => { state.frame = frame; at("time").value = frame; document.body.dataset.frame = frame; draw(); };
 

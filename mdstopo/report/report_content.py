@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.case.model import GROUND, Case, MemberGroup, SpatialJoint
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared
-from mdstopo.plots.scenery import outline, sizes, start_state
+from mdstopo.plots.scenery import outline, points_of, sizes, start_state
+from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
+from mdstopo.plots.views import upright
 from mdstopo.plots.watch import response_history
-from mdstopo.scene.points import points_at
-from mdstopo.store.store_errors import StoreError
+from mdstopo.scene.points import point_rates, points_at
 from mdstopo.store.whole_front import whole_front
 
 Floats = NDArray[np.float64]
@@ -28,8 +29,6 @@ FAINT = 0.02
 def content(source: Source) -> dict[str, Any]:
     """The page's data; numbers are rounded to what a screen can show."""
     case, view = source.case, source.view
-    if case.dimension > 2:
-        raise StoreError(f"{view.path}: there is no page of bodies in space yet; `mdstopo plot` draws what it can")
     names = list(source.names)
     known = _bounds(source)
     kkts = view.arrays.get("iterations/kkt", np.zeros(0))
@@ -51,10 +50,13 @@ def content(source: Source) -> dict[str, Any]:
             for name in names
         ],
         "load_cases": list(source.load_cases),
+        "dimension": case.dimension,
         "bodies": _bodies(case),
         "start": _rounded(start_state(case)),
         "designs": _designs(source),
     }  # fmt: skip
+    if case.dimension > 2:
+        page |= {"upright": upright(case).tolist(), "joints": _joints(case)}
     iterations = view.under("iterations")
     if "combined" in iterations:
         page["iterations"] = {
@@ -96,13 +98,31 @@ def _what(case: Case, name: str) -> str:
 def _bodies(case: Case) -> list[dict[str, Any]]:
     found = []
     for name in [*(body.name for body in case.bodies), GROUND]:
-        corners = outline(case, name)
-        points = [grid.local for grid in case.points.values() if grid.body == name]
-        if name == GROUND and not len(corners):
+        if name == GROUND and not len(points_of(case, name)):
             continue
-        cloud = np.concatenate(points) if points else np.zeros((0, 2))
-        found.append({"name": name, "outline": _rounded(corners), "points": _rounded(cloud)})
+        points = [grid.local for grid in case.points.values() if grid.body == name]
+        cloud = np.concatenate(points) if points else np.zeros((0, case.dimension))
+        found.append({"name": name, **_shape(case, name), "points": _rounded(cloud)})
     return found
+
+
+def _shape(case: Case, body: str) -> dict[str, Any]:
+    """What is drawn of a body beside its points: an outline in the plane, a solid in space."""
+    if case.dimension == 2:
+        return {"outline": _rounded(outline(case, body))}
+    shape = solid(case, body)
+    return {"corners": _rounded(shape.corners), "faces": shape.faces, "edges": shape.edges}
+
+
+def _joints(case: Case) -> list[dict[str, Any]]:
+    """Where joints are on their first body, and their axes there."""
+    index = {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
+    return [
+        {"name": joint.name, "type": joint.type, "body": index[joint.bodies[0]], "at": _rounded(joint.at_first),
+         "axis": _rounded(joint.axes_first[0]) if joint.axis_key else None}
+        for joint in case.joints
+        if isinstance(joint, SpatialJoint)
+    ]  # fmt: skip
 
 
 def _designs(source: Source) -> list[dict[str, Any]]:
@@ -189,10 +209,9 @@ def _forces(
         p = points_at(case, group.body_from, group.p_local[chosen], q)
         r = points_at(case, group.body_to, group.q_local[chosen], q) - p
         length = np.linalg.norm(r, axis=2)
-        h = 1e-6
-        moved = points_at(case, group.body_to, group.q_local[chosen], q + h * v)
-        moved = moved - points_at(case, group.body_from, group.p_local[chosen], q + h * v)
-        rate = (np.linalg.norm(moved, axis=2) - length) / h
+        parting = point_rates(case, group.body_to, group.q_local[chosen], q, v)
+        parting = parting - point_rates(case, group.body_from, group.p_local[chosen], q, v)
+        rate = np.einsum("tki,tki->tk", r, parting) / np.where(length > 0.0, length, 1.0)
         scale = alpha[slices[group.name]][chosen] ** group.power if group.design else np.ones(len(chosen))
         total = np.zeros_like(length)
         for law in group.laws:

@@ -10,8 +10,9 @@ from typing import Any
 def page(data: dict[str, Any]) -> str:
     """HTML that needs nothing else."""
     folder = files("mdstopo.report")
-    style, script, body = ((folder / name).read_text(encoding="utf-8") for name in ("page.css", "page.js", "page.html"))
+    names = ("page.css", "scene_space.js" if data["dimension"] > 2 else "scene_plane.js", "page.js", "page.html")
+    style, scene, script, body = ((folder / name).read_text(encoding="utf-8") for name in names)
     # neither "</script" nor "<!--<script" in a case file may mean anything to the page
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {"title": escape(str(data["title"])), "style": style, "data": text, "script": script}
+    parts = {"title": escape(str(data["title"])), "style": style, "data": text, "script": scene + script}
     return re.sub(r"\{(title|style|data|script)\}", lambda found: parts[found[1]], body)

@@ -36,3 +36,18 @@ def seats_at(q: FloatArray, number: int) -> tuple[FloatArray, FloatArray]:
     """Position (T, 3) and rotation matrix (T, 3, 3) of a body in space at states q (T, 7 n_bodies)."""
     i = SPATIAL * number
     return q[:, i : i + 3], rotations_of(q[:, i + 3 : i + SPATIAL])
+
+
+def point_rates(case: Case, body: str, local: FloatArray, q: FloatArray, v: FloatArray) -> FloatArray:
+    """Global velocities (T, K, d) in m/s of points (K, d) of a body at states q and rates v of a trajectory."""
+    if body == GROUND:
+        return np.zeros((len(q), *local.shape))
+    number = [each.name for each in case.bodies].index(body)
+    if is_spatial(case):
+        arm = points_at(case, body, local, q) - seats_at(q, number)[0][:, None]
+        rates = v[:, None, 6 * number : 6 * number + 6]
+        return np.asarray(rates[..., :3] + np.cross(rates[..., 3:], arm))
+    i = PLANAR * number
+    arm = points_at(case, body, local, q) - q[:, None, i : i + 2]
+    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=2)
+    return np.asarray(v[:, None, i : i + 2] + v[:, i + 2, None, None] * turned)

@@ -1,0 +1,196 @@
+"use strict";
+// The scene in space: it turns under the mouse. canvas: where it is drawn; tools: where its buttons go; data: the
+// page's; motion: the one that is shown, or nothing; colours: of bodies and groups; redraw: draws all anew.
+// fit: choose the window; draw: bodies at q, members (rows) in colour(row, k). What is farther is drawn first.
+const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
+  const g = canvas.getContext("2d"), [right, away, up] = data.upright;
+  const DISTANCE = 4, GRID = "#c9c9c9", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // distance of the eye in radii
+  const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
+  const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
+  let low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;
+
+  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  const sum = (a, s, b, t) => [s * a[0] + t * b[0], s * a[1] + t * b[1], s * a[2] + t * b[2]];
+  const aim = () => {
+    const cosTurn = Math.cos(camera.turn), sinTurn = Math.sin(camera.turn);
+    const level = sum(away, cosTurn, right, -sinTurn);
+    across = sum(right, cosTurn, away, sinTurn);
+    toward = sum(up, Math.sin(camera.rise), level, -Math.cos(camera.rise));
+    along = sum(up, Math.cos(camera.rise), level, Math.sin(camera.rise));
+  };
+
+  // rotation matrix and place of every body; the last one is ground
+  const seats = (q) => {
+    const found = [];
+    for (let i = 0; i < q.length; i += 7) {
+      const [w, x, y, z] = q.slice(i + 3, i + 7);
+      found.push([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)], q.slice(i, i + 3)]);
+    }
+    found.push([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]]);
+    return found;
+  };
+  const place = ([a, b, c, d], p) => [dot(a, p) + d[0], dot(b, p) + d[1], dot(c, p) + d[2]];
+  const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? data.start.length / 7 : b);
+
+  // x, y on the screen and how near it is
+  const seen = (p) => {
+    const r = sum(p, 1, middle, -1), near = dot(r, toward);
+    const s = scale * camera.zoom / (camera.flat ? 1 : Math.max(1 - near / (DISTANCE * radius), 0.02));
+    return [canvas.width / 2 + camera.x + s * dot(r, across), canvas.height / 2 + camera.y - s * dot(r, along), near];
+  };
+
+  // one window for all frames of a motion, so that it stands still
+  const fit = () => {
+    const m = motion(), cloud = [];
+    const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
+    frames.forEach((q, f) => {
+      const all = seats(q);
+      data.bodies.forEach((body, b) => {
+        const index = indexOf(body, b);
+        if (f && index === data.start.length / 7) return;
+        for (const p of body.corners.concat(body.points)) cloud.push(place(all[index], p));
+      });
+    });
+    const reach = (pick, k) => cloud.reduce((a, p) => pick(a, p[k]), cloud.length ? cloud[0][k] : 0);
+    low = [0, 1, 2].map((k) => reach(Math.min, k));
+    high = [0, 1, 2].map((k) => reach(Math.max, k));
+    middle = sum(low, 0.5, high, 0.5);
+    radius = Math.max(0.5 * Math.hypot(...sum(high, 1, low, -1)), 1e-9);
+    scale = 0.62 * Math.min(canvas.width, canvas.height) / radius;
+  };
+
+  const stepOf = (length) => { const size = 10 ** Math.floor(Math.log10(length / 5)); return [1, 2, 5, 10].map((k) => k * size).find((s) => s >= length / 5); };
+  const axisOf = (way) => [0, 1, 2].find((k) => way[k] !== 0);
+  const line = (a, b, colour, width, alpha) => { g.strokeStyle = colour; g.lineWidth = width; g.globalAlpha = alpha; g.beginPath(); g.moveTo(a[0], a[1]); g.lineTo(b[0], b[1]); g.stroke(); };
+  const write = (text, p, colour) => { g.globalAlpha = 1; g.fillStyle = colour; g.fillText(text, p[0], p[1]); };
+
+  // a grid at the foot of the scene, with coordinates along the edges that are nearer
+  const ground = () => {
+    const i = axisOf(right), j = axisOf(away), k = axisOf(up), step = stepOf(2 * radius);
+    const ends = [i, j].map((n) => [Math.floor(low[n] / step + 1e-9) * step, Math.ceil(high[n] / step - 1e-9) * step]);
+    const at = (a, b) => { const p = [0, 0, 0]; p[i] = a; p[j] = b; p[k] = up[k] > 0 ? low[k] : high[k]; return p; };
+    g.font = "11px system-ui, sans-serif"; g.textAlign = "center";
+    for (const n of [0, 1]) {
+      const [from, to] = ends[n], [start, end] = ends[1 - n];
+      for (let c = from; c <= to + 1e-9 * step; c += step) {
+        const a = seen(n ? at(start, c) : at(c, start)), b = seen(n ? at(end, c) : at(c, end));
+        line(a, b, GRID, 1, 0.7);
+        if (Math.abs(dot(up, toward)) < 0.02) continue; // the grid is seen from its edge
+        const [near, far] = a[2] > b[2] ? [a, b] : [b, a], long = Math.hypot(near[0] - far[0], near[1] - far[1]) || 1;
+        const out = [near[0] + 14 * (near[0] - far[0]) / long, near[1] + 14 * (near[1] - far[1]) / long + 4];
+        write(`${Number(c.toPrecision(6))}`, out, "#777777");
+      }
+    }
+  };
+  const corner = () => {
+    g.font = "bold 13px system-ui, sans-serif"; g.textAlign = "center";
+    const foot = [48, canvas.height - 48];
+    [0, 1, 2].forEach((k) => {
+      const tip = [foot[0] + 30 * across[k], foot[1] - 30 * along[k]];
+      line(foot, tip, AXES[k], 2, 1);
+      write("xyz"[k], [foot[0] + 40 * across[k], foot[1] - 40 * along[k] + 4], AXES[k]);
+    });
+    g.textAlign = "start"; g.font = "12px system-ui, sans-serif";
+    write(`grid: ${Number(stepOf(2 * radius).toPrecision(3))} m`, [14, canvas.height - 6], "#777777");
+  };
+
+  const polygon = (points, colour, alpha) => { g.globalAlpha = alpha; g.fillStyle = colour; g.beginPath(); points.forEach((p, i) => (i ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1]))); g.closePath(); g.fill(); };
+  const mean = (points) => points.reduce((a, p) => a + p[2], 0) / points.length;
+
+  const draw = (q, rows, colour, coloured) => {
+    aim();
+    g.globalAlpha = 1;
+    g.clearRect(0, 0, canvas.width, canvas.height);
+    ground();
+    const all = seats(q), things = [], names = []; // things: how near, and what draws it
+    data.bodies.forEach((body, b) => {
+      const seat = all[indexOf(body, b)], fixed = indexOf(body, b) === all.length - 1;
+      const own = fixed ? "#555555" : colours[(b + 2) % colours.length], corners = body.corners.map((p) => seen(place(seat, p)));
+      for (const face of body.faces) {
+        const points = face.map((k) => corners[k]);
+        const area = points.reduce((a, p, i) => { const r = points[(i + 1) % points.length]; return a + p[0] * r[1] - r[0] * p[1]; }, 0);
+        const alpha = body.faces.length < 2 ? 0.15 : area < 0 ? 0.24 : 0.1; // those that look to the eye are stronger
+        things.push([mean(points), () => polygon(points, own, alpha)]);
+      }
+      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, 1.2, 0.9)]);
+      for (const p of body.points) { const s = seen(place(seat, p)); things.push([s[2], () => { g.globalAlpha = 1; g.fillStyle = own; g.fillRect(s[0] - 1.5, s[1] - 1.5, 3, 3); }]); }
+      if (!fixed) names.push([body.name, seen(seat[3]), own]);
+    });
+    rows.forEach((row, k) => {
+      const a = seen(place(all[row[1]], row.slice(3, 6))), b = seen(place(all[row[2]], row.slice(6, 9))), near = (a[2] + b[2]) / 2;
+      const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler
+      things.push([near, () => line(a, b, colour(row, k), 0.4 + 2.4 * row[9], clear * (coloured ? 0.95 : 0.25 + 0.7 * row[9]))]);
+    });
+    for (const joint of data.joints) {
+      const seat = all[joint.body], centre = place(seat, joint.at), s = seen(centre);
+      if (joint.axis) {
+        const way = sum(place(seat, joint.axis), 1, seat[3], -1);
+        const [a, b] = [-0.07, 0.07].map((t) => seen(sum(centre, 1, way, t * radius)));
+        things.push([s[2], () => line(a, b, "#222222", 1.5, 1)]);
+      }
+      things.push([s[2] + 1e-6 * radius, () => { g.globalAlpha = 1; g.fillStyle = "#ffffff"; g.strokeStyle = "#222222"; g.lineWidth = 1.4; g.beginPath(); g.arc(s[0], s[1], 4, 0, 2 * Math.PI); g.fill(); g.stroke(); }]);
+    }
+    things.sort((a, b) => a[0] - b[0]);
+    for (const [, paint] of things) paint();
+    g.font = "13px system-ui, sans-serif"; g.textAlign = "start";
+    for (const [name, p, own] of names) { line([p[0] - 4, p[1]], [p[0] + 4, p[1]], own, 1.5, 1); line([p[0], p[1] - 4], [p[0], p[1] + 4], own, 1.5, 1); write(name, [p[0] + 6, p[1] - 6], own); }
+    corner();
+    g.globalAlpha = 1;
+  };
+
+  const look = (name) => {
+    [camera.turn, camera.rise] = VIEWS[name].map((degrees) => degrees * Math.PI / 180);
+    Object.assign(camera, { zoom: 1, x: 0, y: 0, flat: name !== "perspective" });
+  };
+  const turn = (dx, dy) => {
+    camera.flat = false;
+    camera.turn -= 0.01 * dx;
+    camera.rise = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, camera.rise + 0.01 * dy));
+  };
+  const inside = (event) => { const r = canvas.getBoundingClientRect(), k = canvas.width / (r.width || canvas.width); return [k * (event.clientX - r.left), k * (event.clientY - r.top)]; };
+  const zoom = (factor, [x, y]) => { // the place under the pointer stays
+    const next = Math.max(0.05, Math.min(50, camera.zoom * factor)), k = next / camera.zoom;
+    camera.x = (1 - k) * (x - canvas.width / 2) + k * camera.x;
+    camera.y = (1 - k) * (y - canvas.height / 2) + k * camera.y;
+    camera.zoom = next;
+  };
+  let asked = false; // many moves of the mouse, one picture
+  const again = () => { if (!asked) { asked = true; requestAnimationFrame(() => { asked = false; redraw(); }); } };
+
+  const fingers = new Map();
+  const between = (a, b) => [[(a[0] + b[0]) / 2, (a[1] + b[1]) / 2], Math.hypot(a[0] - b[0], a[1] - b[1])];
+  canvas.addEventListener("pointerdown", (event) => { fingers.set(event.pointerId, inside(event)); if (canvas.setPointerCapture) canvas.setPointerCapture(event.pointerId); });
+  canvas.addEventListener("pointermove", (event) => {
+    if (!fingers.has(event.pointerId)) return;
+    const before = [...fingers.values()], last = fingers.get(event.pointerId), now = inside(event);
+    fingers.set(event.pointerId, now);
+    if (before.length === 2) {
+      const [c0, d0] = between(...before), [c1, d1] = between(...fingers.values());
+      camera.x += c1[0] - c0[0]; camera.y += c1[1] - c0[1];
+      if (d0 > 0) zoom(d1 / d0, c1);
+    } else if (event.shiftKey || (event.buttons & 6)) { camera.x += now[0] - last[0]; camera.y += now[1] - last[1]; } else turn(now[0] - last[0], now[1] - last[1]);
+    again();
+  });
+  for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, (event) => fingers.delete(event.pointerId));
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("wheel", (event) => { event.preventDefault(); zoom(Math.exp(-0.0015 * event.deltaY), inside(event)); again(); }, { passive: false });
+  canvas.addEventListener("dblclick", () => { look("perspective"); redraw(); });
+  canvas.addEventListener("keydown", (event) => {
+    const moves = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
+    if (moves) turn(...moves); else if (event.key === "+" || event.key === "-") zoom(event.key === "+" ? 1.15 : 1 / 1.15, [canvas.width / 2, canvas.height / 2]); else return;
+    event.preventDefault(); redraw();
+  });
+  for (const name of Object.keys(VIEWS)) {
+    const button = Object.assign(document.createElement("button"), { type: "button", textContent: name });
+    button.addEventListener("click", () => { look(name); redraw(); });
+    tools.appendChild(button);
+  }
+  tools.appendChild(Object.assign(document.createElement("span"), { className: "small", textContent: "drag: turn; wheel or two fingers: zoom; shift and drag: move; double click: back" }));
+  canvas.tabIndex = 0;
+  canvas.classList.add("turns");
+  look("perspective");
+  aim();
+  return { fit, draw };
+};
