@@ -1,0 +1,327 @@
+"""The motion of a design as a glTF scene: a node for every body and member, an animation for every load case."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import CubicHermiteSpline
+
+from mdstopo._version import __version__
+from mdstopo.case.model import GROUND, Case
+from mdstopo.plots.scenery import Floats, ends_at, points_of, sizes, start_state
+from mdstopo.plots.solids import Solid, convex, solid
+from mdstopo.plots.source import Source
+from mdstopo.plots.style import COLOURS
+from mdstopo.plots.views import upright
+from mdstopo.report.gltf_file import INDICES, LINES, POINTS, TRIANGLES, VERTICES, GltfFile
+from mdstopo.scene.quaternions import product, quaternions_of
+
+#: members that are drawn, the thickest first; share of the range of alpha below which none is
+MOST, FAINT = 1000, 0.02
+#: between two frames no body turns by more (rad); frames of an animation, at least and at most
+TURN, FEWEST, LONGEST = 0.2, 121, 4001
+#: up to how much turn within a step of the integrator (rad) its ends are enough to know what is between them
+SMOOTH = 0.8
+#: shares of the scene's size: radius of the thickest member, of the thinnest, and of joints
+THICK, THIN, JOINT = 0.006, 0.001, 0.012
+#: sides of a member's tube
+SIDES = 8
+_UP = np.array([0.0, 1.0, 0.0])
+_NEUTRAL = "#555555"
+
+
+class Poses(NamedTuple):
+    """t (T,) from 0 on in s; q (T, n): states of a trajectory; place (T, B, 3) and turn (T, B, 4), w x y z, of bodies."""
+
+    t: Floats
+    q: Floats
+    place: Floats
+    turn: Floats
+
+
+def motion_file(source: Source, slower: float = 1.0) -> tuple[bytes, int]:
+    """The file, and how many members were left out of it. slower: by this factor the animations are."""
+    return _Scene(source, slower).file()
+
+
+class _Scene:
+    """A file in the making."""
+
+    def __init__(self, source: Source, slower: float) -> None:
+        self.source, self.case, self.slower = source, source.case, slower
+        self.out = GltfFile(f"mdstopo {__version__}")
+        self.names = [*(body.name for body in self.case.bodies), GROUND]
+        start = start_state(self.case)
+        self.first = _poses(self.case, np.zeros(1), start[None])
+        self.motions = {name: _motion(source, name) for name in source.load_cases}
+        shapes = {name: _shape(self.case, name) for name in self.names}
+        cloud = [_lifted(self.case, ends_at(self.case, group, start)).reshape(-1, 3) for group in self.case.members]
+        cloud += [self.first.place[0], *(shape.corners for shape in shapes.values())]
+        self.size = max(float(np.linalg.norm(np.ptp(np.concatenate(cloud), axis=0))), 1e-9)
+        self.shapes = shapes
+        #: by node: where it is in every load case, to be animated
+        self.moving: dict[int, dict[str, dict[str, Floats]]] = {}
+
+    def file(self) -> tuple[bytes, int]:
+        children = [self._body(k, name) for k, name in enumerate(self.names)]
+        self._joints(children)
+        members, left_out = self._members()
+        root = self.out.add("nodes", name=self.source.title, rotation=_xyzw(_standing(self.case)))
+        self.out.parts["nodes"][root]["children"] = [*children, *members]
+        self.out.add("scenes", name=self.source.title, nodes=[root])
+        for name, poses in self.motions.items():
+            self._animation(name, poses)
+        return self.out.binary(), left_out
+
+    def _body(self, number: int, name: str) -> int:
+        entry: dict[str, Any] = {"name": name}
+        colour = _NEUTRAL if name == GROUND else COLOURS[(number + 2) % len(COLOURS)]
+        primitives = list(self._primitives(self.shapes[name], self._points(name), colour))
+        if primitives:
+            entry["mesh"] = self.out.add("meshes", name=name, primitives=primitives)
+        if name != GROUND:
+            entry |= {
+                "translation": self.first.place[0, number].tolist(),
+                "rotation": _xyzw(self.first.turn[0, number]),
+            }
+        node = self.out.add("nodes", **entry)
+        if name != GROUND:
+            self.moving[node] = {
+                case: {"translation": poses.place[:, number], "rotation": poses.turn[:, number]}
+                for case, poses in self.motions.items()
+            }
+        return node
+
+    def _points(self, name: str) -> Floats:
+        pieces = [grid.local for grid in self.case.points.values() if grid.body == name]
+        return _lifted(self.case, np.concatenate(pieces)) if pieces else np.zeros((0, 3))
+
+    def _primitives(self, shape: Solid, points: Floats, colour: str) -> Iterator[dict[str, Any]]:
+        """Faces that one can see through, edges, points."""
+        if shape.faces:
+            yield self._faces(shape, self._material(colour, 0.35))
+        solid_colour = self._material(colour, 1.0)
+        if shape.edges:
+            place = self.out.numbers(shape.corners, VERTICES, bounds=True)
+            order = self.out.numbers(np.array(shape.edges).ravel(), INDICES)
+            yield {"attributes": {"POSITION": place}, "indices": order, "mode": LINES, "material": solid_colour}
+        if len(points):
+            place = self.out.numbers(points, VERTICES, bounds=True)
+            yield {"attributes": {"POSITION": place}, "mode": POINTS, "material": solid_colour}
+
+    def _faces(self, shape: Solid, material: int) -> dict[str, Any]:
+        """Triangles; every face has corners of its own, so that its edges are sharp."""
+        places, normals, order, count = [], [], [], 0
+        for face in shape.faces:
+            corners = shape.corners[list(face)]
+            area = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+            places.append(corners)
+            normals.append(np.tile(area / max(float(np.linalg.norm(area)), 1e-300), (len(face), 1)))
+            order += [(count, count + k, count + k + 1) for k in range(1, len(face) - 1)]
+            count += len(face)
+        attributes = {
+            "POSITION": self.out.numbers(np.concatenate(places), VERTICES, bounds=True),
+            "NORMAL": self.out.numbers(np.concatenate(normals), VERTICES),
+        }
+        indices = self.out.numbers(np.array(order).ravel(), INDICES)
+        return {"attributes": attributes, "indices": indices, "mode": TRIANGLES, "material": material}
+
+    def _material(self, colour: str, cover: float) -> int:
+        """A colour; stated ones are those of a screen, a file holds linear ones."""
+        screen = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
+        linear = np.where(screen <= 0.04045, screen / 12.92, ((screen + 0.055) / 1.055) ** 2.4)
+        base = {"baseColorFactor": [*linear.tolist(), cover], "metallicFactor": 0.0, "roughnessFactor": 0.8}
+        more: dict[str, Any] = {"doubleSided": True} | ({"alphaMode": "BLEND"} if cover < 1.0 else {})
+        return self.out.add("materials", pbrMetallicRoughness=base, **more)
+
+    def _joints(self, bodies: list[int]) -> None:
+        """Balls on the first body of each."""
+        if not self.case.joints:
+            return
+        mesh = self.out.add("meshes", name="joint", primitives=[self._faces(_ball(), self._material("#222222", 1.0))])
+        for joint in self.case.joints:
+            place = _lifted(self.case, np.array([joint.at_first]))[0]
+            scale = [JOINT * self.size] * 3
+            node = self.out.add("nodes", name=f"joint {joint.name}", mesh=mesh, translation=place.tolist(), scale=scale)
+            self.out.parts["nodes"][bodies[self.names.index(joint.bodies[0])]].setdefault("children", []).append(node)
+
+    def _members(self) -> tuple[list[int], int]:
+        """Tubes from end to end; how many that could be seen are left out."""
+        slices, nodes = self.case.group_slices, []
+        shares = [
+            sizes(group, self.source.alpha[slices[group.name]]) if group.design else np.full(len(group), 0.5)
+            for group in self.case.members
+        ]
+        every = np.concatenate(shares) if shares else np.zeros(0)
+        there = int((every > FAINT).sum())
+        least = float(np.sort(every)[-MOST]) if there > MOST else 0.0
+        room = MOST
+        for k, (group, share) in enumerate(zip(self.case.members, shares, strict=True)):
+            chosen = np.flatnonzero((share > FAINT) & (share >= least))[:room]
+            room -= len(chosen)
+            if not len(chosen):
+                continue
+            primitive = self._faces(_tube(), self._material(COLOURS[k % len(COLOURS)], 1.0))
+            mesh = self.out.add("meshes", name=group.name, primitives=[primitive])
+            radius = self.size * (THIN + (THICK - THIN) * share)
+            first = _stretched(
+                _lifted(self.case, ends_at(self.case, group, self.first.q[0]))[None, chosen], radius[chosen]
+            )
+            moved = {}
+            for name, poses in self.motions.items():
+                ends = np.stack([ends_at(self.case, group, q)[chosen] for q in poses.q])
+                moved[name] = _stretched(_lifted(self.case, ends), radius[chosen])
+            for i, member in enumerate(chosen.tolist()):
+                place, turn, scale = (part[0, i] for part in first)
+                node = self.out.add(
+                    "nodes", name=f"{group.name} {member}", mesh=mesh, translation=place.tolist(),
+                    rotation=_xyzw(turn), scale=scale.tolist(), extras={"share": float(share[member])},
+                )  # fmt: skip
+                nodes.append(node)
+                self.moving[node] = {
+                    name: dict(zip(("translation", "rotation", "scale"), (part[:, i] for part in parts), strict=True))
+                    for name, parts in moved.items()
+                }
+        return nodes, there - (MOST - room)
+
+    def _animation(self, name: str, poses: Poses) -> None:
+        if len(poses.t) < 2:
+            return
+        times = self.out.numbers(self.slower * poses.t, bounds=True)
+        samplers: list[dict[str, Any]] = []
+        channels: list[dict[str, Any]] = []
+        for node, motions in self.moving.items():
+            for path, values in motions[name].items():
+                told = np.roll(_continuous(values), -1, axis=1) if path == "rotation" else values
+                samplers.append({"input": times, "output": self.out.numbers(told), "interpolation": "LINEAR"})
+                channels.append({"sampler": len(samplers) - 1, "target": {"node": node, "path": path}})
+        if channels:
+            extras = {"start": float(self.case.load_case(name).start), "slower": self.slower}
+            self.out.add("animations", name=name, samplers=samplers, channels=channels, extras=extras)
+
+
+def _motion(source: Source, load_case: str) -> Poses:
+    """The motion at even times, close enough for the turns of bodies.
+
+    Between the steps that the file has, cubic polynomials with their rates; where bodies turn too far within a step,
+    and where the file has no motion of the design, it is simulated again.
+    """
+    case = source.case
+    stored = source.view.under(f"trajectories/{load_case}")
+    found = None
+    if stored and "v" in stored and len(stored["t"]) > 1:
+        t, q, v = (np.asarray(stored[name], dtype=np.float64) for name in ("t", "q", "v"))
+        if float((_spins(case, v)[:-1] * np.diff(t)[:, None]).max(initial=0.0)) <= SMOOTH:
+            found = CubicHermiteSpline(t, q, _slopes(case, q, v))
+    if found is None:
+        motion = source.engine.trajectory(source.design, load_case)
+        t, v = motion.t, motion.v
+        if len(t) < 2:
+            return _poses(case, np.zeros(1), motion.q[:1])
+        turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).sum(axis=0).max(initial=0.0))
+        times = _even(t, turned)
+        return _poses(case, times, motion.at(times).q)
+    turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).sum(axis=0).max(initial=0.0))
+    times = _even(t, turned)
+    return _poses(case, times, found(times))
+
+
+def _even(t: Floats, turned: float) -> Floats:
+    count = int(np.clip(np.ceil(turned / TURN) + 1, FEWEST, LONGEST))
+    return np.linspace(t[0], t[-1], count)
+
+
+def _spins(case: Case, v: Floats) -> Floats:
+    """(T, B) how fast bodies turn, rad/s."""
+    count = len(case.bodies)
+    if case.dimension == 2:
+        return np.abs(v.reshape(len(v), count, 3)[:, :, 2])
+    return np.asarray(np.linalg.norm(v.reshape(len(v), count, 6)[:, :, 3:], axis=2))
+
+
+def _slopes(case: Case, q: Floats, v: Floats) -> Floats:
+    """dq/dt; of the quaternion of a body with the global angular velocity w it is (0, w) times it, by two."""
+    if case.dimension == 2:
+        return v
+    slopes = np.empty_like(q)
+    for b in range(len(case.bodies)):
+        rate = v[:, 6 * b : 6 * b + 6]
+        slopes[:, 7 * b : 7 * b + 3] = rate[:, :3]
+        spin = np.concatenate([np.zeros((len(v), 1)), rate[:, 3:]], axis=1)
+        slopes[:, 7 * b + 3 : 7 * b + 7] = 0.5 * product(spin, q[:, 7 * b + 3 : 7 * b + 7])
+    return slopes
+
+
+def _poses(case: Case, times: Floats, q: Floats) -> Poses:
+    count = len(case.bodies)
+    own = q.reshape(len(q), count, -1).copy()
+    if case.dimension == 2:
+        turn = np.zeros((len(q), count, 4))
+        turn[..., 0], turn[..., 3] = np.cos(0.5 * own[..., 2]), np.sin(0.5 * own[..., 2])
+        place = np.concatenate([own[..., :2], np.zeros((len(q), count, 1))], axis=2)
+        return Poses(times - times[0], q, place, turn)
+    own[..., 3:] /= np.linalg.norm(own[..., 3:], axis=2, keepdims=True)
+    return Poses(times - times[0], own.reshape(len(q), -1), own[..., :3], own[..., 3:])
+
+
+def _lifted(case: Case, points: Floats) -> Floats:
+    """Points (..., d) in space; those of a plane lie at z = 0."""
+    if case.dimension > 2:
+        return points
+    return np.concatenate([points, np.zeros((*points.shape[:-1], 1))], axis=-1)
+
+
+def _shape(case: Case, body: str) -> Solid:
+    if case.dimension > 2:
+        return solid(case, body)
+    points = points_of(case, body)
+    return convex(_lifted(case, points)) if len(points) else Solid(np.zeros((0, 3)))
+
+
+def _standing(case: Case) -> Floats:
+    """The quaternion that turns the case's axes so that up is y, as the format has it."""
+    if case.dimension == 2:
+        return np.array([1.0, 0.0, 0.0, 0.0])
+    right, away, up = upright(case)
+    return quaternions_of(np.array([right, up, -away]))
+
+
+def _stretched(ends: Floats, radius: Floats) -> tuple[Floats, Floats, Floats]:
+    """Translation (T, M, 3), rotation (T, M, 4) and scale (T, M, 3) that make the tube reach between ends (T, M, 2, 3).
+
+    The rotation is the shortest one from y to the member; opposite to y it is half a turn about x.
+    """
+    way = ends[:, :, 1] - ends[:, :, 0]
+    length = np.linalg.norm(way, axis=2)
+    along = way / np.where(length > 0.0, length, 1.0)[..., None]
+    turn = np.concatenate([1.0 + along[..., 1:2], np.cross(_UP, along)], axis=2)
+    size = np.linalg.norm(turn, axis=2)
+    turn = np.where((size > 1e-6)[..., None], turn / np.maximum(size, 1e-6)[..., None], [0.0, 1.0, 0.0, 0.0])
+    wide = np.broadcast_to(radius, length.shape)
+    return ends[:, :, 0], turn, np.stack([wide, length, wide], axis=2)
+
+
+def _continuous(turns: Floats) -> Floats:
+    """Quaternions (T, 4) with the signs for which each is next to the one before."""
+    flips = np.where(np.einsum("tk,tk->t", turns[1:], turns[:-1]) < 0.0, -1.0, 1.0)
+    return np.asarray(turns * np.concatenate([[1.0], np.cumprod(flips)])[:, None])
+
+
+def _xyzw(quaternion: Floats) -> list[float]:
+    """The order of the format."""
+    return [float(value) for value in np.roll(quaternion, -1)]
+
+
+def _tube() -> Solid:
+    """A tube of radius 1 from y = 0 to y = 1."""
+    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    ring = np.stack([np.cos(angle), np.zeros(SIDES), np.sin(angle)], axis=1)
+    return convex(np.concatenate([ring, ring + _UP]))
+
+
+def _ball() -> Solid:
+    """An icosahedron in the unit sphere."""
+    golden = 0.5 * (1.0 + np.sqrt(5.0))
+    signs = [(a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    corners = np.array([np.roll([0.0, a, b], k) for k in range(3) for a, b in signs])
+    return convex(corners / np.linalg.norm(corners[0]))
