@@ -35,7 +35,8 @@ def draw_space(module: Any, source: Source, panels: list[tuple[float | None, Flo
     extent = np.maximum(high - low, LEAST * max(float((high - low).max()), 1e-9)) * (1.0 + 2.0 * MARGIN)
     sizes = [float(extent @ np.abs(row)) for row in (seen["front"].across, seen["top"].along, seen["front"].along)]
     places, inches, scale = _arrange(sizes, len(panels))
-    figure = module.Figure(figsize=inches, layout="none")
+    figure = module.Figure(figsize=inches)
+    figure.set_layout_engine("none")  # the panels' places give all views one scale
     for k, (t, q) in enumerate(panels):
         for name, view in seen.items():
             x, y, width, height = places[k][name]

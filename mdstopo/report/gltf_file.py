@@ -59,8 +59,5 @@ class GltfFile:
         document["buffers"] = [{"byteLength": len(self._data)}]
         text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
-        length = 12 + 8 + len(text) + 8 + len(self._data)
-        head = struct.pack("<III", _MAGIC, _VERSION, length)
-        return (
-            head + struct.pack("<II", len(text), _JSON) + text + struct.pack("<II", len(self._data), _BIN) + self._data
-        )
+        chunks = struct.pack("<II", len(text), _JSON) + text + struct.pack("<II", len(self._data), _BIN) + self._data
+        return struct.pack("<III", _MAGIC, _VERSION, 12 + len(chunks)) + chunks

@@ -31,7 +31,7 @@ _NEUTRAL = "#555555"
 
 
 class Poses(NamedTuple):
-    """t (T,) from 0 on in s; q (T, n): states of a trajectory; place (T, B, 3) and turn (T, B, 4), w x y z, of bodies."""
+    """t (T,) from 0 on in s; q (T, n): a trajectory's states; of bodies place (T, B, 3) and turn (T, B, 4), w x y z."""
 
     t: Floats
     q: Floats
@@ -218,15 +218,15 @@ def _motion(source: Source, load_case: str) -> Poses:
         t, v = motion.t, motion.v
         if len(t) < 2:
             return _poses(case, np.zeros(1), motion.q[:1])
-        turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).sum(axis=0).max(initial=0.0))
-        times = _even(t, turned)
+        times = _even(case, t, v)
         return _poses(case, times, motion.at(times).q)
-    turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).sum(axis=0).max(initial=0.0))
-    times = _even(t, turned)
+    times = _even(case, t, v)
     return _poses(case, times, found(times))
 
 
-def _even(t: Floats, turned: float) -> Floats:
+def _even(case: Case, t: Floats, v: Floats) -> Floats:
+    """Even times from the first to the last of steps, as many as bodies with the rates v need."""
+    turned = float((_spins(case, v)[:-1] * np.diff(t)[:, None]).sum(axis=0).max(initial=0.0))
     count = int(np.clip(np.ceil(turned / TURN) + 1, FEWEST, LONGEST))
     return np.linspace(t[0], t[-1], count)
 

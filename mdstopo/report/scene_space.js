@@ -58,10 +58,10 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
     high = [0, 1, 2].map((k) => reach(Math.max, k));
     middle = sum(low, 0.5, high, 0.5);
     radius = Math.max(0.5 * Math.hypot(...sum(high, 1, low, -1)), 1e-9);
-    scale = 0.62 * Math.min(canvas.width, canvas.height) / radius;
+    scale = 0.56 * Math.min(canvas.width, canvas.height) / radius;
   };
 
-  const stepOf = (length) => { const size = 10 ** Math.floor(Math.log10(length / 5)); return [1, 2, 5, 10].map((k) => k * size).find((s) => s >= length / 5); };
+  const stepOf = (length) => { const size = 10 ** Math.floor(Math.log10(length / 9)); return [1, 2, 5, 10].map((k) => k * size).find((s) => s >= length / 9 * (1 - 1e-9)); };
   const axisOf = (way) => [0, 1, 2].find((k) => way[k] !== 0);
   const line = (a, b, colour, width, alpha) => { g.strokeStyle = colour; g.lineWidth = width; g.globalAlpha = alpha; g.beginPath(); g.moveTo(a[0], a[1]); g.lineTo(b[0], b[1]); g.stroke(); };
   const write = (text, p, colour) => { g.globalAlpha = 1; g.fillStyle = colour; g.fillText(text, p[0], p[1]); };

@@ -18,6 +18,7 @@ from mdstopo.plots.style import styled
 from mdstopo.plots.watch import response_history
 from mdstopo.report.report_content import content
 from tests.front.support import CASE
+from tests.space.gltf_reader import Gltf
 
 matplotlib = pytest.importorskip("matplotlib")
 ROOT = Path(__file__).resolve().parents[2]
@@ -209,6 +210,19 @@ def test_json_holds_every_dataset_and_null_for_what_is_not_known(results, tmp_pa
         assert found["pareto/alpha"] == file["pareto/alpha"][()].tolist()
     assert None in [value for row in found["pareto/visited/0"] for value in row]
     assert run_group(["export", str(results["pareto"])]) == 2
+
+
+@pytest.mark.parametrize(("kind", "words"), [("run", []), ("pareto", ["--point", "0", "--slower", "5"])])
+def test_the_motion_of_a_plane_is_exported_as_gltf(results, kind, words, tmp_path):
+    out = tmp_path / "motion.glb"
+    assert run_group(["export", str(results[kind]), "--gltf", *words, "--out", str(out), "--quiet"]) == 0
+    found = Gltf(out.read_bytes())
+    assert [each["name"] for each in found.json["animations"]] == ["rotation", "translation"]
+    times, places = found.track(1, found.node("vehicle"), "translation")
+    assert times[-1] == pytest.approx(1.0 if words else 0.2)
+    assert not places[:, 2].any()
+    assert places[-1, 0] > 0.1
+    assert run_group(["export", str(results[kind]), "--csv", "--point", "0"]) == 2
 
 
 def test_finished_files_name_their_axes_and_units(results):
