@@ -18,6 +18,8 @@ PAGE, TALL = 2.0 * WIDTH, 9.0
 LEFT, BELOW, ABOVE, LEGEND = 0.55, 0.42, 0.22, 0.3
 #: share of the scene's size that is left free around it; the least of a panel's sides, in the longest one's
 MARGIN, LEAST = 0.07, 0.55
+#: inches: the axes' directions in the corner of the perspective
+ARROW = 0.24
 #: how many times larger than the design a scene may be before what is far off is left out of the view
 FAR = 2.0
 _JOINT = "#222222"
@@ -169,8 +171,9 @@ def _corner(axis: Any, view: View, size: Floats, cloud: Floats) -> None:
     axis.set_yticks([])
     for spine in axis.spines.values():
         spine.set_visible(False)
+    inches = float(axis.get_position().width * axis.figure.get_figwidth())
     foot = middle + np.array([-0.42, -0.42]) * wide
     for k, colour in enumerate(_AXES):
-        way = 0.1 * float(wide.min()) * np.array([view.across[k], view.along[k]])
+        way = ARROW * wide[0] / inches * np.array([view.across[k], view.along[k]])
         axis.plot(*np.array([foot, foot + way]).T, "-", color=colour, linewidth=1.2, clip_on=False)
         axis.text(*(foot + 1.35 * way), "xyz"[k], color=colour, ha="center", va="center", fontsize=8)
