@@ -22,7 +22,18 @@ _NOT_IN_TABLES = ("optimizer", "resume", "pareto/tasks", "sweep/tasks", "combine
 def command(
     result_path: Path, kind: str | None, point: int | None, slower: float | None, out: Path | None, quiet: bool
 ) -> int:
-    """Write what a result file holds as --csv tables or one --json document, or its motion as --gltf."""
+    """Write what a result file holds as --csv tables or one --json document, or its motion as --gltf.
+
+    \f
+    Arguments, which --help leaves out:
+
+    result_path: the result file.
+    kind: csv, json or glb; None is a mistake.
+    point: of a front, whose design moves.
+    slower: by this factor the animations are; None as it was.
+    out: the folder of the tables, or the file; None takes a place beside the result.
+    quiet: say nothing but mistakes.
+    """
     if kind is None:
         raise click.UsageError("say --csv, --json or --gltf")
     if kind != "glb" and (point is not None or slower is not None):

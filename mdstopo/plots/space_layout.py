@@ -19,7 +19,7 @@ LEFT, BELOW, ABOVE, LEGEND = 0.55, 0.42, 0.22, 0.3
 #: share of the scene's size that is left free around it; the least of a panel's sides, in the longest one's
 MARGIN, LEAST = 0.07, 0.55
 #: inches: the axes' directions in the corner of the perspective
-ARROW = 0.24
+ARROW = 0.17
 #: how many times larger than the design a scene may be before what is far off is left out of the view
 FAR = 2.0
 _JOINT = "#222222"
