@@ -63,6 +63,7 @@ from mdstopo.case.parts import (
     Motion,
     PointGrid,
     Prescribed,
+    PrescribedRotation,
     SpatialBody,
 )
 from mdstopo.case.uncertain import Uncertainty
@@ -103,6 +104,7 @@ __all__ = [
     "Pair",
     "PointGrid",
     "Prescribed",
+    "PrescribedRotation",
     "PrismaticJoint",
     "PulseLaw",
     "Response",

@@ -6,47 +6,30 @@ taken from it. The scene is drawn once, so all load cases must start a body at o
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from mdstopo.case.arrays import Signal, Table
 from mdstopo.case.geometry import Geometry
-from mdstopo.case.model import GROUND, Motion, Prescribed
+from mdstopo.case.model import GROUND, Motion
+from mdstopo.case.prescribed import AGREE, agree, position_at_start, prescribed, size_of, value_at
+from mdstopo.case.prescribed_rotation import prescribed_rotation, turning_rate_at_start
 from mdstopo.case.reading import BAD, Fields, Reading
-from mdstopo.case.spline import value_and_slope
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, number_text, shown
 
 if TYPE_CHECKING:
     from mdstopo.case.loading import Window
 
-AGREE = 1e-8
-"""How far, relative to the values at hand, a stated start may lie from a prescribed one."""
-KINDS = ("acceleration", "velocity", "position")
-
 
 @frozen
 class Start(Value):
-    """What motions prescribe at the start; None where they do not. velocity: by coordinate."""
+    """What motions prescribe at the start; None where they do not. velocity: by coordinate.
+
+    angular_velocity: a number in the plane, three in space.
+    """
 
     angle: float | None = None
     velocity: tuple[float | None, ...] = (None, None)
-    angular_velocity: float | None = None
-
-
-def value_at(signal: Signal, time: float) -> float:
-    """A scalar signal at `time`: linear between rows, constant outside, right-continuous."""
-    if not isinstance(signal, Table):
-        return signal
-    t, x = signal.times, signal.values[:, 0]
-    i = int(np.searchsorted(t, time, side="right")) - 1
-    if i < 0:
-        return float(x[0])
-    if i == len(t) - 1:
-        return float(x[-1])
-    return float(x[i] + (x[i + 1] - x[i]) * ((time - t[i]) / (t[i + 1] - t[i])))
+    angular_velocity: float | tuple[float, ...] | None = None
 
 
 def merged(top: Fields, reading: Reading) -> dict[str, dict[str, Fields]]:
@@ -82,16 +65,11 @@ def build_motions(by_body: dict[str, Fields], geometry: Geometry) -> tuple[Motio
     built = []
     for body, fields in by_body.items():
         if fields.good():
-            parts = {axis: _prescribed(fields[axis]) for axis, _ in geometry.coordinates}
+            parts: dict[str, Any] = {axis: prescribed(fields[axis]) for axis, _ in geometry.coordinates}
+            if fields.get("rotation") is not None:
+                parts["rotation"] = prescribed_rotation(fields["rotation"])
             built.append(Motion(body, **parts))
     return tuple(built)
-
-
-def _prescribed(fields: Fields | None) -> Prescribed | None:
-    if fields is None:
-        return None
-    kind = next(kind for kind in KINDS if kind in fields.stated)
-    return Prescribed(kind, fields[kind][0])
 
 
 def resolve_starts(
@@ -120,63 +98,43 @@ def resolve_starts(
 
 
 def _start(motion: Fields, body: Fields, window: Window, geometry: Geometry, reading: Reading) -> Start:
-    found: dict[str, float] = {}
+    found: dict[str, Any] = {}
     velocity: list[float | None] = [None] * geometry.number
     for axis, index in geometry.coordinates:
         part = motion[axis]
         if not isinstance(part, Fields) or not part.good():
             continue
-        prescribed = _prescribed(part)
-        if prescribed is None or prescribed.kind == "acceleration":
+        given = prescribed(part)
+        if given is None or given.kind == "acceleration":
             continue
-        signal, path = prescribed.signal, inside(part.path, prescribed.kind)
-        rate = value_at(signal, window.start)
-        scale = abs(rate)
-        if isinstance(signal, Table):
-            scale = float(np.abs(signal.values).max())
-        if prescribed.kind == "position":
-            assert isinstance(signal, Table)
-            t, x = signal.times, signal.values[:, 0]
-            if not (t[0] <= window.start and window.end <= t[-1]):
-                runs = f"{number_text(float(t[0]))} to {number_text(float(t[-1]))} s"
-                needed = f"start {number_text(window.start)} to end {number_text(window.end)} s"
-                reading.mistake(path, f"the table runs from {runs}; it must cover {needed}")
+        path = inside(part.path, given.kind)
+        rate, scale = value_at(given.signal, window.start), size_of(given.signal)
+        if given.kind == "position":
+            start = position_at_start(given.signal, window, path, reading)
+            if start is None:
                 continue
-            value, rate = value_and_slope(t, x, window.start)
-            if not (math.isfinite(value) and math.isfinite(rate)):
-                reading.mistake(path, "the spline through the table is too steep for a number")
-                continue
+            value, rate, per_second = start
             stated = body["angle"] if index is None else body["position"][index]
             if index is not None or "angle" in body.stated:
                 what = "angle" if index is None else f"position's {axis}"
-                _agree(value, stated, scale, f"{body.path}'s {what}", path, reading)
+                agree(value, stated, scale, f"{body.path}'s {what}", path, reading)
             else:
                 found["angle"] = value
-            scale = float(np.ptp(x) / (window.end - window.start))
+            scale = per_second
         key = "angular_velocity" if index is None else "velocity"
         if key in body.stated:
             stated = body[key] if index is None else body[key][index]
-            _agree(rate, stated, scale, f"{body.path}.{key}", path, reading)
+            agree(rate, stated, scale, f"{body.path}.{key}", path, reading)
         elif index is None:
             found["angular_velocity"] = rate
         else:
             velocity[index] = rate
+    turn = motion.get("rotation")
+    if isinstance(turn, Fields):
+        rates = turning_rate_at_start(turn, body, window, reading)
+        if rates is not None and "angular_velocity" not in body.stated:
+            found["angular_velocity"] = rates
     return Start(velocity=tuple(velocity), **found)
-
-
-def _agree(value: float, stated: float, scale: float, what: str, path: str, reading: Reading) -> None:
-    """Note a mistake where a body does not start as its prescribed motion does.
-
-    value: of the motion at the start.
-    stated: by the body.
-    scale: what the difference may be relative to, beside these two.
-    what: the body's key, in words.
-    path: where the motion stands in the file.
-    reading: takes the mistake.
-    """
-    if not abs(value - stated) <= AGREE * max(abs(value), abs(stated), scale):
-        now, then = number_text(value), number_text(stated)
-        reading.mistake(path, f"found {now} at the start, but {what} states {then}; they must agree")
 
 
 def _one_angle(

@@ -177,14 +177,33 @@ class Prescribed(Value):
 
 
 @frozen
+class PrescribedRotation(Value):
+    """A body's whole rotation over time in space, in one of three ways.
+
+    angles: roll, pitch and yaw, about the global x, y and z, or with `axis` the one angle about that global unit vector;
+    each is 0 at the start. angular_velocity: where there are none, its global components in rad/s.
+    """
+
+    angles: tuple[Prescribed, ...] = ()
+    axis: Triple | None = None
+    angular_velocity: VectorSignal = ()
+
+    @property
+    def signals(self) -> VectorSignal:
+        """All of its quantities over time."""
+        return (*(angle.signal for angle in self.angles), *self.angular_velocity)
+
+
+@frozen
 class Motion(Value):
-    """Prescribed motion of a body; None leaves that coordinate free. angle: in the plane; z: in space."""
+    """Prescribed motion of a body; None leaves that free. angle: in the plane; z and rotation: in space."""
 
     body: str
     x: Prescribed | None = None
     y: Prescribed | None = None
     angle: Prescribed | None = None
     z: Prescribed | None = None
+    rotation: PrescribedRotation | None = None
 
 
 @frozen(kw_only=True)

@@ -116,12 +116,52 @@ BUSHING_KEYS = with_keys(
 
 # Prescribed motion.
 _MOVED = "of the centre of mass"
+_ANGLE_KEYS = (
+    Key("acceleration", Signals(("a",)), "integrated from the body's own angular velocity", unit="rad/s^2"),
+    Key("velocity", Signals(("v",)), "rate; the body's own, where stated, must agree at the start", unit="rad/s"),
+    Key(
+        "position",
+        Signals(("x",), constant=False, order="rising", at_least=4),
+        "the angle itself, 0 at the start: a table of at least 4 rows from start to end without repeated times; a "
+        "cubic spline joins them",
+        unit="rad",
+    ),
+)
+_KINDS = tuple(key.name for key in _ANGLE_KEYS)
+DRIVEN_ANGLE = Record(
+    "a prescribed angle",
+    _ANGLE_KEYS,
+    one_of=(_KINDS,),
+    doc="An angle over time: exactly one of its acceleration, velocity and position.",
+)
+DRIVEN_ROTATION = Record(
+    "a prescribed rotation",
+    (
+        *(
+            Key(name, DRIVEN_ANGLE, f"angle about the global {axis}")
+            for name, axis in (("roll", "x"), ("pitch", "y"), ("yaw", "z"))
+        ),
+        Key("axis", DIRECTION, "global, of any length: all turning is about it, by what stands beside it"),
+        *_ANGLE_KEYS,
+        Key("angular_velocity", Signals(("wx", "wy", "wz")), "global components", unit="rad/s"),
+    ),
+    one_of=(("roll", "axis", "angular_velocity"),),
+    needs=(
+        ("roll", "pitch"),
+        ("roll", "yaw"),
+        ("pitch", "roll"),
+        ("yaw", "roll"),
+        *((kind, "axis") for kind in _KINDS),
+    ),
+    doc="All of a body's rotation: roll, pitch and yaw, done in this order about global axes and 0 at the start; or an "
+    "axis with one of acceleration, velocity and position; or the angular velocity.",
+)
 MOTION = Record(
     "a motion",
     (
         Key("body", BODY, "whose coordinates are prescribed; a body is listed once", required=True),
         *(Key(axis, COORDINATE, _MOVED, otherwise="free") for axis in "xyz"),
-        Key("rotation", NotYet("prescribed rotations"), "not in space yet", otherwise="free"),
+        Key("rotation", DRIVEN_ROTATION, "all of the rotation", otherwise="free"),
     ),
     any_of=("x", "y", "z", "rotation"),
     doc="What a body's coordinates do is given; they carry no unknowns, and loads on them change only the reaction.",

@@ -135,11 +135,7 @@ class _Lift:
 
     def signals(self, value: Any, matrix: FloatArray) -> Any:
         """What a planar quantity over time is in space."""
-        reading = Reading(Path())
-        names = ("x", "y")[: matrix.shape[1]]
-        read: tuple[Signal, ...] = Signals(names).read(node_of(value, ""), "", reading)
-        assert not reading.mistakes  # it has been read before
-        found = combined(matrix, read)
+        found = combined(matrix, read_signals(value, ("x", "y")[: matrix.shape[1]]))
         if not isinstance(found[0], Table):
             return list(found)
         columns = [found[0].times, *(each.values[:, 0] for each in found if isinstance(each, Table))]
@@ -149,9 +145,11 @@ class _Lift:
 
     def body(self, old: Plain, path: str) -> Plain:
         """Its inertia is that of a ball: in the plane only the moment about the normal counts."""
-        del path
         new: Plain = {}
-        turns = []
+        # where it does not state its angle, a motion may have done so
+        name = path.removeprefix("bodies.")
+        start = next((each.angle for each in self.case.bodies if each.name == name), 0.0)
+        turns = [{"axis": [0, 0, 1], "angle": start}] if start != 0.0 and "angle" not in old else []
         for key, value in old.items():
             if key == "inertia":
                 new[key] = [value] * 3
@@ -199,13 +197,24 @@ class _Lift:
         return new
 
     def motion(self, old: Plain, path: str) -> Plain:
-        """Only x and y, and these only in the plane z = 0, are coordinates in space."""
-        if "angle" in old:
-            self.refuse(inside(path, "angle"), "prescribed rotations are not in space yet")
+        """A driven angle is a rotation about the normal; only in the plane z = 0 are x and y coordinates in space."""
         for axis in ("x", "y"):
             if self.is_tilted and axis in old:
                 self.refuse(inside(path, axis), "in a tilted plane it is no single coordinate")
-        return old
+        new = {key: value for key, value in old.items() if key != "angle"}
+        if "angle" in old:
+            ((kind, value),) = old["angle"].items()
+            if kind == "position":
+                value = self.since_start(value, old["body"])
+            new["rotation"] = {"axis": self.normal(), kind: value}
+        return new
+
+    def since_start(self, value: Any, body: str) -> Plain:
+        """A table of angles less the angle at the start: a rotation in space counts from there."""
+        start = next(each.angle for each in self.case.bodies if each.name == body)
+        (table,) = read_signals(value, ("x",))
+        assert isinstance(table, Table)
+        return {"table": np.column_stack([table.times, table.values[:, 0] - start]).tolist()}
 
     def points(self, old: Plain, path: str) -> Plain:
         """The grids in the plane."""
@@ -314,6 +323,14 @@ class _Lift:
         if old.get("integrator") == "gauss":
             self.refuse(inside(path, "integrator"), "gauss is not in space yet")
         return old
+
+
+def read_signals(value: Any, names: tuple[str, ...]) -> tuple[Signal, ...]:
+    """A quantity over time that has been read before."""
+    reading = Reading(Path())
+    read: tuple[Signal, ...] = Signals(names).read(node_of(value, ""), "", reading)
+    assert not reading.mistakes
+    return read
 
 
 def _as_it_is(value: Any, path: str) -> Any:

@@ -86,7 +86,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     fine = has_coarse_steps(case.solver)
     more = lasting_times(case, fine) + motion_times(load_case, dimension)
     times = breakpoints(load_case, more)
-    driven, drive = drives(load_case, times, dimension, dimension.stated(home), v0)
+    driven, drive, frames_of_turns, turns = drives(load_case, times, dimension, dimension.stated(home), v0, home)
     _refuse_impacts(case, load_case, bodies, driven, drive, times)
     free = np.ones(n, dtype=np.int64)
     free[-each:] = 0
@@ -116,8 +116,8 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     model = GeneralModel(
         free=free, mass=mass, q0=np.tile(bodies.at_home, len(names)), v0=v0, home=home, pair=pair, reach=reach,
         **members, times=times, **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven,
-        drive=drive, joint=joint,
-        joint_par=joint_par, row=layout.row, place=layout.place,
+        drive=drive, drive_frame=frames_of_turns, drive_turn=turns, joint=joint, joint_par=joint_par, row=layout.row,
+        place=layout.place,
         size=np.array(
             [*layout.size, int(damped), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
         ), line=layout.line,

@@ -4,69 +4,112 @@ Linear accelerations, linear velocities and cubic splines of positions are all c
 prescribed as acceleration or velocity is integrated from the body's own start.
 """
 
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from mdstopo.case.model import LoadCase, Motion, Prescribed, Table
 from mdstopo.case.spline import slopes
 from mdstopo.general.dimension import Dimension
+from mdstopo.mechanics.kinematics.spatial_drives import FRAME, ROW
 from mdstopo.scene.model import FloatArray, IndexArray
 from mdstopo.scene.signals import segment_values
 
 
-def prescribed(load_case: LoadCase, dimension: Dimension) -> Iterator[tuple[int, str, Prescribed]]:
-    """(freedom, axis, what is prescribed) of everything that is driven, by body as declared, then by freedom."""
-    names = [body.name for body in load_case.bodies]
-    for motion in load_case.motions:
-        first = dimension.kinematics.freedoms * names.index(motion.body)
-        for axis, word in enumerate(dimension.axes):
-            part = getattr(motion, word)
-            if part is not None:
-                yield first + axis, word, part
+class Drives(NamedTuple):
+    """What is driven (`GeneralModel.driven`, `drive`, `drive_frame`, `drive_turn`)."""
+
+    driven: IndexArray
+    cubics: FloatArray
+    frames: FloatArray
+    turns: FloatArray
 
 
 def drives_all(motion: Motion, dimension: Dimension) -> bool:
     """Whether a motion leaves nothing of its body free."""
-    whole = len(dimension.axes) == dimension.kinematics.freedoms
+    whole = len(dimension.axes) == dimension.kinematics.freedoms or motion.rotation is not None
     return whole and all(getattr(motion, word) is not None for word in dimension.axes)
 
 
 def motion_times(load_case: LoadCase, dimension: Dimension) -> list[float]:
     """Rows of the tables of all prescribed motions, s."""
     times: list[float] = []
-    for _, _, part in prescribed(load_case, dimension):
-        if isinstance(part.signal, Table):
-            times += part.signal.times.tolist()
+    for motion in load_case.motions:
+        parts = [getattr(motion, word) for word in dimension.axes]
+        signals = [part.signal for part in parts if part is not None]
+        if motion.rotation is not None:
+            signals += motion.rotation.signals
+        for signal in signals:
+            if isinstance(signal, Table):
+                times += signal.times.tolist()
     return times
 
 
 def drives(
-    load_case: LoadCase, times: FloatArray, dimension: Dimension, home: FloatArray, v0: FloatArray
-) -> tuple[IndexArray, FloatArray]:
-    """Driven freedoms (n_driven,) and their cubics (n_seg, n_driven, 4) in the segments of times (n_seg + 1,).
+    load_case: LoadCase,
+    times: FloatArray,
+    dimension: Dimension,
+    home: FloatArray,
+    v0: FloatArray,
+    attitudes: FloatArray | None = None,
+) -> Drives:
+    """What is driven, by motion, then by freedom.
 
-    What is driven is the change since home (n,), where freedoms are as they are stated; v0 (n,): velocities there.
+    load_case, dimension: the scene, and what belongs to its dimension.
+    times (n_seg + 1,): ends of the segments (s).
+    home (n,): freedoms as they are stated where nothing has moved yet; what is driven is the change since. v0 (n,):
+    velocities there.
+    attitudes (n_body, n_home): bodies at home, which prescribed rotations need.
     """
-    parts = list(prescribed(load_case, dimension))
-    cubics = np.zeros((len(times) - 1, len(parts), 4))
-    for i, (d, _, part) in enumerate(parts):
-        if part.kind == "position":
-            cubics[:, i] = _spline_cubics(part.signal, times, float(home[d]))
-            continue
-        values = segment_values(part.signal, times)
-        position, velocity = 0.0, float(v0[d])
-        for k in range(len(times) - 1):
-            value, slope = values[k]
-            if part.kind == "acceleration":
-                cubic = position, velocity, 0.5 * value, slope / 6.0
-            else:
-                cubic = position, value, 0.5 * slope, 0.0
-            cubics[k, i] = cubic
-            h = times[k + 1] - times[k]
-            position = cubic[0] + h * (cubic[1] + h * (cubic[2] + h * cubic[3]))
-            velocity = cubic[1] + h * (2.0 * cubic[2] + 3.0 * h * cubic[3])
-    return np.array([d for d, _, _ in parts], dtype=np.int64), cubics
+    names = [body.name for body in load_case.bodies]
+    each = dimension.kinematics.freedoms
+    driven: list[int] = []
+    cubics: list[FloatArray] = []
+    frames = np.zeros((0, FRAME))
+    turns = np.zeros((0, ROW))
+    for motion in load_case.motions:
+        body = names.index(motion.body)
+        for d, word in enumerate(dimension.axes, each * body):
+            part: Prescribed | None = getattr(motion, word)
+            if part is not None:
+                driven.append(d)
+                cubics.append(cubics_of(part, times, float(home[d]), float(v0[d])))
+        if motion.rotation is not None:
+            from mdstopo.general.turning_drives import turning_of  # few bodies have one
+
+            assert attitudes is not None
+            first = each * (body + 1) - 3
+            found = turning_of(motion.rotation, times, attitudes[body], v0[first : first + 3])
+            driven += [first, first + 1, first + 2]
+            cubics += list(found.cubics.transpose(1, 0, 2))
+            ends = float(len(turns)), float(len(turns) + len(found.rows))
+            frames = np.vstack([frames, [*found.frame, *ends]])
+            turns = np.vstack([turns, found.rows])
+    whole = np.array(cubics).reshape(len(cubics), len(times) - 1, 4).transpose(1, 0, 2)
+    return Drives(np.array(driven, dtype=np.int64), np.ascontiguousarray(whole), frames, turns)
+
+
+def cubics_of(part: Prescribed, times: FloatArray, home: float, rate: float) -> FloatArray:
+    """(n_seg, 4): powers of the time since the segment's start, of a prescribed quantity less what it is at home.
+
+    rate: at the start, from which an acceleration is integrated.
+    """
+    if part.kind == "position":
+        return _spline_cubics(part.signal, times, home)
+    out = np.zeros((len(times) - 1, 4))
+    values = segment_values(part.signal, times)
+    position, velocity = 0.0, rate
+    for k in range(len(times) - 1):
+        value, slope = values[k]
+        if part.kind == "acceleration":
+            cubic = position, velocity, 0.5 * value, slope / 6.0
+        else:
+            cubic = position, value, 0.5 * slope, 0.0
+        out[k] = cubic
+        h = times[k + 1] - times[k]
+        position = cubic[0] + h * (cubic[1] + h * (cubic[2] + h * cubic[3]))
+        velocity = cubic[1] + h * (2.0 * cubic[2] + 3.0 * h * cubic[3])
+    return out
 
 
 def _spline_cubics(signal: object, times: FloatArray, home: float) -> FloatArray:

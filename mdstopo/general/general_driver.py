@@ -33,6 +33,7 @@ from mdstopo.general.row_gradients import RowGradients
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
 from mdstopo.general.step_history import GRAZES, history_room
+from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
 from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, ResponseResult, SceneFamily
@@ -621,7 +622,7 @@ class GeneralSteps:
                         dense[i, each * int(model.joint[j, JOINT_FIRST + c // each]) + c % each] += jac[j, r, c]
                 dense[:, model.free == 0] = 0.0
                 lam[k] = np.linalg.lstsq(dense.T, dense.T @ lam[k], rcond=1e-10)[0]
-        return np.concatenate([lam, solved[:, n_row:]], axis=1)
+        return np.concatenate([lam, global_moments(model, q, solved[:, n_row:])], axis=1)
 
     def reactions(self, q: FloatArray, lam: FloatArray) -> dict[str, FloatArray]:
         """Joint name -> force and moment (T, D) on its first body, at states q (T, n_q) with lam (T, n_rows)."""

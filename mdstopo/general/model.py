@@ -2,7 +2,7 @@
 
 Bodies are those of the case as declared, ground after them. How many numbers each has, its kinematics says
 (`mechanics.kinematics`): n freedoms of all bodies, and n_q coordinates q, what has changed since home. A freedom is
-free, or driven: known as a cubic of time within each segment; ground is driven and stands still. Rows of joints are
+free, or driven: known as a function of time within each segment; ground is driven and stands still. Rows of joints are
 solved together with the accelerations (`solve_accelerations`); rows that others imply are left out there.
 """
 
@@ -80,9 +80,26 @@ class GeneralModel(NamedTuple):
     load_force: LoadForce
     bushing_pair: Annotated[IndexArray, Field("n_bushing", "the pair that a bushing connects")]
     bushing: Annotated[FloatArray, Field("n_bushing, n_elastic", "P, Q, its stretch at home, stiffness, damping")]
-    driven: Annotated[IndexArray, Field("n_driven", "coordinates that are driven")]
+    driven: Annotated[IndexArray, Field("n_driven", "freedoms that are driven")]
     drive: Annotated[
-        FloatArray, Field("n_seg, n_driven, 4", "where they are in a segment: powers of the time since its start")
+        FloatArray,
+        Field(
+            "n_seg, n_driven, 4",
+            "where they are in a segment: powers of the time since its start; of a rotation in space three angles, or "
+            "integrals of the angular velocity's components since then",
+        ),
+    ]
+    drive_frame: Annotated[
+        FloatArray,
+        Field(
+            "n_turned, 11",
+            "of each driven rotation in space what turns vectors of the body at home into the drive's axes, by rows; "
+            "the first of its rows in `drive_turn`, and the one behind the last",
+        ),
+    ]
+    drive_turn: Annotated[
+        FloatArray,
+        Field("n_turn, 5", "time (s), unit quaternion of the turn since the start by a prescribed angular velocity"),
     ]
     joint: Annotated[IndexArray, Field("n_joint, 5", "code, first and second body, pair, rows")]
     joint_par: Annotated[

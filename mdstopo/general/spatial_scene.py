@@ -98,7 +98,7 @@ def _velocities(body: Any, home: FloatArray) -> list[float]:
 
 
 def _stated(home: FloatArray) -> FloatArray:
-    """x, y, z of all bodies; turns are not driven."""
+    """x, y, z of all bodies; turns count from home."""
     out = np.zeros((len(home), SPATIAL.freedoms))
     out[:, PLACE] = home[:, PLACE]
     return out.ravel()

@@ -168,7 +168,7 @@ class System:
     def _driven(self) -> Iterator[Row]:
         q0 = np.array([value for body in self.load_case.bodies for value in (*body.position, body.angle)])
         v0 = np.array([value for body in self.load_case.bodies for value in (*body.velocity, body.angular_velocity)])
-        indices, cubics = drives(self.load_case, self.times, PLANE, q0, v0)
+        indices, cubics = drives(self.load_case, self.times, PLANE, q0, v0)[:2]
         cubics[:, :, 0] += q0[indices]
         for i, d in enumerate(indices.tolist()):
             if d % 3 < 2:

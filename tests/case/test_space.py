@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -303,11 +304,6 @@ def test_a_spatial_key_in_the_plane_names_the_planar_one(old: str, new: str, mes
         ("joints: []", "contacts: [{points: p, on: {}}]", "contacts: contacts are not in space yet"),
         (
             "joints: []",
-            "motions: [{body: a, rotation: {yaw: {velocity: 0}}}]",
-            "motions[0].rotation: prescribed rotations are not in space yet",
-        ),
-        (
-            "joints: []",
             "solver: {integrator: gauss}",
             "solver.integrator: found the text 'gauss', which is not in space yet",
         ),
@@ -433,6 +429,102 @@ def test_motions_give_the_start_velocities_that_bodies_do_not_state() -> None:
         ("joints: []", "motions: [{body: a, z: {velocity: 3}}]"),
         ("position: [1, 2, 3]}", "position: [1, 2, 3], velocity: [0, 0, 0]}"),
     )
+
+
+TURNS = [
+    ("{roll: {velocity: 1}, pitch: {velocity: 2}, yaw: {acceleration: 3}}", (1, 2, 0)),
+    ("{axis: [0, 3, 4], velocity: 5}", (0, 3, 4)),
+    ("{axis: [0, 3, 4], position: {table: [[0, 0], [1, 5], [2, 10], [3, 15]]}}", (0, 3, 4)),
+    ("{axis: [0, 3, 4], acceleration: 5}", (0, 0, 0)),
+    ("{angular_velocity: {table: [[0, 1, 2, 3], [1, 0, 0, 0]]}}", (1, 2, 3)),
+    ("{angular_velocity: [1, {table: [[0, 2], [1, 0]]}, 3]}", (1, 2, 3)),
+]
+
+
+@pytest.mark.parametrize(("rotation", "start"), TURNS)
+def test_prescribed_rotations_give_the_angular_velocity_at_the_start(rotation: str, start: Any) -> None:
+    case = space(("joints: []", f"motions: [{{body: a, rotation: {rotation}}}]"))
+    (found,) = case.load_cases
+    np.testing.assert_allclose(found.bodies[0].angular_velocity, start, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("rotation", "stated"),
+    [
+        ("{roll: {velocity: 1}, pitch: {acceleration: 2}, yaw: {acceleration: 3}}", (1, 5, 7)),
+        ("{axis: [0, 0, 2], acceleration: 1}", (0, 0, 9)),
+        ("{axis: [1, 2, 2], position: {table: [[0, 0], [1, 3], [2, 6], [3, 9]]}}", (1, 2, 2)),
+    ],
+)
+def test_a_rotation_that_agrees_starts_as_the_body_states(rotation: str, stated: Any) -> None:
+    case = space(
+        ("joints: []", f"motions: [{{body: a, rotation: {rotation}}}]"),
+        ("position: [1, 2, 3]}", f"position: [1, 2, 3], angular_velocity: {list(stated)}}}"),
+    )
+    assert case.load_cases[0].bodies[0].angular_velocity == stated
+
+
+@pytest.mark.parametrize(
+    ("rotation", "message"),
+    [
+        (
+            "{yaw: {velocity: 0}}",
+            "motions[0].rotation.yaw: the key 'yaw' goes with 'roll', which is not given",
+        ),
+        (
+            "{roll: {velocity: 0}, pitch: {velocity: 0}}",
+            "motions[0].rotation.roll: the key 'roll' goes with 'yaw', which is not given",
+        ),
+        (
+            "{roll: {velocity: 0}, axis: [1, 0, 0], velocity: 1}",
+            "motions[0].rotation: found roll and axis, needed is exactly one of roll, axis, angular_velocity",
+        ),
+        (
+            "{axis: [1, 0, 0]}",
+            "motions[0].rotation: found none, needed beside axis is exactly one of acceleration, velocity, position",
+        ),
+        (
+            "{axis: [1, 0, 0], velocity: 1, acceleration: 2}",
+            "motions[0].rotation: found acceleration and velocity, needed beside axis is exactly one of acceleration, "
+            "velocity, position",
+        ),
+        ("{velocity: 1}", "motions[0].rotation.velocity: the key 'velocity' goes with 'axis', which is not given"),
+        (
+            "{angular_velocity: [1, 2]}",
+            "motions[0].rotation.angular_velocity: found a list of 2, allowed is [wx, wy, wz] or "
+            "{table: rows [t, wx, wy, wz]}",
+        ),
+        (
+            "{angular_velocity: [1, 2, 4]}",
+            "motions[0].rotation.angular_velocity: found 4 at the start, but bodies.a.angular_velocity's z states 3; "
+            "they must agree",
+        ),
+        (
+            "{axis: [0, 0, 1], acceleration: 4}",
+            "motions[0].rotation.acceleration: found 0 at the start, but bodies.a.angular_velocity's x states 1; they "
+            "must agree",
+        ),
+        (
+            "{roll: {velocity: 1}, pitch: {velocity: 3}, yaw: {acceleration: 0}}",
+            "motions[0].rotation.pitch.velocity: found 3 at the start, but bodies.a.angular_velocity's y states 2; "
+            "they must agree",
+        ),
+        (
+            "{axis: [1, 2, 3], position: {table: [[0, 1], [1, 2], [2, 3], [3, 4]]}}",
+            "motions[0].rotation.position: found 1 at the start, needed is 0: it counts from there",
+        ),
+        (
+            "{axis: [1, 2, 3], position: {table: [[0, 0], [0.03, 2], [0.06, 3], [0.1, 4]]}}",
+            "motions[0].rotation.position: the table runs from 0 to 0.1 s; it must cover start 0 to end 0.2 s",
+        ),
+    ],
+)
+def test_prescribed_rotations_that_cannot_be_are_refused(rotation: str, message: str) -> None:
+    lines = told(
+        ("joints: []", f"motions: [{{body: a, rotation: {rotation}}}]"),
+        ("position: [1, 2, 3]}", "position: [1, 2, 3], angular_velocity: [1, 2, 3]}"),
+    )
+    assert message in lines, lines
 
 
 def load(keys: str, more: str = "") -> Load:

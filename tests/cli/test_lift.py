@@ -158,11 +158,6 @@ def test_cases_of_the_project_are_lifted(name: str) -> None:
     [
         (
             "points:\n",
-            "motions: [{body: a, angle: {velocity: 3}}]\npoints:\n",
-            "x.yaml:13:28: motions[0].angle: prescribed rotations are not in space yet: it cannot be lifted",
-        ),
-        (
-            "points:\n",
             "solver: {integrator: gauss}\npoints:\n",
             "x.yaml:13:22: solver.integrator: gauss is not in space yet: it cannot be lifted",
         ),
@@ -173,6 +168,42 @@ def test_what_cannot_be_lifted_is_refused_at_its_place(old: str, new: str, messa
     with pytest.raises(CaseError) as refused:
         lifted(read_case(PLANAR.replace(old, new, 1), path="x.yaml"))
     assert message in str(refused.value)
+
+
+TABLE = "[[0, 0.5], [0.1, 0.9], [0.2, 0.4], [0.3, 0]]"
+
+
+@pytest.mark.parametrize("spot", SPOTS)
+@pytest.mark.parametrize(
+    ("body", "motion"),
+    [
+        ("angle: 0.5, angular_velocity: 3", "velocity: {table: [[0, 3], [0.1, 5]]}"),
+        ("angle: 0.5, angular_velocity: 3", "acceleration: 7"),
+        ("velocity: [0, 0]", f"position: {{table: {TABLE}}}"),
+    ],
+)
+def test_a_driven_angle_turns_about_the_normal(
+    spot: tuple[tuple[float, float, float], float], body: str, motion: str
+) -> None:
+    text = PLANAR.replace("angle: 0.5, angular_velocity: 3", body)
+    text = text.replace("points:\n", f"motions: [{{body: a, angle: {{{motion}}}}}]\npoints:\n", 1)
+    planar = read_case(text)
+    spatial = read_case(lifted(planar, *spot))
+    plane = about_axis(*spot)
+    for old, new in zip(planar.bodies, spatial.bodies, strict=True):
+        c, s = np.cos(old.angle), np.sin(old.angle)
+        np.testing.assert_allclose(new.rotation, plane @ [[c, -s, 0], [s, c, 0], [0, 0, 1]], atol=1e-14)
+    (old,), (new,) = planar.load_cases[1].motions, spatial.load_cases[1].motions
+    assert old.angle is not None
+    assert new.rotation is not None
+    np.testing.assert_allclose(new.rotation.axis, plane[:, 2], atol=1e-14)
+    (angle,) = new.rotation.angles
+    start = 0.5 if old.angle.kind == "position" else 0.0
+    assert angle.kind == old.angle.kind
+    for time in (0.0, 0.05, 0.15):
+        assert at(angle.signal, time) == pytest.approx(at(old.angle.signal, time) - start, abs=1e-15)
+    for before, after in zip(planar.load_cases[1].bodies, spatial.load_cases[1].bodies, strict=True):
+        np.testing.assert_allclose(after.angular_velocity, plane[:, 2] * before.angular_velocity, atol=1e-12)
 
 
 def test_what_has_no_component_in_a_tilted_plane_is_refused() -> None:

@@ -27,7 +27,6 @@ from mdstopo.mechanics.kinematics import (
     spatial_steps,
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
-from mdstopo.mechanics.kinematics.planar_drives import drive_acceleration
 from mdstopo.mechanics.kinematics.spatial_poses import ATTITUDE, COORDINATES, FREEDOMS, POSE, ROTATIONS, fill_attitude
 
 
@@ -111,7 +110,7 @@ _KERNELS = (
     spatial_steps.stage_state, spatial_steps.end_state, spatial_steps.stage_vjp, spatial_steps.start_vjp,
     spatial_steps.stage_jvp, spatial_steps.end_jvp, spatial_steps.cubic, spatial_steps.cubic_vjp,
     spatial_steps.cubic_jvp, spatial_steps.quintic,
-    spatial_drives.drive_state, drive_acceleration,
+    spatial_drives.drive_state, spatial_drives.drive_acceleration,
     spatial_poses.turn_bodies, spatial_members.turn_of, relative_pose, spatial_poses.turned_pose,
     spatial_poses.pose_acceleration, spatial_poses.pair_displacement, spatial_poses.add_pair_force,
     spatial_forces.pair_tangent, spatial_forces.pair_matrix_vjp, spatial_forces.pair_stiffness,

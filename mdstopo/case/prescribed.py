@@ -1,0 +1,81 @@
+"""One prescribed quantity over time: what the file says of it, and what that is at the start."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mdstopo.case.arrays import Signal, Table
+from mdstopo.case.model import Prescribed
+from mdstopo.case.reading import Fields, Reading
+from mdstopo.case.spline import value_and_slope
+from mdstopo.case.words import number_text
+
+if TYPE_CHECKING:
+    from mdstopo.case.loading import Window
+
+AGREE = 1e-8
+"""How far, relative to the values at hand, a stated start may lie from a prescribed one."""
+KINDS = ("acceleration", "velocity", "position")
+
+
+def value_at(signal: Signal, time: float) -> float:
+    """A scalar signal at `time`: linear between rows, constant outside, right-continuous."""
+    if not isinstance(signal, Table):
+        return signal
+    t, x = signal.times, signal.values[:, 0]
+    i = int(np.searchsorted(t, time, side="right")) - 1
+    if i < 0:
+        return float(x[0])
+    if i == len(t) - 1:
+        return float(x[-1])
+    return float(x[i] + (x[i + 1] - x[i]) * ((time - t[i]) / (t[i + 1] - t[i])))
+
+
+def size_of(signal: Signal) -> float:
+    """The largest value of a signal, without its sign."""
+    return float(np.abs(signal.values).max()) if isinstance(signal, Table) else abs(signal)
+
+
+def prescribed(fields: Fields | None) -> Prescribed | None:
+    """What keys prescribe, of which one is acceleration, velocity or position; None of nothing."""
+    if fields is None:
+        return None
+    kind = next(kind for kind in KINDS if kind in fields.stated)
+    return Prescribed(kind, fields[kind][0])
+
+
+def position_at_start(signal: Signal, window: Window, path: str, reading: Reading) -> tuple[float, float, float] | None:
+    """Value and rate at the start of a table of positions, and by how much it changes per second.
+
+    None where it does not cover the simulated time, or is too steep, which is noted at `path`.
+    """
+    assert isinstance(signal, Table)
+    t, x = signal.times, signal.values[:, 0]
+    if not (t[0] <= window.start and window.end <= t[-1]):
+        runs = f"{number_text(float(t[0]))} to {number_text(float(t[-1]))} s"
+        needed = f"start {number_text(window.start)} to end {number_text(window.end)} s"
+        reading.mistake(path, f"the table runs from {runs}; it must cover {needed}")
+        return None
+    value, rate = value_and_slope(t, x, window.start)
+    if not (math.isfinite(value) and math.isfinite(rate)):
+        reading.mistake(path, "the spline through the table is too steep for a number")
+        return None
+    return value, rate, float(np.ptp(x) / (window.end - window.start))
+
+
+def agree(value: float, stated: float, scale: float, what: str, path: str, reading: Reading) -> None:
+    """Note a mistake where a body does not start as its prescribed motion does.
+
+    value: of the motion at the start.
+    stated: by the body.
+    scale: what the difference may be relative to, beside these two.
+    what: the body's key, in words.
+    path: where the motion stands in the file.
+    reading: takes the mistake.
+    """
+    if not abs(value - stated) <= AGREE * max(abs(value), abs(stated), scale):
+        now, then = number_text(value), number_text(stated)
+        reading.mistake(path, f"found {now} at the start, but {what} states {then}; they must agree")
