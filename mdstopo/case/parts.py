@@ -180,8 +180,8 @@ class Prescribed(Value):
 class PrescribedRotation(Value):
     """A body's whole rotation over time in space, in one of three ways.
 
-    angles: roll, pitch and yaw, about the global x, y and z, or with `axis` the one angle about that global unit vector;
-    each is 0 at the start. angular_velocity: where there are none, its global components in rad/s.
+    angles: roll, pitch and yaw, about the global x, y and z, or with `axis` the one angle about that global unit
+    vector; each is 0 at the start. angular_velocity: where there are none, its global components in rad/s.
     """
 
     angles: tuple[Prescribed, ...] = ()

@@ -137,7 +137,7 @@ def test_an_angular_velocity_turns_a_body_as_an_integrator_says() -> None:
             atol=1e-13,
         )
         turn, start = Rotation.from_matrix(found.y[:, -1].reshape(3, 3)), end
-        seen, omega, alpha = driven(scene, end, None if end != 1.0 else 0)
+        seen, omega, _ = driven(scene, end, None if end != 1.0 else 0)
         assert (seen * turn.inv()).magnitude() < 1e-11, end
         same(omega, rate(end, side), 1e-14)
         if end not in (1.0, 1.6):

@@ -7,7 +7,7 @@ start in axes of its own, which a frame H at home leads to: R(t) = R_home E with
 
 because the rate of v is that of omega as the body sees it: omega x omega is nothing. Either Q = Q_z Q_y Q_x of three
 angles that are cubics of time, or omega is linear in time within a segment. Then Q goes on from a row of a table by the
-exponential of Magnus' series (S. Blanes, F. Casas, J. Ros, BIT 42, 2002, Eq. 24 for vectors of R^3), with
+exponential of Magnus' series (S. Blanes, F. Casas, J. Ros, BIT 40, 2000; here of vectors), with
 a = h omega(middle), b = h^2 omega' and c = a x b
 
     Omega = a - c/12 + a x (a x c)/720 + c x b/240 - c x (a x c)/14400,
