@@ -7,12 +7,13 @@ method is at the limit of its stability there.
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.accelerations import solve_unknowns
 from mdstopo.general.members import MODE, rate_of_row
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import CLOSED, MU, SLIP, C, K, contact_force
-from mdstopo.mechanics.kinematics.kinematics_interface import contact_rows
+from mdstopo.mechanics.kinematics.kinematics_interface import contact_directions, contact_drag
+from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, norm
 
 #: a step this long, relative to the time in which friction brakes by `slip`, has no error but that of rounding
 SETTLED = 0.1
@@ -48,41 +49,47 @@ def friction_error(model, member_state, vectors, s, h, q0, v0, q1, v1, a, noise,
     Returns the error, 0 where no contact drags, NaN where one appears.
     """
     first = model.member.shape[1]
-    rows = np.empty((2, pair_freedoms(model)))
-    rates = np.empty((2, pair_freedoms(model)))
+    last = contact_directions(model) - 1  # the normal; those before it slide
+    rows = np.empty((last + 1, pair_freedoms(model)))
     worst = 0.0
     for j in range(model.contact_pair.shape[0]):
         c = model.contact[j]
         if int(member_state[MODE, first + j]) != CLOSED or c[MU] == 0.0:
             continue
         p = model.contact_pair[j]
-        _, height = contact_rows(model, j, q0, v0, rows, rates)
-        slide = rate_of_row(model, p, rows[0], v0)
-        normal = -c[K] * height - c[C] * rate_of_row(model, p, rows[1], v0)
-        contact_rows(model, j, q1, v1, rows, rates)
-        after = rate_of_row(model, p, rows[0], v1)
-        slow = min(abs(slide), abs(after)) if slide * after > 0.0 else 0.0
+        height, rise, before = contact_drag(model, j, q0, v0, rows)
+        normal = -c[K] * height - c[C] * rise
+        _, _, after = contact_drag(model, j, q1, v1, rows)
+        slow = slowest_between(before, after)
         fine = 0.0
         coarse = 0.0
         parts = 0.0
         rising = 0.0
         mobility = 0.0
+        for m in range(last):
+            sum_fine = 0.0
+            sum_coarse = 0.0
+            for r in range(pair_freedoms(model)):
+                d = place_in_pair(model, p, r)
+                if model.free[d] != 0:
+                    mobility += rows[m, r] * rows[m, r] / model.mass[d]
+                parts += abs(rows[m, r] * v1[d])
+                for i in range(s):
+                    sum_fine += rows[m, r] * vectors[4, i] * a[i, d]
+                    sum_coarse += rows[m, r] * vectors[6, i] * a[i, d]
+            fine += sum_fine * sum_fine
+            coarse += sum_coarse * sum_coarse
         for r in range(pair_freedoms(model)):
-            d = place_in_pair(model, p, r)
-            if model.free[d] != 0:
-                mobility += rows[0, r] * rows[0, r] / model.mass[d]
-            parts += abs(rows[0, r] * v1[d])
-            rising += abs(rows[1, r] * v1[d])
-            for i in range(s):
-                fine += rows[0, r] * vectors[4, i] * a[i, d]
-                coarse += rows[0, r] * vectors[6, i] * a[i, d]
+            rising += abs(rows[last, r] * v1[place_in_pair(model, p, r)])
+        fine = np.sqrt(fine)
+        coarse = np.sqrt(coarse)
         brake = c[MU] * mobility * h
         if not brake * abs(normal) > SETTLED * c[SLIP]:
             continue
         rounded = ROUNDING * parts + brake * (c[K] * noise[p] + c[C] * ROUNDING * rising) + mobility * h * shaken
         scale = max(c[SLIP] + slow * slow / c[SLIP], rounded / tolerance)
-        fine = h * abs(fine) / scale
-        coarse = h * abs(coarse) / scale
+        fine = h * fine / scale
+        coarse = h * coarse / scale
         if not np.isfinite(fine):
             return np.nan
         if fine > 0.0:
@@ -91,11 +98,23 @@ def friction_error(model, member_state, vectors, s, h, q0, v0, q1, v1, a, noise,
     return worst
 
 
+@part
+def slowest_between(before, after):
+    """The least size of a sliding velocity (three numbers) that changes evenly from one to another (m/s)."""
+    forward = dot(before, after)
+    if forward >= dot(before, before):
+        return norm(before)
+    if forward >= dot(after, after):
+        return norm(after)
+    return norm(cross(before, after)) / norm(minus(after, before))
+
+
 @kernel
 def brake_rate(model, member_state, q, v, enough, workspace):
     """The fastest rate at which closed contacts brake velocities at a state, at most; and which of them brakes most.
 
-    Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, damping c; with rows B and the mobility
+    Friction has the slope D = mu N sech^2(slide / slip) / slip in the velocity, in space T / slide across that, damping
+    has c; with rows B and the mobility
     G = B M^-1 B^T, in which joints hold what they hold, the rates are the eigenvalues of G D. Their sum is the trace;
     where that is more than `enough`, it is the largest row of |G| D.
 
@@ -112,10 +131,10 @@ def brake_rate(model, member_state, q, v, enough, workspace):
     n = v.shape[0]
     first = model.member.shape[1]
     count = model.contact_pair.shape[0]
-    rows = np.empty((2, pair_freedoms(model)))
-    rates = np.empty((2, pair_freedoms(model)))
-    kept = np.empty((2 * count, pair_freedoms(model)))
-    slope = np.zeros(2 * count)
+    each = contact_directions(model)
+    rows = np.empty((each, pair_freedoms(model)))
+    kept = np.empty((each * count, pair_freedoms(model)))
+    slope = np.zeros(each * count)
     total = 0.0
     largest = 0.0
     who = -1
@@ -124,32 +143,34 @@ def brake_rate(model, member_state, q, v, enough, workspace):
         if int(member_state[MODE, first + j]) != CLOSED or (c[MU] == 0.0 and c[C] == 0.0):
             continue
         p = model.contact_pair[j]
-        _, height = contact_rows(model, j, q, v, rows, rates)
-        slide = rate_of_row(model, p, rows[0], v)
-        _, _, by_rise, _, _, _, by_slide = contact_force(c, height, rate_of_row(model, p, rows[1], v), slide, CLOSED)
-        slope[2 * j] = abs(by_slide)
-        slope[2 * j + 1] = abs(by_rise)
-        for i in range(2):
+        height, rise, sliding = contact_drag(model, j, q, v, rows)
+        slide = sliding[0] if each == 2 else norm(sliding)
+        _, _, by_rise, friction, _, _, by_slide = contact_force(c, height, rise, slide, CLOSED)
+        slope[each * j] = abs(by_slide)
+        if each == 3:
+            slope[each * j + 1] = abs(friction) / slide if slide > 0.0 else abs(by_slide)
+        slope[each * j + each - 1] = abs(by_rise)
+        for i in range(each):
             mobility = 0.0
             for r in range(pair_freedoms(model)):
-                kept[2 * j + i, r] = rows[i, r]
+                kept[each * j + i, r] = rows[i, r]
                 d = place_in_pair(model, p, r)
                 if model.free[d] != 0:
                     mobility += rows[i, r] * rows[i, r] / model.mass[d]
-            total += slope[2 * j + i] * mobility
-            if slope[2 * j + i] * mobility > largest:
-                largest = slope[2 * j + i] * mobility
+            total += slope[each * j + i] * mobility
+            if slope[each * j + i] * mobility > largest:
+                largest = slope[each * j + i] * mobility
                 who = first + j
     if not total > enough:
         return total, who
     found = 0.0
     push = np.empty(n)
     held = np.empty(model.size[0])
-    for i in range(2 * count):
+    for i in range(each * count):
         if slope[i] == 0.0:
             continue
         push[:] = 0.0
-        p = model.contact_pair[i // 2]
+        p = model.contact_pair[i // each]
         for r in range(pair_freedoms(model)):
             push[place_in_pair(model, p, r)] = kept[i, r]
         if held.shape[0] > 0:
@@ -159,8 +180,8 @@ def brake_rate(model, member_state, q, v, enough, workspace):
             for d in range(n):
                 push[d] = push[d] / model.mass[d] if model.free[d] != 0 else 0.0
         row = 0.0
-        for k in range(2 * count):
+        for k in range(each * count):
             if slope[k] != 0.0:
-                row += abs(rate_of_row(model, model.contact_pair[k // 2], kept[k], push)) * slope[k]
+                row += abs(rate_of_row(model, model.contact_pair[k // each], kept[k], push)) * slope[k]
         found = max(found, row)
     return min(found, total), who

@@ -21,8 +21,10 @@ from mdstopo.general.contact import contact_switch
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START, STOP
 from mdstopo.general.strides import pair_freedoms, place_in_pair
-from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes, contact_pose
+from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes
 from mdstopo.mechanics.kinematics.kinematics_interface import (
+    contact_distance,
+    contact_seen,
     cubic,
     deflection,
     member_motion,
@@ -76,8 +78,8 @@ def smallest_margin(model, segment, member_state, rel):
                 who = i
     for j in range(model.contact_pair.shape[0]):
         i = model.member.shape[1] + j
-        along, height, _, rise = contact_pose(model.contact[j], rel[model.contact_pair[j]])
-        s = contact_margin(model.contact[j], along, height, rise, int(member_state[MODE, i]))
+        height, rise, room, _, _ = contact_seen(model, j, rel[model.contact_pair[j]])
+        s = contact_margin(model.contact[j], height, rise, room, int(member_state[MODE, i]))
         if s < best:
             best = s
             who = i
@@ -138,16 +140,16 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
         row = model.contact[j]
         mode = int(member_state[MODE, model.member.shape[1] + j])
         p = model.contact_pair[j]
-        along, height, slide, rise = contact_pose(row, rel0[p])
-        by_along, by_height, by_rise = contact_margin_slopes(row, along, height, rise, mode)
-        s0 = contact_margin(row, along, height, rise, mode)
-        d0 = h * (by_along * slide + by_height * rise)
-        along, height, slide, rise = contact_pose(row, rel1[p])
-        at_along, at_height, at_rise = contact_margin_slopes(row, along, height, rise, mode)
-        if by_rise != 0.0 or at_rise != 0.0 or by_along != at_along or by_height != at_height:
+        height, rise, room, room_rate, end = contact_seen(model, j, rel0[p])
+        by_height, by_rise, by_room = contact_margin_slopes(row, height, rise, room, mode)
+        s0 = contact_margin(row, height, rise, room, mode)
+        d0 = h * (by_room * room_rate + by_height * rise)
+        height, rise, room, room_rate, at_end = contact_seen(model, j, rel1[p])
+        at_height, at_rise, at_room = contact_margin_slopes(row, height, rise, room, mode)
+        if by_rise != 0.0 or at_rise != 0.0 or by_height != at_height or (by_room != 0.0 and end != at_end):
             continue
-        s1 = contact_margin(row, along, height, rise, mode)
-        d1 = h * (at_along * slide + at_height * rise)
+        s1 = contact_margin(row, height, rise, room, mode)
+        d1 = h * (at_room * room_rate + at_height * rise)
         c, dip = lowest_between(s0, d0, s1, d1)
         if dip < 0.0:
             best = min(best, c)
@@ -177,7 +179,10 @@ def lowest_between(s0, d0, s1, d1):
 
 @kernel
 def probes_needed(model, segment, rel0, rel1):
-    """In how many parts a step is looked through: more where the bodies move far compared with a member's length."""
+    """In how many parts a step is looked through: more where the bodies move far compared with a member's length.
+
+    The distance from a curved surface's centre or axis is to a contact what its length is to a member.
+    """
     needed = 4.0
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
@@ -195,6 +200,9 @@ def probes_needed(model, segment, rel0, rel1):
     for j in range(model.contact_pair.shape[0]):
         p = model.contact_pair[j]
         needed = max(needed, min(4.0 * (turning_rate(model, rel1, p) + turning_rate(model, rel0, p)), 8.0))
+        near = min(contact_distance(model, j, rel0[p]), contact_distance(model, j, rel1[p]))
+        if near < np.inf:
+            needed = max(needed, min(8.0 * deflection(model, rel1, rel0, p) / max(near, 1e-300), 200.0))
     return int(needed)
 
 

@@ -140,4 +140,4 @@ def general_forces(model, member_state, segment, t, q, v, tangent, workspace):
                 none[:] = 0.0
         load_tangent(model, segment, t, q, v, workspace.turn)
     if model.contact_pair.shape[0] > 0:
-        add_contacts(model, member_state, q, v, tangent, f, workspace.k, workspace.c)
+        add_contacts(model, member_state, rel, q, v, tangent, f, workspace.k, workspace.c)

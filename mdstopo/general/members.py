@@ -9,8 +9,10 @@ which neither switch nor remember, are summed as vectors.
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, MEMBER_FREE_LENGTH, PAIR, START
 from mdstopo.general.strides import pair_freedoms, place_in_pair
-from mdstopo.mechanics.contact import contact_pose, contact_start, second_rise
+from mdstopo.mechanics.contact import contact_start
 from mdstopo.mechanics.kinematics.kinematics_interface import (
+    contact_second_rise,
+    contact_seen,
     ends_meet,
     keep_apart,
     member_motion,
@@ -113,9 +115,9 @@ def set_modes(model, member_state, rel, rel_rate, knots):
                 member_state[SET, i] = 0.0
     for j in range(model.contact_pair.shape[0]):
         p = model.contact_pair[j]
-        along, height, _, rise = contact_pose(model.contact[j], rel[p])
-        second = second_rise(model.contact[j], rel[p], rel_rate[p])
-        member_state[MODE, model.member.shape[1] + j] = contact_start(model.contact[j], along, height, rise, second)
+        height, rise, room, _, _ = contact_seen(model, j, rel[p])
+        second = contact_second_rise(model, j, rel[p], rel_rate[p])
+        member_state[MODE, model.member.shape[1] + j] = contact_start(model.contact[j], height, rise, second, room)
 
 
 @kernel

@@ -148,8 +148,8 @@ class GeneralModel(NamedTuple):
     response_par: Annotated[
         FloatArray, Field("n_response, n_number", "a point or axis of the body, then numbers of its own")
     ]
-    contact_pair: Annotated[IndexArray, Field("n_contact", "the pair of edge and point")]
-    contact: Annotated[FloatArray, Field("n_contact, 11", "see `mechanics.contact`")]
+    contact_pair: Annotated[IndexArray, Field("n_contact", "the pair of edge (or surface) and point")]
+    contact: Annotated[FloatArray, Field("n_contact, n_surface", "see `mechanics.contact`, `spatial_contacts`")]
     varied: Annotated[
         IndexArray,
         Field(

@@ -1,13 +1,17 @@
-"""A point of one body against an edge of another: modes, normal force and regularised friction, as scalars.
+"""A point of one body against an edge or a surface of another: modes, normal force and friction, as scalars.
 
-Seen from the body with the edge, the point lies `along` the edge from its first end and `height` above it, on the left
-of its direction; `rise` and `slide` are the rates. In contact, with depth = -height,
+Seen from the body with the edge, the point lies `height` above it, on its free side, and has `room` to the nearest end
+(infinite where there is none; negative beside it); `rise` and `slide` are the rates of the height and along the edge.
+In contact, with depth = -height,
 
     N = k depth - c rise >= 0,     T = -mu N tanh(slide / slip).
 
+In space the sliding velocity s has two components, and T = -mu N tanh(|s| / slip) s / |s|.
+
 Modes: above the edge, closed, clipped (damping would make N negative: no force), beside (behind the edge without
-having passed through it). In each mode the formula goes on beyond its end. Row of parameters (CONTACT,): k, c, mu,
-slip, the point, the edge's first end, its direction, its length.
+having passed through it). In each mode the formula goes on beyond its end. Row of parameters in a plane (CONTACT,): k,
+c, mu, slip, the point, the edge's first end, its direction (its left is free), its length. In space the first four are
+the same (`kinematics.spatial_contacts`).
 """
 
 import math
@@ -65,13 +69,35 @@ def contact_force(c, height, rise, slide, mode):
 
 
 @inline
-def contact_margin(c, along, height, rise, mode):
+def drag_by_slide(c, slide):
+    """e and e' of a friction T = -N e s against a sliding velocity s in space, |s| = slide; de = e' (s . ds).
+
+    With x = slide / slip, e = mu / slip tanh(x) / x and e' = mu / slip^3 (d/dx tanh(x) / x) / x: even powers of x, so
+    nothing is special where nothing slides. Near there they are summed as series.
+    """
+    x = slide / c[3]
+    y = x * x
+    if y < 0.01:
+        even = 1.0 - y * (
+            1.0 / 3.0 - y * (2.0 / 15.0 - y * (17.0 / 315.0 - y * (62.0 / 2835.0 - y * 1382.0 / 155925.0)))
+        )
+        slope = -2.0 / 3.0 + y * (8.0 / 15.0 - y * (34.0 / 105.0 - y * (496.0 / 2835.0 - y * 2764.0 / 31185.0)))
+        slope += y * y * y * y * y * 262128.0 / 6081075.0
+    else:
+        share = math.tanh(x)
+        even = share / x
+        slope = (1.0 - share * share - even) / y
+    return c[2] / c[3] * even, c[2] / (c[3] * c[3] * c[3]) * slope
+
+
+@inline
+def contact_margin(c, height, rise, room, mode):
     """How far the mode is from its end, in m, or the unclipped N by k + c."""
     if mode == ABOVE:
         return height
     if mode == BESIDE:
         return -height
-    margin = min(-height, along, c[10] - along)
+    margin = min(-height, room)
     if c[1] == 0.0:
         return margin
     unclipped = -(c[0] * height + c[1] * rise) / (c[0] + c[1])
@@ -79,21 +105,21 @@ def contact_margin(c, along, height, rise, mode):
 
 
 @inline
-def contact_margin_slopes(c, along, height, rise, mode):
-    """Slopes of the margin by along, height and rise."""
+def contact_margin_slopes(c, height, rise, room, mode):
+    """Slopes of the margin by height, rise and room."""
     if mode == ABOVE:
-        return 0.0, 1.0, 0.0
+        return 1.0, 0.0, 0.0
     if mode == BESIDE:
-        return 0.0, -1.0, 0.0
-    margin = min(-height, along, c[10] - along)
+        return -1.0, 0.0, 0.0
+    margin = min(-height, room)
     if c[1] > 0.0:
         sign = -1.0 if mode == CLOSED else 1.0
         total = c[0] + c[1]
         if sign * (c[0] * height + c[1] * rise) / total < margin:
-            return 0.0, sign * c[0] / total, sign * c[1] / total
-    if -height <= along and -height <= c[10] - along:
-        return 0.0, -1.0, 0.0
-    return (1.0 if along <= c[10] - along else -1.0), 0.0, 0.0
+            return sign * c[0] / total, sign * c[1] / total, 0.0
+    if -height <= room:
+        return -1.0, 0.0, 0.0
+    return 0.0, 0.0, 1.0
 
 
 @inline
@@ -103,16 +129,17 @@ def _touching(c, depth, rise):
 
 
 @inline
-def contact_next(c, along, height, rise, second, mode):
+def contact_next(c, height, rise, second, room, mode):
     """The mode that follows where this one's margin is negative.
 
     c (CONTACT,): parameters of the contact.
-    along, height (m): where the point is seen from the edge.
+    height (m): of the point above the edge.
     rise (m/s): rate of the height.
     second (m/s^2): rate of rise.
+    room (m): how far it is within the ends.
     mode: the present one.
     """
-    on_edge = along >= 0.0 and along <= c[10]
+    on_edge = room >= 0.0
     if mode == BESIDE:
         return ABOVE
     if mode == ABOVE:
@@ -133,11 +160,11 @@ def contact_next(c, along, height, rise, second, mode):
 
 
 @inline
-def contact_start(c, along, height, rise, second):
+def contact_start(c, height, rise, second, room):
     """The mode at the start; what is inside the edge then is in contact, what rests at it has reached it."""
     if height > NEAR:
         return ABOVE
-    if along < 0.0 or along > c[10]:
+    if room < 0.0:
         return ABOVE if height >= 0.0 else BESIDE
     if height >= -NEAR:
         ahead = rise if rise != 0.0 else second

@@ -12,6 +12,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.general.contact import add_contacts
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.mechanics.contact import CLOSED
+from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 from mdstopo.status import Status
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text
 
@@ -262,7 +263,10 @@ def test_with_settling_a_block_begins_at_its_depth():
 
 @numba.njit
 def _add(ints, floats, member_state, q, v, tangent, f, k, c):
-    add_contacts(unpack_general(ints, floats), member_state, q, v, tangent, f, k, c)
+    model = unpack_general(ints, floats)
+    rel = np.empty((model.pair.shape[0], pose_size(model)))
+    relative_pose(model, q, v, rel)
+    add_contacts(model, member_state, rel, q, v, tangent, f, k, c)
 
 
 def test_tangents_are_the_slopes_of_the_forces():

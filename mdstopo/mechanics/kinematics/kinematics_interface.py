@@ -871,33 +871,75 @@ def add_bushings(model, rel, q, tangent, sums):
     raise NotImplementedError
 
 
-def contact_rows(model, j, q, v, rows, rates):
-    """Where the point of a contact is as seen from the edge, with slopes.
+def contact_directions(model):
+    """In how many directions a contact pushes: those in which its point slides, and the normal."""
+    raise NotImplementedError
+
+
+def contact_seen(model, j, r):
+    """Where the point of a contact is as seen from the edge or surface.
+
+    model: the compiled scene. j: the contact. r (POSE,): relative pose of its pair.
+
+    Returns its height above it (m) with the rate (m/s), the room to its nearest end (m; infinite where there is none)
+    with the rate (m/s), and which end that is.
+    """
+    raise NotImplementedError
+
+
+def contact_second_rise(model, j, r, acc):
+    """Second derivative of the height of contact j by time (m/s^2); r (POSE,): its pose; acc (D,): xi''."""
+    raise NotImplementedError
+
+
+def contact_distance(model, j, r):
+    """How far the point of contact j is from what its surface bends around (m), infinite where that is flat."""
+    raise NotImplementedError
+
+
+def contact_ends(model, j, q, v, rows, rate):
+    """Height of the point of a contact, and its room to the nearest end (m), with slopes.
 
     In:
       model: the compiled scene.
       j: the contact.
       q (n_q,), v (n,): coordinates and velocities.
     Out:
-      rows (2, 2 D): slopes of along and of height by the freedoms of both bodies.
-      rates (2, 2 D): their derivatives by time.
-
-    Returns along, height (m).
+      rows (2, 2 D): slopes of room and of height by the freedoms of both bodies.
+      rate (2 D,): d(rows[1] v)/dq.
     """
     raise NotImplementedError
 
 
-def add_contact_curvature(model, j, q, rows, n, t, k):
-    """Add what the directions of a contact's forces change by with both bodies: N H_n + T H_t, H second derivatives.
+def contact_drag(model, j, q, v, rows):
+    """How the point of a contact slides, in the directions in which it is pushed.
 
     In:
       model: the compiled scene.
       j: the contact.
-      q (n_q,): coordinates.
-      rows (2, 2 D): of `contact_rows`.
-      n, t: normal force and friction (N).
+      q (n_q,), v (n,): coordinates and velocities.
     Out:
-      k (2 D, 2 D): the stiffness of its pair, added to.
+      rows (directions, 2 D): slopes of its place by the freedoms of both bodies: along what it slides, in space across
+        that, too, and last along the normal.
+
+    Returns the height (m), its rate (m/s), and the sliding velocity as the edge's or surface's body sees it (m/s): three
+    numbers, of which a plane uses the first.
+    """
+    raise NotImplementedError
+
+
+def add_contact(model, j, r, q, v, tangent, f, k, d):
+    """Add the normal force and the friction of a closed contact, and on demand their tangents.
+
+    In:
+      model: the compiled scene.
+      j: the contact.
+      r (POSE,): relative pose of its pair.
+      q (n_q,), v (n,): coordinates and velocities.
+      tangent: whether k and d are wanted.
+    Out, added to:
+      f (n,): forces and moments (N, N m).
+      k, d (2 D, 2 D): -dF/dq and -dF/dv of its pair.
     """
     raise NotImplementedError
 

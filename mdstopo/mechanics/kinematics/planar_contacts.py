@@ -4,14 +4,60 @@ Along and height are functions of the six coordinates of both bodies, h_u(q) = (
 the edge's first end and u its direction or normal. Their second derivatives have the angles' terms only.
 """
 
-from mdstopo.compiler.jit import kernel
+import numpy as np
+
+from mdstopo.compiler.jit import kernel, part
+from mdstopo.mechanics.contact import CLOSED, LENGTH, contact_force, contact_pose, second_rise
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
 from mdstopo.scene.model import HOME_X, HOME_Y
 
 
+#: directions in which a contact pushes: along the edge, and normal to it
+DIRECTIONS = 2
+
+
+@part
+def contact_directions(model):
+    """Along the edge, and normal to it."""
+    return DIRECTIONS
+
+
+@part
+def contact_seen(model, j, r):
+    """Height, rise, room and its rate, and the nearer end; see `kinematics_interface.contact_seen`."""
+    c = model.contact[j]
+    along, height, slide, rise = contact_pose(c, r)
+    if along <= c[LENGTH] - along:
+        return height, rise, along, slide, 0
+    return height, rise, c[LENGTH] - along, -slide, 1
+
+
+@part
+def contact_second_rise(model, j, r, acc):
+    """See `mechanics.contact.second_rise`."""
+    return second_rise(model.contact[j], r, acc)
+
+
+@part
+def contact_distance(model, j, r):
+    """An edge is straight."""
+    return np.inf
+
+
 @kernel
 def contact_rows(model, j, q, v, rows, rates):
-    """Where a contact's point is as seen from the edge; see `kinematics_interface.contact_rows`."""
+    """Where a contact's point is as seen from the edge, with slopes.
+
+    In:
+      model: the compiled scene.
+      j: the contact.
+      q (n_q,), v (n,): coordinates and velocities.
+    Out:
+      rows (2, 2 D): slopes of along and of height by the freedoms of both bodies.
+      rates (2, 2 D): their derivatives by time.
+
+    Returns along, height (m).
+    """
     p = model.contact_pair[j]
     c = model.contact[j]
     one = model.pair[p, 0]
@@ -53,9 +99,58 @@ def contact_rows(model, j, q, v, rows, rates):
     return along, height
 
 
+@part
+def _place(model, p, r):
+    """The place of entry r (0 to 2 D - 1) of pair p among the freedoms of all bodies."""
+    return 3 * model.pair[p, r // 3] + r % 3
+
+
+@part
+def _rate_of(model, p, row, v):
+    """row (2 D,) of pair p times velocities v (n,)."""
+    total = 0.0
+    for r in range(6):
+        total += row[r] * v[_place(model, p, r)]
+    return total
+
+
 @kernel
-def add_contact_curvature(model, j, q, rows, n, t, k):
-    """What the directions of a contact's forces change by; see `kinematics_interface.add_contact_curvature`."""
+def contact_ends(model, j, q, v, rows, rate):
+    """Height and room with their slopes; see `kinematics_interface.contact_ends`."""
+    c = model.contact[j]
+    rates = np.empty((2, 6))
+    along, height = contact_rows(model, j, q, v, rows, rates)
+    for r in range(6):
+        rate[r] = rates[1, r]
+    if along <= c[LENGTH] - along:
+        return height, along
+    for r in range(6):
+        rows[0, r] = -rows[0, r]
+    return height, c[LENGTH] - along
+
+
+@kernel
+def contact_drag(model, j, q, v, rows):
+    """Height, rise and slide with their rows; see `kinematics_interface.contact_drag`."""
+    p = model.contact_pair[j]
+    rates = np.empty((2, 6))
+    _, height = contact_rows(model, j, q, v, rows, rates)
+    return height, _rate_of(model, p, rows[1], v), (_rate_of(model, p, rows[0], v), 0.0, 0.0)
+
+
+@kernel
+def _add_curvature(model, j, q, rows, n, t, k):
+    """Add what the directions of a contact's forces change by with both bodies: N H_n + T H_t, H second derivatives.
+
+    In:
+      model: the compiled scene.
+      j: the contact.
+      q (n_q,): coordinates.
+      rows (2, 2 D): of `contact_rows`.
+      n, t: normal force and friction (N).
+    Out:
+      k (2 D, 2 D): the stiffness of its pair, added to.
+    """
     p = model.contact_pair[j]
     c = model.contact[j]
     one = model.pair[p, 0]
@@ -83,3 +178,33 @@ def add_contact_curvature(model, j, q, rows, n, t, k):
     k[0, 2] -= uy
     k[2, 1] += ux
     k[1, 2] += ux
+
+
+@kernel
+def add_contact(model, j, r, q, v, tangent, f, k, d):
+    """The force of a closed contact; see `kinematics_interface.add_contact`.
+
+    With rows B_u = dh_u/dq and their rates,
+
+        F = N B_n^T + T B_t^T,   dF = B_n^T dN + B_t^T dT + (N H_n + T H_t) dq,   H_u = d2h_u/dq2
+    """
+    rows = np.empty((2, 6))
+    rates = np.empty((2, 6))
+    p = model.contact_pair[j]
+    _, height = contact_rows(model, j, q, v, rows, rates)
+    slide = _rate_of(model, p, rows[0], v)
+    rise = _rate_of(model, p, rows[1], v)
+    n, n_h, n_r, t, t_h, t_r, t_s = contact_force(model.contact[j], height, rise, slide, CLOSED)
+    for i in range(6):
+        f[_place(model, p, i)] += n * rows[1, i] + t * rows[0, i]
+    if not tangent:
+        return
+    for s in range(6):
+        by_q_n = n_h * rows[1, s] + n_r * rates[1, s]
+        by_q_t = t_h * rows[1, s] + t_r * rates[1, s] + t_s * rates[0, s]
+        by_v_n = n_r * rows[1, s]
+        by_v_t = t_r * rows[1, s] + t_s * rows[0, s]
+        for i in range(6):
+            k[i, s] -= rows[1, i] * by_q_n + rows[0, i] * by_q_t
+            d[i, s] -= rows[1, i] * by_v_n + rows[0, i] * by_v_t
+    _add_curvature(model, j, q, rows, n, t, k)

@@ -4,7 +4,7 @@ Coordinates of a body are by how much its centre of mass has moved since home, a
 since home; velocities are that of the centre of mass, in global axes, and the turning rate in the body's principal
 axes, so that inertia is a diagonal. The parts stand beside: `vectors` and `rotations`, `spatial_poses`,
 `spatial_forces`, `spatial_scales`, `spatial_steps`, `spatial_drives`, `spatial_members`, `spatial_lines`,
-`spatial_joints`, `spatial_points`.
+`spatial_joints`, `spatial_contacts`, `spatial_points`.
 """
 
 from typing import Any, cast
@@ -16,6 +16,7 @@ from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.kernel import Kernel
 from mdstopo.mechanics.kinematics import (
     spatial_bushings,
+    spatial_contacts,
     spatial_drives,
     spatial_forces,
     spatial_joints,
@@ -89,17 +90,6 @@ def relative_pose(model, q, v, rel):
         spatial_poses.fill_pose(model, p, one, two, q, v, rel[p])
 
 
-@part
-def contact_rows(model, j, q, v, rows, rates):
-    """Not called: a case in space has no contacts yet; see `kinematics_interface.contact_rows`."""
-    return 0.0, 0.0
-
-
-@part
-def add_contact_curvature(model, j, q, rows, n, t, k):
-    """Not called, as `contact_rows`; see `kinematics_interface.add_contact_curvature`."""
-
-
 _KERNELS = (
     coordinates, freedoms, rotations, load_slopes, attitude, most_rows, pose_size, joint_places,
     spatial_steps.retract, spatial_steps.difference, spatial_steps.retract_vjp, spatial_steps.retract_jvp,
@@ -127,7 +117,8 @@ _KERNELS = (
     spatial_joints.place_joint, spatial_joints.place_joint_alone, spatial_joints.joint_rows,
     spatial_joints.joint_gamma, spatial_joints.joint_velocity_slope, spatial_joints.joint_acceleration_slopes,
     spatial_joints.joint_stiffness, spatial_joints.joint_is_point, spatial_joints.point_joint_vjp,
-    spatial_bushings.add_bushings, contact_rows, add_contact_curvature,
+    spatial_bushings.add_bushings, spatial_contacts.contact_directions, spatial_contacts.contact_seen, spatial_contacts.contact_second_rise,
+    spatial_contacts.contact_distance, spatial_contacts.contact_ends, spatial_contacts.contact_drag, spatial_contacts.add_contact,
     spatial_reactions.transmitted, spatial_points.point_motion, spatial_points.turn_motion, spatial_points.tilt_motion,
 )  # fmt: skip
 
