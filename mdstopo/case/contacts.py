@@ -1,4 +1,4 @@
-"""Contacts of the points of one body with an edge of another."""
+"""Contacts of the points of one body with an edge of another, in space with a surface."""
 
 from __future__ import annotations
 
@@ -7,13 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import Contact, PointGrid
+from mdstopo.case.model import AnyContact, Contact, PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames, in_range
 from mdstopo.case.words import inside, shown
 
 
-def build_contacts(entries: Any, points: dict[str, PointGrid], frames: Frames, reading: Reading) -> tuple[Contact, ...]:
+def build_contacts(
+    entries: Any, points: dict[str, PointGrid], frames: Frames, reading: Reading
+) -> tuple[AnyContact, ...]:
     """The contacts that can be made."""
     built = []
     named: dict[str, int] = {}
@@ -34,32 +36,30 @@ def build_contacts(entries: Any, points: dict[str, PointGrid], frames: Frames, r
 
 def _build(
     index: int, fields: Fields, points: dict[str, PointGrid], frames: Frames, reading: Reading
-) -> Contact | None:
-    edge, grid = fields["on"], points.get(fields["points"]) if isinstance(fields["points"], str) else None
-    if edge is BAD or grid is None or not fields.good() or edge["body"] not in frames.bodies:
+) -> AnyContact | None:
+    on, grid = fields["on"], points.get(fields["points"]) if isinstance(fields["points"], str) else None
+    if on is BAD or grid is None or not fields.good() or on["body"] not in frames.bodies:
         return None
-    path = inside(fields.path, "on")
-    if edge["body"] == grid.body:
+    if on["body"] == grid.body:
+        path = inside(fields.path, "on")
         reading.mistake(path, f"the points are on {shown(grid.body)} as well; a contact needs two bodies")
         return None
+    common = {key: fields[key] for key in ("stiffness", "damping", "friction", "slip")}
+    common |= {"name": fields["name"] or str(index), "index": index, "body": grid.body, "points": grid.local}
+    return frames.geometry.build_contact(common, on, frames, reading)
+
+
+def edge_contact(common: dict[str, Any], edge: Fields, frames: Frames, reading: Reading) -> Contact | None:
+    """The contact of points with an edge, None where there is no such edge, which is noted.
+
+    common: what contacts with anything have, as fields of `Contact`.
+    """
     first, first_world = frames.point(edge["body"], edge["from"], edge["frame"])
     second, second_world = frames.point(edge["body"], edge["to"], edge["frame"])
-    if not in_range(np.array([first, second, first_world, second_world]), path, reading):
+    if not in_range(np.array([first, second, first_world, second_world]), edge.path, reading):
         return None
     length = math.hypot(second[0] - first[0], second[1] - first[1])
     if not length > 0.0:
-        reading.mistake(path, "both ends of the edge coincide; an edge needs a length")
+        reading.mistake(edge.path, "both ends of the edge coincide; an edge needs a length")
         return None
-    return Contact(
-        name=fields["name"] or str(index),
-        index=index,
-        body=grid.body,
-        points=grid.local,
-        edge_body=edge["body"],
-        edge_from=first,
-        edge_to=second,
-        stiffness=fields["stiffness"],
-        damping=fields["damping"],
-        friction=fields["friction"],
-        slip=fields["slip"],
-    )
+    return Contact(**common, edge_body=edge["body"], edge_from=first, edge_to=second)

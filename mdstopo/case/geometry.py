@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from mdstopo.case.arrays import Components, FloatArray
 from mdstopo.case.nodes import SCALAR, Node
-from mdstopo.case.parts import AnyBody, Load
+from mdstopo.case.parts import AnyBody, AnyContact, Load
 from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.words import listed
 
@@ -31,7 +31,8 @@ class Geometry(NamedTuple):
     build_body (name, keys, path, prescribed angle or None, reading): the body, None where it cannot be made.
     least: the smallest of a body's mass and moments of inertia, in kg and kg m^2.
     grid_count, grid_points (kind, keys), check_grid (kind, keys, reading): of point grids. build_load (keys, body, its
-    point in body coordinates or BAD, reading): the load, None where it cannot be made.
+    point in body coordinates or BAD, reading): the load, None where it cannot be made. build_contact (fields that all
+    contacts have, keys of what is touched, `Frames`, reading): the contact, None where it cannot be made.
     joints, responses: by their words. default_at (first, second body): where a fixed joint is that does not say it.
     """
 
@@ -47,6 +48,7 @@ class Geometry(NamedTuple):
     grid_points: Callable[[str, Any], FloatArray]
     check_grid: Callable[[str, Any, Reading], bool]
     build_load: Callable[[Fields, AnyBody, Components, Reading], Load | None]
+    build_contact: Callable[[dict[str, Any], Fields, Any, Reading], AnyContact | None]
     joints: Mapping[str, type[Joint]]
     responses: Mapping[str, ResponseKind]
     default_at: Callable[[AnyBody, AnyBody], Components]

@@ -54,6 +54,7 @@ from mdstopo.case.laws import (
 from mdstopo.case.marks import Marks
 from mdstopo.case.parts import (
     AnyBody,
+    AnyContact,
     Body,
     Bushing,
     Contact,
@@ -65,6 +66,8 @@ from mdstopo.case.parts import (
     Prescribed,
     PrescribedRotation,
     SpatialBody,
+    Surface,
+    SurfaceContact,
 )
 from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
@@ -76,6 +79,7 @@ __all__ = [
     "LAWS",
     "ActuatorLaw",
     "AnyBody",
+    "AnyContact",
     "Body",
     "Bushing",
     "Case",
@@ -115,6 +119,8 @@ __all__ = [
     "SpatialBody",
     "SpatialJoint",
     "SpringLaw",
+    "Surface",
+    "SurfaceContact",
     "Table",
     "TableLaw",
     "Triple",
@@ -133,7 +139,8 @@ class Case(Value):
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
     the user should know. uncertainty: None where all is certain; the other fields are the nominal case. shared: groups
     whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws that are
-    varied. dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`, joints `SpatialJoint`.
+    varied. dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`, joints `SpatialJoint` and contacts
+    `SurfaceContact`.
     """
 
     title: str
@@ -160,7 +167,7 @@ class Case(Value):
     shared: tuple[str, ...] = ()
     mirrored: tuple[tuple[str, ...], ...] = ()
     variables: tuple[Variable, ...] = ()
-    contacts: tuple[Contact, ...] = ()
+    contacts: tuple[AnyContact, ...] = ()
     dimension: int = 2
 
     @property

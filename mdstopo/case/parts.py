@@ -232,6 +232,52 @@ class Contact(Value):
 
 
 @frozen
+class Surface(Value):
+    """A surface of a body in space, in coordinates of that body.
+
+    shape: plane | rectangle | sphere | cylinder. place: a point of a plane, the centre of a rectangle or a sphere, one
+    end of a cylinder's axis. axes (3, 3): unit vectors by rows; the last is the normal, to the free side, of planes and
+    rectangles and the axis of cylinders, the first two are along the sides of rectangles. sizes (m): half of both sides
+    of rectangles, radius of spheres, radius and length of cylinders, else 0. hollow: points are free inside.
+    """
+
+    shape: str
+    place: Triple
+    axes: FloatArray
+    sizes: Pair
+    hollow: bool = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axes", read_only(self.axes))
+
+
+@frozen(kw_only=True)
+class SurfaceContact(Value):
+    """Points of one body against a surface of another, in space: as `Contact`, with points (n, 3).
+
+    edge_body: the body that has the surface.
+    """
+
+    name: str
+    index: int
+    body: str
+    points: FloatArray
+    edge_body: str
+    surface: Surface
+    stiffness: float
+    damping: float
+    friction: float
+    slip: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", read_only(self.points))
+
+
+#: a `Contact`, in space a `SurfaceContact`
+AnyContact: TypeAlias = Any
+
+
+@frozen
 class Bushing(Value):
     """An elastic joint: forces along the first body's axes and a couple.
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.contacts import edge_contact
 from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.loading import largest, scaled
@@ -100,6 +101,7 @@ PLANE = Geometry(
     grid_points=grid_points,
     check_grid=lambda kind, grid, reading: True,
     build_load=_build_load,
+    build_contact=edge_contact,
     joints=JOINTS,
     responses=RESPONSES,
     default_at=_default_at,

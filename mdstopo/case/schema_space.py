@@ -14,6 +14,7 @@ from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.responses import key_of
 from mdstopo.case.schema_case import CONSTRAINT, FORMAT, OBJECTIVE, SOLVER
+from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_scene import (
     BODY,
     BUSHING,
@@ -29,6 +30,7 @@ from mdstopo.case.schema_scene import (
     MOTIONS,
     POINTS,
 )
+from mdstopo.case.schema_surface import SURFACE
 from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 
 ZERO = (0.0, 0.0, 0.0)
@@ -347,6 +349,13 @@ SPATIAL_SOLVER = with_keys(
     SOLVER,
     replace(_INTEGRATOR, kind=NotYetAs(_INTEGRATOR.kind, ("gauss",))),
 )
+
+# Contacts.
+_ON = Key("on", SURFACE, "the surface of another body that they touch", required=True)
+_CONTACT = replace(
+    with_keys(CONTACT, _ON),
+    doc="Points of one body against a surface of another, with friction: one-sided, no design variable.",
+)
 SPACE_FORMAT = with_keys(
     FORMAT,
     Key("gravity", TRIPLE, "acceleration of free fall, [x, y, z]", default=ZERO, unit="m/s^2"),
@@ -355,7 +364,7 @@ SPACE_FORMAT = with_keys(
     with_kind(FORMAT, "bushings", ListOf(BUSHING_KEYS, what="bushings")),
     _MOTIONS,
     with_kind(FORMAT, "points", Named(POINTS_KEYS, "point grid")),
-    with_kind(FORMAT, "contacts", NotYet("contacts")),
+    Key("contacts", ListOf(_CONTACT, what="contacts"), "points of one body against a surface of another", default=()),
     with_kind(FORMAT, "members", Named(GROUP, "member group")),
     _LOADS,
     with_kind(FORMAT, "load_cases", Named(_CASE, "load case")),

@@ -19,6 +19,7 @@ from mdstopo.case.signals import combined
 from mdstopo.case.spatial_grids import check_grid, grid_count, grid_points
 from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 from mdstopo.case.start_geometry import in_range
+from mdstopo.case.surfaces import surface_contact
 from mdstopo.case.words import inside, listed, number_text
 
 UNIT = 1e-6
@@ -181,6 +182,7 @@ SPACE = Geometry(
     grid_points=grid_points,
     check_grid=check_grid,
     build_load=_build_load,
+    build_contact=surface_contact,
     joints=SPATIAL_JOINTS,
     responses=SPATIAL_RESPONSES,
     default_at=_default_at,

@@ -114,15 +114,20 @@ def _say_joints(output: Output, case: "Case") -> None:
 
 
 def _say_contacts(output: Output, case: "Case") -> None:
-    """Which side of an edge is free is easily drawn the wrong way round: so how deep points are in it is told."""
+    """Which side of an edge is free is easily drawn the wrong way round: so it is told how deep points are in it."""
     if not case.contacts:
         return
+    from mdstopo.case.model import SurfaceContact
     from mdstopo.cli.check_numbers import depths
 
-    rows = [["contact", "points of", "on the edge of", "points", "in it at the start, m"]]
+    on_what = "on the edge of" if case.dimension == 2 else "on"
+    rows = [["contact", "points of", on_what, "points", "in it at the start, m"]]
     for contact, own in zip(case.contacts, depths(case), strict=True):
         inside = f"{int((own > 0.0).sum())}, up to {number(float(own.max()))}" if (own > 0.0).any() else "none"
-        rows.append([contact.name, contact.body, contact.edge_body, str(len(own)), inside])
+        on = contact.edge_body
+        if isinstance(contact, SurfaceContact):
+            on = f"the {contact.surface.shape} of {on}{', inside' if contact.surface.hollow else ''}"
+        rows.append([contact.name, contact.body, on, str(len(own)), inside])
     output.say(f"{len(case.contacts)} contacts")
     output.table(rows)
 

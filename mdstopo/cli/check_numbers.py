@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo.case.columns import point_columns
-from mdstopo.case.model import GROUND, Case, SpringLaw, Table, VolumeRow
+from mdstopo.case.model import GROUND, Case, Contact, SpringLaw, SurfaceContact, Table, VolumeRow
 from mdstopo.cli.output import number
+from mdstopo.scene.bodies import placed
 
 Floats = NDArray[np.float64]
 
@@ -138,22 +139,38 @@ def _at(signal: float | Table, time: float) -> float:
 
 def depths(case: Case) -> list[Floats]:
     """(n,) of each contact: how deep its points are in it at the start, m; below 0 in front of it, -inf beside it."""
-    found = []
-    for contact in case.contacts:
-        points = _global(case, contact.body, contact.points)
-        first, second = _global(case, contact.edge_body, np.array([contact.edge_from, contact.edge_to]))
-        along = (second - first) / np.hypot(*(second - first))
-        off = points - first
-        beside = (off @ along < 0.0) | (off @ along > np.hypot(*(second - first)))
-        # the left of the way from the first end to the second is free
-        found.append(np.where(beside, -np.inf, along[1] * off[:, 0] - along[0] * off[:, 1]))
-    return found
+    return [_surface_depths(case, each) if case.dimension > 2 else _edge_depths(case, each) for each in case.contacts]
+
+
+def _edge_depths(case: Case, contact: Contact) -> Floats:
+    points = _global(case, contact.body, contact.points)
+    first, second = _global(case, contact.edge_body, np.array([contact.edge_from, contact.edge_to]))
+    along = (second - first) / np.hypot(*(second - first))
+    off = points - first
+    beside = (off @ along < 0.0) | (off @ along > np.hypot(*(second - first)))
+    # the left of the way from the first end to the second is free
+    return np.where(beside, -np.inf, along[1] * off[:, 0] - along[0] * off[:, 1])
+
+
+def _surface_depths(case: Case, contact: SurfaceContact) -> Floats:
+    surface, name = contact.surface, contact.edge_body
+    points = _global(case, contact.body, contact.points)
+    if name != GROUND:
+        body = case.body(name)
+        points = (points - np.array(body.position)) @ body.rotation
+    off = (points - np.array(surface.place)) @ surface.axes.T
+    beside = np.zeros(len(off), dtype=bool)
+    if surface.shape in ("plane", "rectangle"):
+        if surface.shape == "rectangle":
+            beside = (np.abs(off[:, :2]) > np.array(surface.sizes)).any(axis=1)
+        return np.where(beside, -np.inf, -off[:, 2])
+    if surface.shape == "cylinder":
+        beside = (off[:, 2] < 0.0) | (off[:, 2] > surface.sizes[1])
+        off = off[:, :2]
+    inward = surface.sizes[0] - np.linalg.norm(off, axis=1)
+    return np.where(beside, -np.inf, -inward if surface.hollow else inward)
 
 
 def _global(case: Case, name: str, points: Floats) -> Floats:
-    """Points (n, 2) of a body at the start."""
-    if name == GROUND:
-        return points
-    body = case.body(name)
-    c, s = np.cos(body.angle), np.sin(body.angle)
-    return np.asarray(points @ np.array([[c, s], [-s, c]]) + np.array(body.position))
+    """Points (n, d) of a body at the start."""
+    return points if name == GROUND else placed(case.body(name), points)

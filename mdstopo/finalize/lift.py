@@ -82,7 +82,7 @@ class _Lift:
             "bodies": self.each(self.body),
             "joints": self.each(self.joint),
             "bushings": self.each(self.bushing),
-            "contacts": self.not_yet("contacts"),
+            "contacts": self.each(self.contact),
             "uncertainty": self.not_yet("uncertain values"),
             "motions": self.each(self.motion),
             "points": self.each(self.points),
@@ -261,6 +261,19 @@ class _Lift:
             if isinstance(old[end], Mapping):
                 new[end] = {**old[end], "at": self.vector(old[end]["at"], _frame(old[end]))}
         return new
+
+    def contact(self, old: Plain, path: str) -> Plain:
+        """An edge becomes a rectangle that is as wide as long; the free side is on the left of the edge."""
+        del path
+        on = old["on"]
+        frame, ends = _frame(on), [np.array(on[end], dtype=np.float64) for end in ("from", "to")]
+        rectangle = {
+            "center": self.vector((0.5 * (ends[0] + ends[1])).tolist(), frame),
+            "axes": [self.vector((ends[1] - ends[0]).tolist(), frame), self.normal(-1, frame)],
+            "size": [float(np.hypot(*(ends[1] - ends[0])))] * 2,
+        }
+        rest = {key: value for key, value in on.items() if key not in ("from", "to")}
+        return {**old, "on": {**rest, "rectangle": rectangle}}
 
     def load(self, old: Plain, path: str) -> Plain:
         """Forces stay in the plane, couples are along its normal."""

@@ -97,7 +97,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     members = _members(case, dimension, frames, moved, index, pairs, times)
     bushing_pair, bushing = dimension.bushings(case, index, pairs, home)
     joint, joint_par = _joints(case, dimension, frames, index, pairs, home)
-    contact_pair, contact, contact_words = dimension.contacts(case, index, pairs)
+    contact_pair, contact, contact_words = dimension.contacts(case, index, pairs, frames)
     held = {body for pair in pairs for body in pair}
     for i in range(len(names) - 1):
         if i not in held:

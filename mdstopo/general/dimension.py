@@ -40,10 +40,11 @@ class Dimension:
     masses (body): mass of each freedom. velocities (body, row of home): those of its freedoms at the start.
     stated (home): (n,) where each freedom is at home, from which stated positions are measured; 0 of turns.
     places (home, body, points): global places (K, d) at home of points (K, d) of a body, in the axes of arrays.
-    loads (load_case, index, times, frames): as arrays. bushings, contacts (case, index, pairs, home): as arrays; of
-    contacts words, too. half_turn (pairs, home, q): the first of the states q (T, n_q) at which a bushing, of those
-    between bodies (n_bushing, 2), has turned by half a turn and may not, and the bushing; None where none has.
-    reaches (contact): (n_contact,) how far the point of each contact is from its body's centre.
+    loads (load_case, index, times, frames): as arrays. bushings (case, index, pairs, home): as arrays.
+    half_turn (pairs, home, q): the first of the states q (T, n_q) at which a bushing, of those between bodies
+    (n_bushing, 2), has turned by half a turn and may not, and the bushing; None where none has. contacts (case, index,
+    pairs, frames): as arrays, and in words. reaches (contact): (n_contact,) how far the point of each contact is from
+    its body's centre.
     joint_code, joint_kernels (class): of a joint. has_norm (class): whether its force has several components, and is
     not a number along a line. joint_row (joint, home, first, second, frames): its parameters.
     response_row (response, frames): its numbers.
@@ -63,7 +64,7 @@ class Dimension:
     loads: Callable[[LoadCase, dict[str, int], FloatArray, Frames], Loads]
     bushings: Callable[[Case, dict[str, int], Pairs, FloatArray], tuple[IndexArray, FloatArray]]
     half_turn: Callable[[IndexArray, FloatArray, FloatArray], tuple[int, int] | None]
-    contacts: Callable[[Case, dict[str, int], Pairs], tuple[IndexArray, FloatArray, tuple[str, ...]]]
+    contacts: Callable[[Case, dict[str, int], Pairs, Frames], tuple[IndexArray, FloatArray, tuple[str, ...]]]
     reaches: Callable[[FloatArray], FloatArray]
     joint_code: Callable[[type[Joint]], int]
     joint_kernels: Callable[[type[Joint]], JointRecord]

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import Case, Joint, LoadCase, Response
-from mdstopo.general.contact_compile import contact_rows
+from mdstopo.general.contact_compile import edge_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs
 from mdstopo.mechanics.contact import PX, PY
 from mdstopo.mechanics.joints import table as joints
@@ -88,7 +88,7 @@ PLANE = Dimension(
     loads=_loads,
     bushings=_bushings,
     half_turn=lambda pairs, home, q: None,
-    contacts=contact_rows,
+    contacts=edge_rows,
     reaches=_reaches,
     joint_code=joints.code_of,
     joint_kernels=joints.kernels_of,

@@ -10,12 +10,13 @@ import numpy as np
 
 from mdstopo.case.model import GROUND, Case, Joint, Load, LoadCase, Response, Signal
 from mdstopo.compiler.kernel import Kernel
+from mdstopo.general.contact_compile import surface_rows
 from mdstopo.general.dimension import Dimension, Frames, Pairs, in_frame
-from mdstopo.mechanics.contact import CONTACT
 from mdstopo.mechanics.joints.kernels import FITTED
 from mdstopo.mechanics.kinematics import spatial_bushings
 from mdstopo.mechanics.kinematics.spatial import SPATIAL
 from mdstopo.mechanics.kinematics.spatial_bushings import WIDTH as BUSHING
+from mdstopo.mechanics.kinematics.spatial_contacts import POINT, SHAPE
 from mdstopo.mechanics.kinematics.spatial_forces import ACCELERATES, FOLLOWS, GLOBAL
 from mdstopo.mechanics.kinematics.spatial_half_turns import half_turn
 from mdstopo.mechanics.kinematics.spatial_joints import (
@@ -183,9 +184,8 @@ def _apart(home: FloatArray, pair: tuple[int, int], points: tuple[FloatArray, Fl
     return np.where(np.abs(apart) > FITTED * size, apart, 0.0)
 
 
-def _no_contacts(case: Case, index: dict[str, int], pairs: Pairs) -> tuple[IndexArray, FloatArray, tuple[str, ...]]:
-    del case, index, pairs
-    return np.zeros(0, dtype=np.int64), np.zeros((0, CONTACT)), ()
+def _reaches(contact: FloatArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(contact[:, POINT:SHAPE], axis=1))
 
 
 class JointRows(NamedTuple):
@@ -245,8 +245,8 @@ SPACE = Dimension(
     loads=_loads,
     bushings=_bushings,
     half_turn=half_turn,
-    contacts=_no_contacts,
-    reaches=lambda contact: np.zeros(len(contact)),
+    contacts=surface_rows,
+    reaches=_reaches,
     joint_code=lambda kind: JOINTS[kind.type],
     joint_kernels=_joint_kernels,
     has_norm=lambda kind: True,

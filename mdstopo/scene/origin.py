@@ -18,6 +18,7 @@ import numpy as np
 
 from mdstopo.case.model import (
     GROUND,
+    AnyContact,
     Body,
     Bushing,
     Case,
@@ -29,6 +30,7 @@ from mdstopo.case.model import (
     Objective,
     Prescribed,
     ResponseRow,
+    SurfaceContact,
     Table,
 )
 from mdstopo.scene.bodies import distances, placed
@@ -89,9 +91,22 @@ def _places(case: Case) -> Iterator[FloatArray]:
                 yield np.array([at])
     for contact in case.contacts:
         if contact.edge_body == GROUND:
-            yield np.array([contact.edge_from, contact.edge_to])
+            yield _ends(contact)
         if contact.body == GROUND:
             yield contact.points
+
+
+def _ends(contact: AnyContact) -> FloatArray:
+    """Points (any, d) that tell where an edge or a surface is, and how far it goes."""
+    if isinstance(contact, Contact):
+        return np.array([contact.edge_from, contact.edge_to])
+    surface, place = contact.surface, np.array(contact.surface.place)
+    axes = surface.axes * np.array([*surface.sizes, 0.0])[:, None]  # of a rectangle
+    if surface.shape in ("plane", "rectangle"):
+        return np.array([place + one * axes[0] + two * axes[1] for one in (-1, 1) for two in (-1, 1)])
+    radius, length = surface.sizes  # a sphere has no length
+    ends = np.array([place, place + length * surface.axes[2]])
+    return np.concatenate([ends - radius, ends + radius])
 
 
 def seen_from(case: Case, origin: Point) -> Case:
@@ -149,8 +164,11 @@ def _group(group: MemberGroup, stands: dict[str, Body], origin: Point) -> Member
     return replace(group, **ends, length=distances(d))
 
 
-def _contact(contact: Contact, origin: Point) -> Contact:
-    if contact.edge_body == GROUND:
+def _contact(contact: AnyContact, origin: Point) -> AnyContact:
+    if contact.edge_body == GROUND and isinstance(contact, SurfaceContact):
+        surface = replace(contact.surface, place=_from(contact.surface.place, origin))
+        contact = replace(contact, surface=surface)
+    elif contact.edge_body == GROUND:
         edge_from, edge_to = _from(contact.edge_from, origin), _from(contact.edge_to, origin)
         contact = replace(contact, edge_from=edge_from, edge_to=edge_to)
     if contact.body == GROUND:

@@ -174,8 +174,7 @@ def test_a_moving_point_rises_as_its_second_rate_says() -> None:
 
 @pytest.mark.usefixtures("in_python")
 def test_rooms_of_rectangles_and_cylinders_end_at_their_ends() -> None:
-    model, q, v, _ = with_contact(RECTANGLE, 1)
-    c = model.contact[0]
+    c = with_contact(RECTANGLE, 1)[0].contact[0]
     for number, (x, y) in enumerate(((0.9, 0.1), (-0.9, 0.1), (0.1, 0.65), (0.1, -0.65))):
         z = c[ORIGIN : ORIGIN + 3] + x * c[FIRST_AXIS : FIRST_AXIS + 3] + y * c[SECOND_AXIS : SECOND_AXIS + 3]
         _, _, _, room, inward, end = _surface(c, z)

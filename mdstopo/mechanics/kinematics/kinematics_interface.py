@@ -922,8 +922,8 @@ def contact_drag(model, j, q, v, rows):
       rows (directions, 2 D): slopes of its place by the freedoms of both bodies: along what it slides, in space across
         that, too, and last along the normal.
 
-    Returns the height (m), its rate (m/s), and the sliding velocity as the edge's or surface's body sees it (m/s): three
-    numbers, of which a plane uses the first.
+    Returns the height (m), its rate (m/s), and the sliding velocity as the edge's or surface's body sees it (m/s):
+    three numbers, of which a plane uses the first.
     """
     raise NotImplementedError
 

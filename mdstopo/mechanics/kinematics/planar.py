@@ -409,8 +409,8 @@ _KERNELS = (
     place_joint, place_joint_alone, joint_rows, joint_gamma, joint_velocity_slope, joint_acceleration_slopes,
     joint_stiffness, joint_is_point, point_joint_vjp, transmitted, planar_bushings.add_bushings,
     planar_contacts.contact_directions, planar_contacts.contact_seen, planar_contacts.contact_second_rise,
-    planar_contacts.contact_distance, planar_contacts.contact_ends, planar_contacts.contact_drag, planar_contacts.add_contact,
-    planar_points.point_motion,
+    planar_contacts.contact_distance, planar_contacts.contact_ends, planar_contacts.contact_drag,
+    planar_contacts.add_contact, planar_points.point_motion,
     planar_points.angle_motion,
 )  # fmt: skip
 

@@ -11,7 +11,6 @@ from mdstopo.mechanics.contact import CLOSED, LENGTH, contact_force, contact_pos
 from mdstopo.mechanics.kinematics.planar_poses import turned_body
 from mdstopo.scene.model import HOME_X, HOME_Y
 
-
 #: directions in which a contact pushes: along the edge, and normal to it
 DIRECTIONS = 2
 

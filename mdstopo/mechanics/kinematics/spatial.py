@@ -117,8 +117,9 @@ _KERNELS = (
     spatial_joints.place_joint, spatial_joints.place_joint_alone, spatial_joints.joint_rows,
     spatial_joints.joint_gamma, spatial_joints.joint_velocity_slope, spatial_joints.joint_acceleration_slopes,
     spatial_joints.joint_stiffness, spatial_joints.joint_is_point, spatial_joints.point_joint_vjp,
-    spatial_bushings.add_bushings, spatial_contacts.contact_directions, spatial_contacts.contact_seen, spatial_contacts.contact_second_rise,
-    spatial_contacts.contact_distance, spatial_contacts.contact_ends, spatial_contacts.contact_drag, spatial_contacts.add_contact,
+    spatial_bushings.add_bushings, spatial_contacts.contact_directions, spatial_contacts.contact_seen,
+    spatial_contacts.contact_second_rise, spatial_contacts.contact_distance, spatial_contacts.contact_ends,
+    spatial_contacts.contact_drag, spatial_contacts.add_contact,
     spatial_reactions.transmitted, spatial_points.point_motion, spatial_points.turn_motion, spatial_points.tilt_motion,
 )  # fmt: skip
 

@@ -3,16 +3,19 @@
 As the first body sees it, in its axes, the point is at z = d + S c and moves at u = d' + w x S c. A surface gives the
 height h(z), its slope n (|n| = 1), and by H = d2h/dz2 how n turns; room(z) is how far z is within the nearest end. With
 
-    rise = n . u,   s = u - rise n,   f = N n - N e(|s|) s,   N = -k h - c rise                     (`mechanics.contact`)
+    rise = n . u,   s = u - rise n,   f = N n - N e(|s|) s,   N = -k h - c rise            (`mechanics.contact`)
 
 the force on the point is f, of which the freedoms feel B^T f, B = dz/dq. Its change is B^T df + d(B^T f)/dq at fixed f:
 
-    dn = H dz,   d(rise) = n . du + u . dn,   ds = du - d(rise) n - rise dn,   df = dN n + N dn - dN e s - N (de s + e ds)
+    dn = H dz,   d(rise) = n . du + u . dn,   ds = du - d(rise) n - rise dn
+    df = dN n + N dn - dN e s - N (de s + e ds)
     dz = R_A^T (dx_B - dx_A) + z x dtheta_A + S (dtheta_B x c)
-    du = (d' + omega_A x d) x dtheta_A + dz x omega_A + dphi x S (omega_B x c)        (at given velocities; dphi: `spatial_poses`)
+    du = (d' + omega_A x d) x dtheta_A + dz x omega_A + dphi x S (omega_B x c)
 
-A surface bends around a centre or an axis at the distance 1 / |curve|: H a = curve (a without its parts along n and the
-axis). It is outside of a sphere or cylinder, or inside, where `side` is -1.
+at given velocities, dphi as of `spatial_poses`.
+
+A surface bends around a centre or an axis at the distance 1 / |curve|: H a = curve (a without its parts along n and
+the axis). It is outside of a sphere or cylinder, or inside, where `side` is -1.
 """
 
 import numpy as np
@@ -48,9 +51,9 @@ from mdstopo.mechanics.kinematics.vectors import (
     vector_at,
 )
 
-#: columns of `GeneralModel.contact` behind k, c, mu and slip (`mechanics.contact`), in the axes of the bodies: the point;
-#: the shape; where it is (a point of a plane, centres, one end of an axis); the rectangle's two axes, and the normal or
-#: the axis; the rectangle's half sides, or radius and length; the side
+#: columns of `GeneralModel.contact` behind k, c, mu and slip (`mechanics.contact`), in the axes of the bodies: the
+#: point; the shape; where it is (a point of a plane, centres, one end of an axis); the rectangle's two axes, and the
+#: normal or the axis; the rectangle's half sides, or radius and length; the side
 POINT, SHAPE, ORIGIN, FIRST_AXIS, SECOND_AXIS, NORMAL, SIZES, SIDE = 4, 7, 8, 11, 14, 17, 20, 22
 WIDTH = 23
 #: the shapes
@@ -63,7 +66,7 @@ NO_DISTANCE = 1e-15
 NOTHING = (0.0, 0.0, 0.0)
 
 
-# Surfaces: each gives the height of a point z, the normal, how it bends (see above), the room with its slope, and the end
+# Surfaces: each gives the height of a point z, the normal, how it bends (above), the room with its slope, and the end
 
 
 @part
