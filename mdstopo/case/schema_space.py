@@ -9,7 +9,7 @@ from mdstopo.case.joints.spatial import SPATIAL_JOINTS
 from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, explained
 from mdstopo.case.mesh_files import MeshFile
-from mdstopo.case.not_yet import NotYet, NotYetAs
+from mdstopo.case.not_yet import NotYetAs
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.responses import key_of
