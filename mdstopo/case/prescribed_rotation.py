@@ -79,7 +79,7 @@ def turning_rate_at_start(fields: Fields, body: Fields, window: Window, reading:
         if start is None:
             return None
         if "angular_velocity" in body.stated:
-            _agree(start[0], k, start[1], body, path, reading)
+            agree(start[0], body["angular_velocity"][k], start[1], _words(body, k), path, reading)
         found_rates.append(start[0])
     return tuple(found_rates)
 
@@ -104,8 +104,9 @@ def _compare(rates: FloatArray, scale: float, body: Fields, path: str, reading: 
     """Note the components (3,) that the body states otherwise."""
     if "angular_velocity" in body.stated:
         for k in range(3):
-            _agree(float(rates[k]), k, max(scale, float(np.abs(rates).max())), body, path, reading)
+            size = max(scale, float(np.abs(rates).max()))
+            agree(float(rates[k]), body["angular_velocity"][k], size, _words(body, k), path, reading)
 
 
-def _agree(rate: float, k: int, scale: float, body: Fields, path: str, reading: Reading) -> None:
-    agree(rate, body["angular_velocity"][k], scale, f"{body.path}.angular_velocity's {'xyz'[k]}", path, reading)
+def _words(body: Fields, k: int) -> str:
+    return f"{body.path}.angular_velocity's {'xyz'[k]}"

@@ -126,10 +126,11 @@ def test_what_reorders_letters_is_shown_as_it_is_written() -> None:
 
 
 def test_the_page_takes_nothing_in_the_data_for_a_place_of_its_own() -> None:
-    text = page({"title": "{style}{script}", "case": "{data}</script><!--<script>"})
+    text = page({"title": "{style}{script}", "dimension": 2, "case": "{data}</script><!--<script>"})
     start = text.index('type="application/json">') + len('type="application/json">')
     assert json.loads(text[start : text.index("</script>", start)]) == {
         "title": "{style}{script}",
+        "dimension": 2,
         "case": "{data}</script><!--<script>",
     }
     assert "<title>{style}{script}</title>" in text

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from mdstopo.case.reader import read_case
-from mdstopo.general.accelerations import factor_matrix, joint_state, make_workspace, solve_unknowns
+from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace, solve_unknowns
 from mdstopo.general.compile import compile_general
 from mdstopo.general.joint_matrix import decompose, substitute, weakest
 from mdstopo.general.model import pack_general, unpack_general
@@ -58,9 +58,8 @@ def _solve(ints, floats, q, transposed, a, lam, jac, factors):
     workspace = make_workspace(model)
     turn_bodies(model, q, workspace.turned)
     joint_state(model, q, np.zeros_like(q), workspace)
-    singular = factor_matrix(
-        model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, transposed
-    )
+    w = workspace
+    singular = factor_matrix(model, w, w.k, w.c, w.turn, w.mass, 0.0, 0.0, w.tangents[NO_SHIFT], transposed)
     jac[:] = workspace.jac
     factors[:] = workspace.switches
     if singular < 0:

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 
-from mdstopo.general.accelerations import factor_matrix, joint_state, make_workspace
+from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, make_workspace
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.projection import swept
 from mdstopo.mechanics.kinematics.planar import turn_bodies
@@ -17,7 +17,8 @@ def _swept(ints, floats, h, x, y, jac):
     workspace = make_workspace(model)
     turn_bodies(model, model.q0, workspace.turned)
     joint_state(model, model.q0, np.zeros_like(model.q0), workspace)
-    factor_matrix(model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, 0.0, 0.0, True)
+    w = workspace
+    factor_matrix(model, w, w.k, w.c, w.turn, w.mass, 0.0, 0.0, w.tangents[NO_SHIFT], True)
     jac[:] = workspace.jac
     return swept(model, workspace, h, x, y)
 

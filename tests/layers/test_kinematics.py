@@ -45,7 +45,7 @@ NO_STRIDES = {
     ("step_history.py", "range(3)"): "names of columns",
 }
 #: modules that say what is planar, or spatial, when a case is compiled
-OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py"}
+OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py", "turning_drives.py"}
 #: modules that take something of the plane itself, and what
 OF_THE_PLANE = {
     "generalized_alpha.py": {"planar_poses"},  # copy_rows, which copies any rows

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import mdstopo
 from tests.general.support import slopes
@@ -25,8 +24,3 @@ def test_gradients_through_all_laws_and_events_are_slopes() -> None:
         assert size > 0.0, name
         assert abs(differences[name] - gradient @ direction) < 3e-8 * np.abs(gradient * direction).max(), name
         assert np.abs(direct.gradients[name] - gradient).max() < 1e-9 * size, name
-
-
-def test_a_method_that_is_not_in_space_is_refused_by_name() -> None:
-    with pytest.raises(ValueError, match="iterative method is not in space"):
-        mdstopo.evaluate(load("laws"), method="iterative")

@@ -208,7 +208,13 @@ def slope_by_shift(model, slopes, m, r, i, tangents, body):
 
 
 def turn_slope_by_shift(model, slopes, d, r, tangents, body):
-    """`slope_by_shift` of slopes (., T or more) by the turn of one body: by component r of its turn, in row d."""
+    """As `slope_by_shift`, by the turn of one body only.
+
+    model: the compiled scene.
+    slopes (., T or more), d: an array, and its row, with slopes by the turn.
+    r: the component of the turn.
+    tangents (n_body, SHIFT), body: as of `shift_tangents`, and the body.
+    """
     raise NotImplementedError
 
 

@@ -115,7 +115,7 @@ def shift_tangents(model, q, moved, out):
 
 @part
 def slope_by_shift(model, slopes, m, r, i, tangents, body):
-    """See `kinematics_interface.slope_by_shift`."""
+    """By a component of a turn, all three slopes times J(t); see `kinematics_interface.slope_by_shift`."""
     k = i % FREEDOMS - 3
     if k < 0:
         return slopes[m, r, i]
@@ -129,7 +129,7 @@ def slope_by_shift(model, slopes, m, r, i, tangents, body):
 
 @part
 def turn_slope_by_shift(model, slopes, d, r, tangents, body):
-    """See `kinematics_interface.turn_slope_by_shift`."""
+    """The three slopes by the turn times J(t); see `kinematics_interface.turn_slope_by_shift`."""
     return (
         slopes[d, 0] * tangents[body, r] + slopes[d, 1] * tangents[body, 3 + r] + slopes[d, 2] * tangents[body, 6 + r]
     )
