@@ -10,6 +10,7 @@ from mdstopo.plots.scenery import Floats, ends_at, hull, points_of
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import COLOURS, WIDTH
+from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.views import View, views
 from mdstopo.scene.points import points_at
 
@@ -22,7 +23,7 @@ MARGIN, LEAST = 0.07, 0.55
 ARROW = 0.17
 #: how many times larger than the design a scene may be before what is far off is left out of the view
 FAR = 2.0
-_JOINT = "#222222"
+_JOINT, _CONTACT = "#222222", "#8A8A8A"
 _AXES = ("#B22222", "#2E7D32", "#1F4FA3")
 
 
@@ -87,6 +88,9 @@ def _arrange(sizes: list[float], count: int) -> tuple[_Places, tuple[float, floa
 def _cloud(case: Case, states: list[Floats], solids: dict[str, Solid]) -> Floats:
     """(n, 3) places between which everything is that is drawn, without what lies far outside of the design."""
     own = {name: np.concatenate([points_of(case, name), shape.corners]) for name, shape in solids.items()}
+    for each in surfaces_of(case):
+        if not each.endless:
+            own[each.body] = np.concatenate([own[each.body], *each.lines])
     every = np.concatenate([points_at(case, name, own[name], np.array(states)).reshape(-1, 3) for name in own])
     designed = [ends_at(case, group, q).reshape(-1, 3) for q in states for group in case.design_groups]
     if case.design_groups:
@@ -97,8 +101,13 @@ def _cloud(case: Case, states: list[Floats], solids: dict[str, Solid]) -> Floats
 
 
 def _scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[str, Solid]) -> None:
-    """Bodies, members between their nearer and their farther edges, joints."""
+    """Surfaces, bodies, members between their nearer and their farther edges, joints."""
     case, state = source.case, q[None]
+    for number, surface in enumerate(surfaces_of(case)):
+        for k, line in enumerate(surface.lines):
+            label = "contact" if number == k == 0 else None
+            flat = view.seen(points_at(case, surface.body, line, state)[0])
+            axis.plot(*flat.T, "-", color=_CONTACT, linewidth=0.5, alpha=0.8, zorder=1.4, label=label)
     for k, (name, shape) in enumerate(solids.items()):
         colour = "#555555" if name == GROUND else COLOURS[(k + 2) % len(COLOURS)]
         if len(shape.corners):

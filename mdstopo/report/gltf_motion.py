@@ -12,6 +12,7 @@ from mdstopo.plots.scenery import Floats, ends_at, points_of, sizes, start_state
 from mdstopo.plots.solids import Solid, convex, solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import COLOURS
+from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.views import upright
 from mdstopo.report.gltf_file import INDICES, LINES, POINTS, TRIANGLES, VERTICES, GltfFile
 from mdstopo.scene.quaternions import product, quaternions_of
@@ -27,7 +28,7 @@ THICK, THIN, JOINT = 0.006, 0.001, 0.012
 #: sides of a member's tube
 SIDES = 8
 _UP = np.array([0.0, 1.0, 0.0])
-_NEUTRAL = "#555555"
+_NEUTRAL, _CONTACT = "#555555", "#8A8A8A"
 
 
 class Poses(NamedTuple):
@@ -59,6 +60,7 @@ class _Scene:
         cloud += [self.first.place[0], *(shape.corners for shape in shapes.values())]
         self.size = max(float(np.linalg.norm(np.ptp(np.concatenate(cloud), axis=0))), 1e-9)
         self.shapes = shapes
+        self.touched = surfaces_of(self.case) if self.case.dimension > 2 else []
         #: by node: where it is in every load case, to be animated
         self.moving: dict[int, dict[str, dict[str, Floats]]] = {}
 
@@ -76,7 +78,7 @@ class _Scene:
     def _body(self, number: int, name: str) -> int:
         entry: dict[str, Any] = {"name": name}
         colour = _NEUTRAL if name == GROUND else COLOURS[(number + 2) % len(COLOURS)]
-        primitives = list(self._primitives(self.shapes[name], self._points(name), colour))
+        primitives = [*self._primitives(self.shapes[name], self._points(name), colour), *self._surfaces(name)]
         if primitives:
             entry["mesh"] = self.out.add("meshes", name=name, primitives=primitives)
         if name != GROUND:
@@ -91,6 +93,14 @@ class _Scene:
                 for case, poses in self.motions.items()
             }
         return node
+
+    def _surfaces(self, name: str) -> Iterator[dict[str, Any]]:
+        """Lines of the surfaces of a body that points may touch."""
+        lines = [line for each in self.touched if each.body == name for line in each.lines]
+        if lines:
+            ends = np.concatenate([np.stack([line[:-1], line[1:]], axis=1).reshape(-1, 3) for line in lines])
+            place = self.out.numbers(ends, VERTICES, bounds=True)
+            yield {"attributes": {"POSITION": place}, "mode": LINES, "material": self._material(_CONTACT, 1.0)}
 
     def _points(self, name: str) -> Floats:
         pieces = [grid.local for grid in self.case.points.values() if grid.body == name]

@@ -13,6 +13,7 @@ from mdstopo.limiting.compare import compared
 from mdstopo.plots.scenery import outline, points_of, sizes, start_state
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
+from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.views import upright
 from mdstopo.plots.watch import response_history
 from mdstopo.scene.points import point_rates, points_at
@@ -56,7 +57,7 @@ def content(source: Source) -> dict[str, Any]:
         "designs": _designs(source),
     }  # fmt: skip
     if case.dimension > 2:
-        page |= {"upright": upright(case).tolist(), "joints": _joints(case)}
+        page |= {"upright": upright(case).tolist(), "joints": _joints(case), "surfaces": _surfaces(case)}
     iterations = view.under("iterations")
     if "combined" in iterations:
         page["iterations"] = {
@@ -112,6 +113,15 @@ def _shape(case: Case, body: str) -> dict[str, Any]:
         return {"outline": _rounded(outline(case, body))}
     shape = solid(case, body)
     return {"corners": _rounded(shape.corners), "faces": shape.faces, "edges": shape.edges}
+
+
+def _surfaces(case: Case) -> list[dict[str, Any]]:
+    """Lines of the surfaces that points may touch."""
+    index = {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
+    return [
+        {"body": index[each.body], "lines": [_rounded(line) for line in each.lines], "endless": each.endless}
+        for each in surfaces_of(case)
+    ]
 
 
 def _joints(case: Case) -> list[dict[str, Any]]:

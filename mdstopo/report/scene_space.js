@@ -4,7 +4,7 @@
 // fit: choose the window; draw: bodies at q, members (rows) in colour(row, k). What is farther is drawn first.
 const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
   const g = canvas.getContext("2d"), [right, away, up] = data.upright;
-  const DISTANCE = 4, GRID = "#c9c9c9", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // distance of the eye in radii
+  const DISTANCE = 4, GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // distance of the eye in radii
   const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
   const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
   let low = [0, 0, 0], high = [0, 0, 0], middle = [0, 0, 0], radius = 1, scale = 1, across, along, toward;
@@ -52,6 +52,7 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
         if (f && index === data.start.length / 7) return;
         for (const p of body.corners.concat(body.points)) cloud.push(place(all[index], p));
       });
+      for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) cloud.push(place(all[surface.body], p));
     });
     const reach = (pick, k) => cloud.reduce((a, p) => pick(a, p[k]), cloud.length ? cloud[0][k] : 0);
     low = [0, 1, 2].map((k) => reach(Math.min, k));
@@ -118,6 +119,10 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
       for (const p of body.points) { const s = seen(place(seat, p)); things.push([s[2], () => { g.globalAlpha = 1; g.fillStyle = own; g.fillRect(s[0] - 1.5, s[1] - 1.5, 3, 3); }]); }
       if (!fixed) names.push([body.name, seen(seat[3]), own]);
     });
+    for (const surface of data.surfaces) for (const corners of surface.lines) {
+      const flat = corners.map((p) => seen(place(all[surface.body], p)));
+      for (let k = 1; k < flat.length; k++) things.push([(flat[k - 1][2] + flat[k][2]) / 2, () => line(flat[k - 1], flat[k], CONTACT, 0.8, 0.8)]);
+    }
     rows.forEach((row, k) => {
       const a = seen(place(all[row[1]], row.slice(3, 6))), b = seen(place(all[row[2]], row.slice(6, 9))), near = (a[2] + b[2]) / 2;
       const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler

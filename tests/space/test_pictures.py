@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from mdstopo.case.reader import read_case
 from mdstopo.plots.scenery import ends_at, start_state
 from mdstopo.plots.solids import convex, equal_box, solid
+from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.views import upright, views
 from mdstopo.report import report_content
 from mdstopo.report.gltf_motion import motion_file
@@ -39,6 +40,15 @@ joints:
 points:
   corners: {body: hull, frame: body, grid: {box: {from: [-0.5, -0.4, -0.25], to: [0.5, 0.4, 0.25], count: [3, 2, 2]}}}
   posts: {body: ground, grid: {plane: {corner: [-1.5, -1.2, 0], edges: [[3, 0, 0], [0, 2.4, 0]], count: [2, 2]}}}
+contacts:
+  - {points: corners, on: {body: ground, plane: {at: [0, 0, 0.2], normal: [0, 0.1, 1]}}, stiffness: 1e4}
+  - {points: corners, on: {body: ball, sphere: {center: [1, 0, 1], radius: 0.1}}, stiffness: 1e4}
+  - points: posts
+    on: {body: hull, frame: body, rectangle: {center: [0, 0, 0.3], axes: [[1, 0, 0], [0, 1, 0]], size: [1, 0.8]}}
+    stiffness: 1e4
+  - points: posts
+    on: {body: hull, frame: body, cylinder: {from: [0, 0, 0], to: [1, 0, 0], radius: 0.3, hollow: true}}
+    stiffness: 1e4
 members:
   lashings: {from: corners, to: posts, law: {type: spring, stiffness: 800}}
 objectives:
@@ -114,6 +124,21 @@ def test_a_body_without_points_is_the_box_of_its_inertia():
     assert _volume(shape) == pytest.approx(a * b * c)
     assert np.abs(shape.corners @ turn) == pytest.approx(np.tile([0.5 * a, 0.5 * b, 0.5 * c], (8, 1)))
     assert len(equal_box(1.0, np.diag([0.0, 1.0, 1.0])).corners) == 2  # a rod
+
+
+def test_lines_of_surfaces_lie_on_them():
+    case = read_case(CASE)
+    found = surfaces_of(case)
+    assert [each.body for each in found] == ["ground", "ball", "hull", "hull"]
+    assert [each.endless for each in found] == [True, False, False, False]
+    plane, sphere, rectangle, cylinder = (np.concatenate(each.lines) for each in found)
+    assert (plane - [0.0, 0.0, 0.2]) @ [0.0, 0.1, 1.0] == pytest.approx(np.zeros(len(plane)), abs=1e-12)
+    assert np.ptp(plane[:, 0]) > 2.0  # as large as the scene
+    assert np.linalg.norm(sphere, axis=1) == pytest.approx(np.full(len(sphere), 0.1))
+    assert rectangle[:, 2] == pytest.approx(np.full(len(rectangle), 0.3))
+    assert np.abs(rectangle).max(axis=0) == pytest.approx([0.5, 0.4, 0.3])
+    assert np.linalg.norm(cylinder[:, 1:], axis=1) == pytest.approx(np.full(len(cylinder), 0.3))
+    assert (cylinder[:, 0].min(), cylinder[:, 0].max()) == pytest.approx((0.0, 1.0))
 
 
 def _volume(shape):
