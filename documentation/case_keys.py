@@ -14,7 +14,7 @@ from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
 
 #: sections of a case in space that have a table on its page
-IN_SPACE = ("bodies", "joints", "motions", "points", "loads", "objectives")
+IN_SPACE = ("bodies", "joints", "motions", "points", "contacts", "loads", "objectives")
 #: where the page tells of tables of time and of rows from files
 ROWS = "rows"
 #: mappings that many keys share, told once

@@ -301,7 +301,6 @@ def test_a_spatial_key_in_the_plane_names_the_planar_one(old: str, new: str, mes
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("joints: []", "contacts: [{points: p, on: {}}]", "contacts: contacts are not in space yet"),
         (
             "joints: []",
             "solver: {integrator: gauss}",

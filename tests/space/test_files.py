@@ -14,7 +14,7 @@ import pytest
 
 from mdstopo.cli.group import run_group
 
-from .support import CASES
+from .support import CASES, load
 
 LOOP = """
 format: 1
@@ -96,4 +96,4 @@ def test_results_in_space_have_pictures_and_a_page(said: Say, tmp_path: Path) ->
     said("report", result)
     assert (tmp_path / "springs-layout.png").read_bytes()[:4] == b"\x89PNG"
     assert (tmp_path / "springs-histories.png").read_bytes()[:4] == b"\x89PNG"
-    assert "springs.yaml" in (tmp_path / "springs.html").read_text(encoding="utf-8")
+    assert load("springs").title in (tmp_path / "springs.html").read_text(encoding="utf-8")
