@@ -20,6 +20,7 @@ SECTIONS = {
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
     "space": "objective and exact gradient of one scene in the plane and in space",
+    "lifts": "every planar case of the project beside itself in space: values and gradients",
     "rows": "cost of many competing peaks and members, whose gradients are pulled back in one sweep",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
@@ -42,7 +43,7 @@ PEERS = ("peers", "ring", "forward", "million")
 CAMPAIGNS = ("damage", "hunt")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts", "golden")
+NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts", "golden", "lifts")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {

@@ -35,8 +35,8 @@ def command(
     The scene lies in the plane z = 0, or with --tilt in any other. Bodies have their moment of inertia about all axes,
     pins turn about the normal. An angle becomes the component z of the rotation, which is the planar angle up to half a
     turn; seen from ground in a tilted plane it becomes the norm, and only `over_time: max_abs` or `rms` of it can be
-    told. Prescribed angles, uncertain values and what the solver cannot do in space yet are refused
-    by name.
+    told. Uncertain numbers that are no single ones in space, and what the solver cannot do there yet, are
+    refused by name.
     \f
     Arguments, which --help leaves out:
 

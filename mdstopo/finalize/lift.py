@@ -16,12 +16,12 @@ from mdstopo.case.arrays import FloatArray, Signal, Table
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.number_rows import Signals
-from mdstopo.case.overrides import node_of
+from mdstopo.case.overrides import node_of, steps_of
 from mdstopo.case.reading import Reading
 from mdstopo.case.responses import RESPONSES
 from mdstopo.case.rotations import about_axis
 from mdstopo.case.signals import combined
-from mdstopo.case.words import inside
+from mdstopo.case.words import inside, shown
 from mdstopo.finalize.document import Plain, content_of
 from mdstopo.finalize.text import text_of
 
@@ -65,6 +65,8 @@ class _Lift:
         for key, value in old.items():
             if key != "dimension" and value is not None:
                 new[key] = self.sections().get(key, _as_it_is)(value, key)
+        if new.get("uncertainty"):
+            new["uncertainty"] = self.uncertainty(new["uncertainty"], content_of(self.case), new)
         self.tell()
         return new
 
@@ -83,7 +85,6 @@ class _Lift:
             "joints": self.each(self.joint),
             "bushings": self.each(self.bushing),
             "contacts": self.each(self.contact),
-            "uncertainty": self.not_yet("uncertain values"),
             "motions": self.each(self.motion),
             "points": self.each(self.points),
             "members": self.each(self.group),
@@ -97,16 +98,6 @@ class _Lift:
     def refuse(self, path: str, words: str) -> None:
         """Note what cannot be lifted."""
         self.refused.append((path, words))
-
-    def not_yet(self, what: str) -> Callable[[Any, str], Any]:
-        """A section that may only be empty."""
-
-        def refuse(value: Any, path: str) -> Any:
-            if value:
-                self.refuse(path, f"{what} are not in space yet")
-            return value
-
-        return refuse
 
     @staticmethod
     def each(lift: Callable[[Any, str], Any]) -> Callable[[Any, str], Any]:
@@ -331,6 +322,45 @@ class _Lift:
         angles = {body.name: body.angle for body in self.case.bodies} | {GROUND: 0.0}
         return float(angles[keys["body"]] - angles[keys.get("relative_to", GROUND)])
 
+    def uncertainty(self, section: Plain, old: Plain, new: Plain) -> Plain:
+        """The same numbers are uncertain, where they stand in space; one that is several numbers there is refused."""
+
+        def moved(numbers: Plain, path: str) -> Plain:
+            return {self.number(key, value, old, new, path): value for key, value in numbers.items()}
+
+        lifted_section = dict(section)
+        if section.get("parameters"):
+            lifted_section["parameters"] = moved(section["parameters"], "uncertainty.parameters")
+        if section.get("scenarios"):
+            lifted_section["scenarios"] = {
+                name: {**scenario, "set": moved(scenario["set"], f"uncertainty.scenarios.{name}.set")}
+                if scenario.get("set")
+                else scenario
+                for name, scenario in section["scenarios"].items()
+            }
+        return lifted_section
+
+    def number(self, key: str, value: Any, old: Plain, new: Plain, path: str) -> str:
+        """The key path in space of a number of the planar case; value: what it varies by, or becomes."""
+        steps = steps_of(key)
+        planar, spatial = _at(old, steps), _at(new, steps)
+        if isinstance(planar, bool) or not isinstance(planar, int | float) or isinstance(value, list):
+            self.refuse(path, f"{shown(key)} is no number of the case")
+        elif spatial == planar and (isinstance(steps[-1], str) or self.same_row(old, new, steps)):
+            return key
+        elif spatial == [0, 0, planar] and not self.is_tilted:
+            return f"{key}[2]"
+        elif steps[-1] == "inertia" and spatial == [planar] * 3:
+            return f"{key}[2]"  # the others do nothing: all turns are about the body's z
+        else:
+            self.refuse(path, f"{shown(key)} is no single number in space")
+        return key
+
+    def same_row(self, old: Plain, new: Plain, steps: list[str | int]) -> bool:
+        """Whether the list that a number stands in is the same, or a vector that has got a zero off the plane."""
+        before, behind = _at(old, steps[:-1]), _at(new, steps[:-1])
+        return bool(before == behind or (not self.is_tilted and behind == [*before, 0]))
+
     def solver(self, old: Plain, path: str) -> Plain:
         """What is not in space yet."""
         if old.get("integrator") == "gauss":
@@ -344,6 +374,18 @@ def read_signals(value: Any, names: tuple[str, ...]) -> tuple[Signal, ...]:
     read: tuple[Signal, ...] = Signals(names).read(node_of(value, ""), "", reading)
     assert not reading.mistakes
     return read
+
+
+def _at(content: Any, steps: list[str | int]) -> Any:
+    """What stands at a key path, None where there is nothing."""
+    for step in steps:
+        if isinstance(step, str) and isinstance(content, Mapping):
+            content = content.get(step)
+        elif isinstance(step, int) and isinstance(content, list) and 0 <= step < len(content):
+            content = content[step]
+        else:
+            return None
+    return content
 
 
 def _as_it_is(value: Any, path: str) -> Any:

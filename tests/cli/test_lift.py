@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import mdstopo
 from mdstopo.case.arrays import Table
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
@@ -168,6 +169,50 @@ def test_what_cannot_be_lifted_is_refused_at_its_place(old: str, new: str, messa
     with pytest.raises(CaseError) as refused:
         lifted(read_case(PLANAR.replace(old, new, 1), path="x.yaml"))
     assert message in str(refused.value)
+
+
+#: of the planar scene of Figure 6, with the mass, a moment of inertia, a component and a turning load uncertain
+UNCERTAIN = """
+format: 1
+time: {end: 0.2}
+bodies:
+  a: {mass: 60, inertia: 10, position: [0, 0]}
+  b: {mass: 200, inertia: 60, position: [0, -1], angle: 0.1}
+members: {s: {from: {body: a, at: [0, 0]}, to: {body: b, at: [0, -0.5]}, law: {type: spring, stiffness: 500}}}
+loads:
+  - {body: b, acceleration: [9.8, 1], angular_acceleration: {table: [[0, 20], [0.2, 5]]}, frame: body}
+  - {body: a, moment: 3}
+uncertainty:
+  parameters: {NUMBER: {normal: {deviation: 0.1}}}
+  scenarios: {one: {probability: 0.5}, two: {probability: 0.5, set: {members.s.law.stiffness: 700}}}
+  sample: 4
+objectives: {G: {response: energy}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("number", "in_space"),
+    [
+        ("bodies.a.mass", "bodies.a.mass"),
+        ("bodies.a.inertia", "bodies.a.inertia[2]"),
+        ("loads[0].acceleration[1]", "loads[0].acceleration[1]"),
+        ("loads[1].moment", "loads[1].moment[2]"),
+        ("loads[0].angular_acceleration.table[1][1]", ""),
+        ("bodies.b.angle", ""),
+    ],
+)
+def test_uncertain_numbers_are_the_same_in_space(number: str, in_space: str) -> None:
+    planar = read_case(UNCERTAIN.replace("NUMBER", f'"{number}"'))
+    if not in_space:
+        with pytest.raises(CaseError, match="is no single number in space"):
+            lifted(planar)
+        return
+    spatial = read_case(lifted(planar))
+    assert planar.uncertainty is not None
+    assert spatial.uncertainty is not None
+    assert [each.key for each in spatial.uncertainty.numbers] == [in_space]
+    one, two = (mdstopo.evaluate(case, gradient=False) for case in (planar, spatial))
+    assert two.objectives["G"] == pytest.approx(one.objectives["G"], rel=1e-5)
 
 
 TABLE = "[[0, 0.5], [0.1, 0.9], [0.2, 0.4], [0.3, 0]]"
