@@ -225,6 +225,8 @@ class _Builder:
         mark = getattr(error, "problem_mark", None) or getattr(error, "context_mark", None)
         if mark is not None:
             problem = error.problem or error.context or "cannot be read"
+            if "nesting depth" in problem:  # newer parsers count, too, and look ahead
+                return YamlSyntaxError(self._mistake(mark, f"nested deeper than {DEEPEST} levels"))
             begun = getattr(error, "context_mark", None)
             context = ""
             if error.context and begun is not None:
