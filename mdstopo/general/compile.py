@@ -13,12 +13,13 @@ from mdstopo.general import responses as responses_of
 from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in_frame
 from mdstopo.general.drives import drives, drives_all, motion_times
 from mdstopo.general.layout import arrange
-from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, GeneralModel
+from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
 from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.bodies import distances, stands_as
+from mdstopo.scene.grids import row_of
 from mdstopo.scene.model import VECTOR, FloatArray, IndexArray
 from mdstopo.scene.origin import ends_of
 from mdstopo.scene.other_kernels import include_kernels
@@ -218,6 +219,7 @@ def _members(
             middle = 0.5 * (times[:-1] + times[1:])
             known = np.zeros((segments, 2)) if kernels.signal is None else segment_values(kernels.signal(record), times)
             parts = np.arange(len(group))[:, None] if each_member(case, group, place) else np.arange(len(group))[None]
+            row = row_of(group, elastic=len(parts) == 1)[1]
             for part in parts:
                 count = len(part)
                 padded = -(-count // VECTOR) * VECTOR
@@ -227,7 +229,7 @@ def _members(
                 member[MEMBER_FREE_LENGTH, :count] = free
                 member[MEMBER_EXCESS, :count] = (length[part] - free) * (length[part] + free)
                 variable = first + int(part[0]) if group.design else -1
-                blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0])])
+                blocks.append([pair, start, start + padded, code, variable, count, number, int(part[0]), row])
                 rows.append(laws.parameters(record, curves))
                 powers.append(group.power)
                 columns.append(member)
@@ -236,7 +238,7 @@ def _members(
                 start += padded
         first += len(group) if group.design else 0
     return {
-        "block": np.array(blocks, dtype=np.int64).reshape(-1, 8),
+        "block": np.array(blocks, dtype=np.int64).reshape(-1, ROW + 1),
         "law": np.array(rows, dtype=np.float64).reshape(-1, laws.PARAMETERS),
         "active": np.array(active, dtype=np.int64).reshape(-1, segments).T.copy(),
         "level": np.array(level, dtype=np.float64).reshape(-1, segments, 2).transpose(1, 0, 2).copy(),

@@ -5,7 +5,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SET, level_of, rate_of_row
-from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, INERTER, KIND, OFFSET, PAIR, START, SUBJECT
+from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, INERTER, KIND, OFFSET, PAIR, ROW, START, SUBJECT
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.step_history import has_factors
@@ -116,7 +116,7 @@ def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
         p = model.block[k, PAIR]
         lo = model.block[k, START]
         if code == SPRING and weight == 0.0 and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
-            spring_designs(model, model.law[k], lo, model.block[k, COUNT], rel, u, p, out)
+            spring_designs(model, model.law[k], lo, model.block[k, COUNT], model.block[k, ROW], rel, u, p, out)
             continue
         for j in range(count):
             if code != INERTER:

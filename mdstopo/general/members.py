@@ -7,7 +7,7 @@ which neither switch nor remember, are summed as vectors.
 """
 
 from mdstopo.compiler.jit import kernel, part
-from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, MEMBER_FREE_LENGTH, PAIR, START
+from mdstopo.general.model import CODE, COUNT, DESIGN, INERTER, MEMBER_FREE_LENGTH, PAIR, ROW, START
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_start
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -80,7 +80,8 @@ def general_sums(model, segment, t, member_state, rel, tangent, sums):
             count = model.block[k, COUNT]
             counted = model.block[k, DESIGN] >= 0
             if code == SPRING:
-                spring_sums(model, model.law[k], lo, count, counted, member_state, rel[p], tangent, sums[p])
+                row = model.block[k, ROW]
+                spring_sums(model, model.law[k], lo, count, row, counted, member_state, rel[p], tangent, sums[p])
             else:
                 level = level_of(model, segment, k, t)
                 member_sums(
@@ -124,7 +125,7 @@ def set_modes(model, member_state, rel, rel_rate, knots):
 def unscale_general(block, power, alpha, padded, out):
     """Derivatives by alpha from those by alpha^mu: times mu alpha^(mu - 1), summed over the laws of a member.
 
-    block (n_block, 8), power (n_block,): as in `GeneralModel`; alpha (N,): the design.
+    block (n_block, 9), power (n_block,): as in `GeneralModel`; alpha (N,): the design.
     padded (M_padded + P,): derivatives by alpha^mu of each member and law, then by the values of the laws' variables.
     out (N + P,): set to the derivatives by alpha, then, unchanged, those by the values.
     """

@@ -28,8 +28,9 @@ from mdstopo.scene.model import (
 )
 
 #: columns of `GeneralModel.block`; code -1 is an inerter. A block has all members of a group, or where each has a
-#: parameter of its own one of them, which is number OFFSET of the group
-PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET = range(8)
+#: parameter of its own one of them, which is number OFFSET of the group. Where every point of one grid is joined with
+#: every point of another, ROW members behind each other begin at one point; elsewhere ROW is 0
+PAIR, START, STOP, CODE, DESIGN, COUNT, GROUP, OFFSET, ROW = range(9)
 #: columns of `GeneralModel.joint`
 JOINT_CODE, JOINT_FIRST, JOINT_SECOND, JOINT_PAIR, JOINT_ROWS = range(5)
 #: columns of `GeneralModel.response`: what is looked at, body and reference, component, order in time, group or joint
@@ -58,9 +59,9 @@ class GeneralModel(NamedTuple):
     block: Annotated[
         IndexArray,
         Field(
-            "n_block, 8",
+            "n_block, 9",
             "pair, start, stop (padded), code of the law, first design variable, members, group, number of the first "
-            "member in it",
+            "member in it; of a grid: members of a row",
         ),
     ]
     law: Annotated[FloatArray, Field("n_block, 8", "the law's parameters (`mechanics.laws.table`)")]

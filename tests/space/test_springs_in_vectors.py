@@ -61,7 +61,7 @@ def together(
     p: np.ndarray, r: np.ndarray, counted: bool = True, tangent: bool = True, model: Any = MODEL
 ) -> np.ndarray:
     o = np.zeros(SUMS)
-    KERNELS.spring_sums(model, p, START, COUNT, counted, STATES, r, tangent, o)
+    KERNELS.spring_sums(model, p, START, COUNT, 0, counted, STATES, r, tangent, o)
     return o
 
 
@@ -129,7 +129,7 @@ def test_a_spring_without_length_adds_nothing() -> None:
     strengths = STATES.copy()
     strengths[0, START] = 0.0
     without = np.zeros(SUMS)
-    KERNELS.spring_sums(model, p, START, COUNT, True, strengths, r, True, without)
+    KERNELS.spring_sums(model, p, START, COUNT, 0, True, strengths, r, True, without)
     same(found, without, 1e-15)
 
 
@@ -140,7 +140,7 @@ def test_the_derivative_of_many_poses_is_the_sum_of_theirs() -> None:
     for s in range(5):
         KERNELS.relative_pose(MODEL, turned_by(s), V, rel[s])
     found, expected = np.zeros((2, WIDTH))
-    KERNELS.spring_designs(MODEL, p, START, COUNT, rel, u, 0, found)
+    KERNELS.spring_designs(MODEL, p, START, COUNT, 0, rel, u, 0, found)
     for s in range(5):
         KERNELS.member_designs(
             MODEL, SPRING, p, START, COUNT, 0.0, 0.0, STATES, STATES[1], rel[s, 0], u[s, 0], 0.0, expected

@@ -732,13 +732,14 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
     raise NotImplementedError
 
 
-def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
+def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, o):
     """`member_sums` of springs.
 
     In:
       model: the compiled scene.
       p (3 or more,): k, c, preload of the law.
       start, count: the first spring (padded), and how many there are.
+      row: of a grid, how many behind each other begin at one point (`general.model.ROW`); else 0.
       counted, member_state, r, tangent: as of `member_sums`.
     Out:
       o (SUMS,): added to.
@@ -761,11 +762,11 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
     raise NotImplementedError
 
 
-def spring_designs(model, p, lo, count, rel, u, pair, out):
+def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     """`member_designs` of springs without damping and preload, at S poses rel (S, n_pair, POSE) at once.
 
     model: the compiled scene.
-    p (1 or more,): stiffness (N/m) and what else the law has. lo, count: the springs. pair: theirs.
+    p (1 or more,): stiffness (N/m) and what else the law has. lo, count, row: the springs. pair: theirs.
     u (S, n_pair, D): virtual changes of the poses. out (M_padded or more,): added to.
     """
     raise NotImplementedError

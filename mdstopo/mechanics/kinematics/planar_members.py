@@ -190,7 +190,7 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
 
 
 @part
-def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
+def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, o):
     """Forces, energy and tangents of springs; see `kinematics_interface.spring_sums`."""
     member = model.member
     stop = start + whole_vectors(count)
@@ -234,7 +234,7 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
 
 
 @part
-def spring_designs(model, p, lo, count, rel, u, pair, out):
+def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     """`member_designs` of springs at many poses; see `kinematics_interface.spring_designs`."""
     width = model.member.shape[1]
     rows = model.member.reshape(model.member.size)

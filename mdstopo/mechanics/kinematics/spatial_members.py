@@ -17,6 +17,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.compiler.padding import whole_vectors
 from mdstopo.mechanics.kinematics.spatial_forces import C, K
+from mdstopo.mechanics.kinematics.spatial_grids import grid_designs, grid_sums
 from mdstopo.mechanics.kinematics.spatial_lines import (
     NO_LENGTH,
     add_line_stiffness,
@@ -206,17 +207,20 @@ def _add_tangent(e, arm, lever, y, speed, rate, w, f, fd, fr, o):
 
 
 @kernel
-def spring_sums(model, p, start, count, counted, member_state, r, tangent, o):
+def spring_sums(model, p, start, count, row, counted, member_state, r, tangent, o):
     """Forces, energy and tangents of springs; see `kinematics_interface.spring_sums`."""
     stop = start + whole_vectors(count)
     width = model.member.shape[1]
     rows = model.member.reshape(model.member.size)
     scale = member_state.reshape(member_state.size)
-    alike_sums(rows, width, scale, start, stop, p, r, counted, o)
-    if tangent:
-        alike_tangent(rows, width, scale, start, stop, p, r, o)
-        if p[1] != 0.0:
-            alike_damping(rows, width, scale, start, stop, p, r, o)
+    if row > 0:
+        grid_sums(rows, width, scale, start, count, row, p, r, counted, tangent, o)
+    else:
+        alike_sums(rows, width, scale, start, stop, p, r, counted, o)
+        if tangent:
+            alike_tangent(rows, width, scale, start, stop, p, r, o)
+    if tangent and p[1] != 0.0:
+        alike_damping(rows, width, scale, start, stop, p, r, o)
 
 
 @kernel
@@ -238,10 +242,14 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
 
 
 @part
-def spring_designs(model, p, lo, count, rel, u, pair, out):
+def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     """`member_designs` of springs at many poses; see `kinematics_interface.spring_designs`."""
     rows = model.member.reshape(model.member.size)
-    elastic_designs(rows, model.member.shape[1], lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
+    width = model.member.shape[1]
+    if row > 0:
+        grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, out)
+    else:
+        elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
 
 
 @part

@@ -279,7 +279,8 @@ def _slope_bar(table, s, h, i, u, d, end_bar):
 def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
     """The cotangent of the accelerations of stage j; see `kinematics_interface.stage_vjp`.
 
-    The turning parts of u and g of the stage behind j, which nobody reads any more, become bar t and bar omega.
+    The turning parts of u and g of the stage behind j, which nobody reads any more, become bar t and bar omega. Until
+    stage 0 comes, bar t_end waits in its place in u, which is 0 before and after.
     """
     s, n = u.shape
     by_end = h * h * table[VECTORS, END, j]
@@ -287,10 +288,13 @@ def stage_vjp(model, table, h, j, q, v, lam_q, lam_v, u, g, z):
     for body in range(n // FREEDOMS):
         c = COORDINATES * body
         d = FREEDOMS * body
-        if j + 1 < s:
+        if j + 1 == s:
             end_turn = _end_turn(table, s, h, q, v, c, d)
-            end_bar = turn_rate(times(-1.0, end_turn), vector_at(lam_q, d + 3))
-            _stage_bars(table, h, j + 1, q, v, end_bar, u, g, c, d)
+            put(u[0], d + 3, turn_rate(times(-1.0, end_turn), vector_at(lam_q, d + 3)))
+        else:
+            _stage_bars(table, h, j + 1, q, v, vector_at(u[0], d + 3), u, g, c, d)
+        if j == 0:
+            put(u[0], d + 3, (0.0, 0.0, 0.0))
         place = plus(times(by_end, vector_at(lam_q, d)), times(by_end_rate, vector_at(lam_v, d)))
         turn = times(by_end_rate, vector_at(lam_v, d + 3))
         for i in range(j + 1, s):
