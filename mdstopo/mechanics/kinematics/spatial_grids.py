@@ -84,6 +84,7 @@ def _seen(room, length, i, c):
 def _stretch(room, length, i, x, square, y, free, excess):
     """Delta = L - l0 of these members (m), as `spatial_springs` has it.
 
+    room (SEEN length,), length, i: of `begin_columns`, the members of a row, and the column from which on.
     x, square, y: r, its square and 1/L (m, m^2, 1/m). free, excess: l0 (m) and L0^2 - l0^2 (m^2).
     """
     moved = load(room, 6 * length + i)

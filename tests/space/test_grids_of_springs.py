@@ -1,0 +1,165 @@
+"""Springs between whole grids of points in space, against the same springs one by one and as a block of any springs."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mdstopo import Evaluation, evaluate
+from mdstopo.case.reader import read_case
+from mdstopo.general import compile as general_compile
+from mdstopo.mechanics.kinematics.spatial_poses import POSE
+from mdstopo.mechanics.laws.table import SPRING
+
+from .in_python import KERNELS, in_python, same, scene, state
+
+__all__ = ["in_python"]
+START, ROWS, WIDTH = 8, 3, 64
+SUMS = 13 + 36 + 21
+FORCE, ENERGY, PULL, K = slice(0, 6), 6, slice(7, 13), slice(13, 49)
+LAWS = {"elastic": (3.0, 0.0, 0.0), "preloaded": (2.0, 0.0, -0.7), "damped": (1.5, 0.4, 0.3)}
+#: members of a row: two vectors that overlap, one vector, two whole ones
+LENGTHS = (11, 8, 16)
+Q, V, _ = state()
+
+
+def grid(length: int) -> tuple[Any, np.ndarray]:
+    """A model whose pair 0 has ROWS rows of springs from START on, other members around them, and their states."""
+    model, rng = scene(), np.random.default_rng(length)
+    member = rng.normal(size=(8, WIDTH))
+    of = slice(START, START + ROWS * length)
+    member[:3, of] = np.repeat(rng.normal(size=(3, ROWS)), length, axis=1)
+    member[3:6, of] = np.tile(rng.normal(size=(3, length)), ROWS)
+    one, two = model.pair[0]
+    ends = [
+        model.home[b, :3, None] + model.home[b, 3:12].reshape(3, 3) @ p
+        for b, p in ((one, member[:3]), (two, member[3:6]))
+    ]
+    member[6] = rng.uniform(0.5, 1.5, WIDTH)
+    member[7] = ((ends[1] - ends[0]) ** 2).sum(axis=0) - member[6] ** 2
+    model.member = member
+    states = np.zeros((3, WIDTH))
+    states[0] = rng.uniform(0.1, 1.0, WIDTH)
+    return model, states
+
+
+def pose(model: Any, near: float) -> np.ndarray:
+    """The relative pose of pair 0 at a share of the way from home."""
+    home = np.tile([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], len(model.home))
+    shift, q, rel = np.zeros(len(V)), np.empty_like(Q), np.zeros((2, POSE))
+    KERNELS.difference(model, Q, home, shift)
+    KERNELS.retract(model, home, near * shift, q)
+    KERNELS.relative_pose(model, q, V, rel)
+    return rel[0]
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("length", LENGTHS)
+@pytest.mark.parametrize("near", [1.0, 1e-7])
+def test_sums_are_those_of_the_springs_one_by_one(law: str, length: int, near: float) -> None:
+    model, states = grid(length)
+    r, p, count = pose(model, near), np.array([*LAWS[law], 0.0, 0.0, 0.0, 0.0, 0.0]), ROWS * length
+    found, expected, bare = np.zeros((3, SUMS))
+    KERNELS.spring_sums(model, p, START, count, length, True, states, r, False, bare)
+    KERNELS.member_sums(model, SPRING, p, START, count, True, 0.0, 0.0, states, r, True, expected)
+    if p[1] != 0.0:  # dampers are summed over whole vectors: what lies behind the block must not count
+        states[0, START + count :] = 0.0
+    KERNELS.spring_sums(model, p, START, count, length, True, states, r, True, found)
+    for part in (FORCE, ENERGY, PULL, K, slice(49, 70)):
+        same(found[part], expected[part], 4e-15 * count)
+    same(bare[:13], found[:13], 1e-15)
+    assert not bare[13:].any()
+
+
+@pytest.mark.usefixtures("in_python")
+@pytest.mark.parametrize("length", LENGTHS)
+def test_the_derivative_of_many_poses_is_the_sum_of_theirs(length: int) -> None:
+    model, states = grid(length)
+    rng, p, count = np.random.default_rng(3), np.array([3.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ROWS * length
+    rel, u = np.zeros((4, 2, POSE)), rng.normal(size=(4, 2, 6))
+    for s in range(4):
+        rel[s, 0] = pose(model, 0.2 * (s + 1))
+    found, expected = np.zeros((2, WIDTH))
+    KERNELS.spring_designs(model, p, START, count, length, rel, u, 0, found)
+    for s in range(4):
+        KERNELS.member_designs(
+            model, SPRING, p, START, count, 0.0, 0.0, states, states[1], rel[s, 0], u[s, 0], 0.0, expected
+        )
+    same(found, expected, 1e-13)
+    assert not found[:START].any()
+    assert not found[START + count :].any()
+
+
+@pytest.mark.usefixtures("in_python")
+def test_a_spring_of_a_grid_without_length_adds_nothing() -> None:
+    model, states = grid(11)
+    r, p, who = pose(model, 1.0), np.array([1.5, 0.0, 0.3, 0.0, 0.0, 0.0, 0.0, 0.0]), START + 15
+    r[:3], r[3:12] = (0.5, 0.25, -1.0), np.eye(3).ravel()  # few digits leave exactly no length
+    member = model.member.copy()
+    member[3:6, START + 4 : START + 33 : 11] = np.array([[1.0], [2.0], [3.0]])
+    member[:3, START + 11 : START + 22] = np.array([[1.5], [2.25], [2.0]])
+    moved = SimpleNamespace(**{**vars(model), "member": member})
+    found, without = np.zeros((2, SUMS))
+    KERNELS.spring_sums(moved, p, START, 33, 11, True, states, r, True, found)
+    states[0, who] = 0.0
+    KERNELS.spring_sums(moved, p, START, 33, 11, True, states, r, True, without)
+    assert np.isfinite(found).all()
+    same(found, without, 1e-15)
+
+
+CASE = """
+format: 1
+dimension: 3
+gravity: [0, 0, -9.81]
+time: {end: 0.4}
+bodies:
+  lower: {mass: 40, inertia: [3, 4, 5], position: [0, 0, 0], velocity: [1, 0.2, 0], angular_velocity: [0.4, -0.3, 0.5]}
+  upper: {mass: 20, inertia: [2, 3, 2.5], position: [0, 0, 1]}
+points:
+  low: {body: lower, grid: {plane: {corner: [-1, -1, 0.2], edges: [[2, 0, 0], [0, 2, 0]], count: [5, 4]}}}
+  high: {body: upper, grid: {circle: {center: [0, 0, 0.9], radius: 0.5, normal: [0, 0, 1], start: [1, 0, 0],
+                                      count: 21}}}
+members:
+  net: {from: low, to: high, law: {type: spring, stiffness: 40, DAMPING}}
+design: {initial: 0.3, lower: 0.01, upper: 1}
+objectives:
+  energy: {response: energy, over_time: max}
+  force: {response: {member_force: {group: net}}, over_time: max}
+  turn: {response: {rotation: {body: upper, relative_to: lower, component: norm}}, over_time: max}
+combine: {method: weighted_sum, weights: {energy: 1, force: 1, turn: 1}}
+constraints:
+  - {volume: net, fraction: 0.3}
+solver: {tolerance: 1.0e-10}
+"""
+
+
+def evaluated(text: str) -> Evaluation:
+    case = read_case(text)
+    return evaluate(case, np.random.default_rng(1).uniform(0.05, 1.0, case.n_design))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["free_length: 0.6", "damping: 2"])
+def test_a_case_has_the_same_values_and_gradients_without_the_kernels_for_grids(
+    monkeypatch: pytest.MonkeyPatch, law: str
+) -> None:
+    text, rows = CASE.replace("DAMPING", law), []
+
+    def none(*arguments: Any, **options: Any) -> tuple[int, int]:
+        rows.append(row_of(*arguments, **options))
+        return 0, 0
+
+    row_of = general_compile.row_of
+    with_rows = evaluated(text)
+    monkeypatch.setattr(general_compile, "row_of", none)
+    without = evaluated(text)
+    assert rows == [(24, 21)]
+    for name, value in without.objectives.items():
+        assert with_rows.objectives[name] == pytest.approx(value, rel=1e-11)
+        assert with_rows.gradients[name] == pytest.approx(
+            without.gradients[name], rel=1e-9, abs=1e-9 * np.abs(without.gradients[name]).max()
+        )
