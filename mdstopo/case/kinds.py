@@ -12,7 +12,8 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
-from mdstopo.case.reading import BAD, Reading, Reference, found
+from mdstopo.case.quantities import PATTERN, QuantityError, in_si, is_quantity, unit_at
+from mdstopo.case.reading import BAD, Bad, Reading, Reference, found
 from mdstopo.case.scalars import to_float
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import did_you_mean, listed, number_text, shown
@@ -57,9 +58,14 @@ class Number(Value):
 
     def read(self, node: Node, path: str, reading: Reading) -> Any:
         """float (int where whole) or BAD."""
-        raw = node.scalar() if node.kind == SCALAR else None
+        raw: Any = node.scalar() if node.kind == SCALAR else None
+        if has_unit(node) and not self.whole:
+            raw = with_unit(node, path, reading)
+            if raw is BAD:
+                return BAD
         if isinstance(raw, bool) or not isinstance(raw, (int, float)):
-            reading.mistake(path, f"found {found(node)}{self._hint(node)}, allowed is {self.allowed()}", node)
+            hint = self._hint(node, reading.unit)
+            reading.mistake(path, f"found {found(node)}{hint}, allowed is {self.allowed()}", node)
             return BAD
         value = to_float(raw)
         if not math.isfinite(value):
@@ -78,13 +84,14 @@ class Number(Value):
         return int(raw) if self.whole else value
 
     @staticmethod
-    def _hint(node: Node) -> str:
+    def _hint(node: Node, unit: str) -> str:
         if node.kind != SCALAR or not node.text:
             return ""
         if not node.plain and re.fullmatch(r"[-+.0-9eExX]+", node.text):
             return " (a quoted number is text)"
         if node.plain and re.match(r"[-+.]?[0-9].*[a-zA-Z]", node.text):
-            return " (units are SI and not written)"
+            quoted = '; with its unit a number stands in quotes: "40 mm"' if unit else ""
+            return f" (without quotes units are SI and not written{quoted})"
         if node.plain and re.fullmatch(r"[-+]?[0-9]+,[0-9]+", node.text):
             return " (the decimal sign is a point)"
         return ""
@@ -97,8 +104,10 @@ class Number(Value):
             "maximum": self.maximum,
             "exclusiveMaximum": self.below,
         }
-        kind = "integer" if self.whole else "number"
-        return {"type": kind, **{word: limit for word, limit in limits.items() if limit is not None}}
+        limited = {word: limit for word, limit in limits.items() if limit is not None}
+        if self.whole:
+            return {"type": "integer", **limited}
+        return {"type": ["number", "string"], "pattern": PATTERN, **limited}
 
 
 @frozen
@@ -112,6 +121,23 @@ class ScalarInPlane(Number):
             reading.mistake(path, f"found {found(node)}, allowed is {self.allowed()}{words}", node)
             return BAD
         return Number(self.minimum, self.above, self.maximum, self.below, self.whole).read(node, path, reading)
+
+
+def has_unit(node: Node) -> bool:
+    """Whether a node is a number with something behind it, in quotes."""
+    return node.kind == SCALAR and not node.plain and is_quantity(node.text)
+
+
+def with_unit(node: Node, path: str, reading: Reading) -> float | Bad:
+    """The number of such a node in the SI unit of its key, or BAD."""
+    needed = unit_at(reading.unit, path)
+    try:
+        if not needed or needed == "the number's unit":
+            raise QuantityError("allowed is a number: units are read where a key has one of its own")
+        return in_si(node.text, needed)
+    except QuantityError as error:
+        reading.mistake(path, f"found {found(node)}; {error}", node)
+    return BAD
 
 
 NUMBER = Number()

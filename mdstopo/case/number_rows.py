@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Table, read_only
-from mdstopo.case.kinds import Number, Schema
+from mdstopo.case.kinds import NUMBER, Number, Schema, has_unit, with_unit
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
-from mdstopo.case.reading import BAD, Fields, Reading, found
+from mdstopo.case.reading import BAD, Bad, Fields, Reading, found
 from mdstopo.case.records import Key, Record
 from mdstopo.case.scalars import resolve, to_float
 from mdstopo.case.value import Value, frozen
@@ -83,7 +83,12 @@ class Rows(Value):
         for index, row in enumerate(node.items):
             if row.kind == SEQUENCE and len(row.items) == width:
                 for column, cell in enumerate(row.items):
-                    number = _number(cell)
+                    number: Any = _number(cell)
+                    if has_unit(cell):
+                        number = self._measured(cell, f"{path}[{index}]", column, reading)
+                        if number is BAD:
+                            wrong += 1
+                            continue
                     values[index, column] = number
                     if not math.isfinite(number):
                         wrong += 1
@@ -100,6 +105,16 @@ class Rows(Value):
             return BAD
         rows = node.items
         return self._checked(values, path, node, reading, lambda index: (f"{path}[{index}]", rows[index], ""))
+
+    def _measured(self, cell: Node, path: str, column: int, reading: Reading) -> float | Bad:
+        """The number of a cell that has a unit: times are in s, whatever the others are in."""
+        around = reading.unit
+        if column == 0 and self.columns[0] == "t":
+            reading.unit = "s"
+        try:
+            return with_unit(cell, f"{path}[{column}]", reading)
+        finally:
+            reading.unit = around
 
     def _file(self, name: str, node: Node, path: str, reading: Reading) -> Any:
         data = reading.include(name)
@@ -175,7 +190,7 @@ class Rows(Value):
     def schema(self) -> Schema:
         """array of rows, or a file."""
         width = len(self.columns)
-        row = {"type": "array", "items": {"type": "number"}, "minItems": width, "maxItems": width}
+        row = {"type": "array", "items": NUMBER.schema(), "minItems": width, "maxItems": width}
         title = f"rows {self.row_text}"
         rows = {"type": "array", "title": title, "items": row, "minItems": self.at_least}
         return {"anyOf": [rows, FILE.schema()]}
@@ -251,7 +266,8 @@ class Signals(Value):
         if node.kind == SEQUENCE and self._is_rows(node):
             return self._split(self.rows.read(node, path, reading))
         if len(self.names) == 1:
-            if not self.constant or node.kind != SCALAR or isinstance(node.scalar(), (str, type(None))):
+            text = node.kind == SCALAR and isinstance(node.scalar(), (str, type(None))) and not has_unit(node)
+            if not self.constant or node.kind != SCALAR or text:
                 allowed = f"{'a number or ' if self.constant else ''}{{table: rows {self.rows.row_text}}}"
                 reading.mistake(path, f"found {found(node)}, allowed is {allowed}", node)
                 return BAD
@@ -286,6 +302,6 @@ class Signals(Value):
             return {"anyOf": tables}
         n = len(self.names)
         if n == 1:
-            return {"anyOf": [{"type": "number"}, *tables]}
+            return {"anyOf": [NUMBER.schema(), *tables]}
         part = Signals(("value",)).schema()
         return {"anyOf": [{"type": "array", "items": part, "minItems": n, "maxItems": n}, *tables]}

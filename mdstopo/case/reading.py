@@ -64,6 +64,8 @@ class Reading:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        #: the unit of the key that is read, as its description has it
+        self.unit = ""
         self.mistakes: list[Mistake] = []
         self.warnings: list[Mistake] = []
         self.files: dict[str, str] = {}

@@ -285,6 +285,14 @@ class Key(Value):
         parts = [self.doc, unit, otherwise]
         return ", ".join(part for part in parts if part)
 
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """What the kind reads, with this key's unit for its numbers, or the unit of the key around it."""
+        around, reading.unit = reading.unit, self.unit or reading.unit
+        try:
+            return self.kind.read(node, path, reading)
+        finally:
+            reading.unit = around
+
     def schema(self) -> Schema:
         """The value's schema with the key's description and default."""
         schema = dict(self.kind.schema())
@@ -346,7 +354,7 @@ class Record(Value):
             if entry is not None:
                 here = inside(path, name)
                 reading.mark(here, entry[1], entry[0])
-                fields[name] = key.kind.read(entry[1], here, reading)
+                fields[name] = key.read(entry[1], here, reading)
             elif key.required:
                 fields[name] = BAD
                 if name not in meant:

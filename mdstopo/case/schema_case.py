@@ -209,7 +209,7 @@ CONSTRAINT = Record(
         Key("over_time", _OVER_TIME.kind, "how the response becomes a number", otherwise="max"),
         _LOAD_CASE,
         Key("limit", NUMBER, "at most this"),
-        Key("fraction", NUMBER, "of a volume: at most this share of sum V_i"),
+        Key("fraction", Number(minimum=0, maximum=1), "of a volume: at most this share of sum V_i"),
         Key("equals", NUMBER, "exactly this"),
         Key("at_least", NUMBER, "at least this"),
     ),

@@ -98,8 +98,8 @@ def damping_key() -> Any:
 def free_length_key() -> Any:
     """A field: the free length l0."""
     return stated(
-        POSITIVE,
-        "l0, the length at which Delta = 0",
+        NOT_NEGATIVE,
+        "l0, the length at which Delta = 0; 0: the force is along the member and grows with its length",
         unit="m",
         default=None,
         otherwise="each member's initial length",

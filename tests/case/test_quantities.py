@@ -1,0 +1,117 @@
+"""Numbers with units in quotes become the same case as their SI numbers; wrong units are mistakes with a place."""
+
+import math
+import re
+
+import pytest
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.kinds import NUMBER
+from mdstopo.case.model import Table
+from mdstopo.case.quantities import QuantityError, in_si
+from mdstopo.case.reader import read_case
+
+CASE = """
+format: 1
+gravity: [0, {gravity}]
+time: {{end: {end}}}
+bodies: {{b: {{mass: {mass}, inertia: {inertia}, position: [{x}, 0], angle: {angle}}}}}
+points:
+  p: {{body: b, grid: {{list: [[{x}, {y}], [0, 1]]}}}}
+  g: {{body: ground, grid: {{list: [[0, 2], [1, 2]]}}}}
+members: {{m: {{from: g, to: p, law: {{type: spring, stiffness: {stiffness}, free_length: {free}}}}}}}
+bushings: [{{bodies: [ground, b], at: [0, 0], stiffness: [{stiffness}, 0, {turning}]}}]
+loads: [{{body: b, force: [{{table: [[0, 0], [{half}, {force}]]}}, 0]}}]
+objectives: {{G: {{response: energy}}}}
+"""
+SI = {
+    "gravity": "-9.80665", "end": "0.5", "mass": "12.5", "inertia": "2", "x": "0.04", "y": "0.3048", "angle": "0.25",
+    "stiffness": "2500", "free": "0.035", "turning": "7", "half": "0.25", "force": "4448.2216152605",
+}  # fmt: skip
+UNITS = {
+    "gravity": '"-9.80665 m/s^2"', "end": '"500 ms"', "mass": '"12500 g"', "inertia": '"2 kg m²"', "x": '"40 mm"',
+    "y": '"1 ft"', "angle": '"250 mrad"', "stiffness": '"2.5 N/mm"', "free": '"3.5 cm"', "turning": '"7 N m/rad"',
+    "half": '"0.25 s"', "force": '"1000 lbf"',
+}  # fmt: skip
+
+
+def test_a_case_with_units_is_the_same_as_in_si_to_the_bit() -> None:
+    plain, measured = (read_case(CASE.format(**values)) for values in (SI, UNITS))
+    for part in ("bodies", "members", "bushings", "load_cases", "points"):
+        assert getattr(plain, part) == getattr(measured, part)
+    signal = measured.load_cases[0].loads[0].force[0]
+    assert isinstance(signal, Table)
+    assert signal.times.tolist() == [0.0, 0.25]
+
+
+@pytest.mark.parametrize(
+    ("text", "needed", "value"),
+    [
+        ("35 mm", "m", 0.035),
+        ("30 deg", "rad", math.pi / 6),
+        ("60 rpm", "rad/s", 2 * math.pi),
+        ("1 rev/s", "rad/s", 2 * math.pi),
+        ("36 km/h", "m/s", 10.0),
+        ("1 in", "m", 0.0254),
+        ("1 J", "N m", 1.0),
+        ("2e3 g*m/s**2", "N", 2.0),
+        ("3 N s/m", "N s/m", 3.0),
+        ("5 1/s", "rad/s", 5.0),
+    ],
+)
+def test_units_have_their_international_factors(text: str, needed: str, value: float) -> None:
+    assert in_si(text, needed) == pytest.approx(value, rel=1e-15, abs=0)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "path", "words"),
+    [
+        ("mass", '"12 mm"', "bodies.b.mass", ["'12 mm'", "in kg"]),
+        ("mass", '"12 kgg"', "bodies.b.mass", ["'kgg'", "g, N", "prefix"]),
+        ("mass", '"-12 kg"', "bodies.b.mass", ["> 0"]),
+        ("x", '"4 kg"', "bodies.b.position[0]", ["in m"]),
+        ("force", '"4 s"', "loads[0].force[0].table[1][1]", ["in N"]),
+        ("half", '"4 N"', "loads[0].force[0].table[1][0]", ["in s"]),
+        ("turning", '"7 N/m"', "bushings[0].stiffness[2]", ["in N m/rad"]),
+        ("end", '"4 m/"', "time.end", ["no unit"]),
+        ("end", '"0.5"', "time.end", ["a quoted number is text"]),
+    ],
+)
+def test_a_wrong_unit_is_a_mistake_with_its_place(key: str, value: str, path: str, words: list[str]) -> None:
+    with pytest.raises(CaseError) as caught:
+        read_case(CASE.format(**{**SI, key: value}))
+    assert path in [mistake.path_key for mistake in caught.value.mistakes]
+    told = next(mistake.message for mistake in caught.value.mistakes if mistake.path_key == path)
+    for word in words:
+        assert word in told
+
+
+def test_a_prescribed_angle_is_no_length() -> None:
+    motion = "motions: [{{body: b, {}: {{velocity: {}}}}}]\n"
+    moved = read_case(CASE.format(**SI) + motion.format("angle", '"90 deg/s"')).load_cases[0].motions[0].angle
+    assert moved is not None
+    assert moved.signal == math.pi / 2
+    for coordinate, value in (("angle", '"1 m/s"'), ("x", '"1 rad/s"')):
+        with pytest.raises(CaseError, match="measures the same"):
+            read_case(CASE.format(**SI) + motion.format(coordinate, value))
+
+
+def test_a_number_whose_key_has_no_unit_takes_none() -> None:
+    text = CASE.format(**SI) + 'constraints: [{response: energy, limit: "3 J"}]\n'
+    with pytest.raises(CaseError, match="units are read where a key has one"):
+        read_case(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("40 mm", "m"), ("-9.8 m/s^2", "m/s^2"), ("1e3N", "N"), ("30°", "rad"), ("5 1/s", "rad/s")]
+)
+def test_the_schema_lets_editors_accept_what_the_reader_does(text: str, unit: str) -> None:
+    assert re.search(NUMBER.schema()["pattern"], text)
+    assert math.isfinite(in_si(text, unit))
+
+
+@pytest.mark.parametrize("text", ["40", "mm", "40 =2", ""])
+def test_neither_takes_what_has_no_number_or_no_unit(text: str) -> None:
+    assert not re.search(NUMBER.schema()["pattern"], text)
+    with pytest.raises(QuantityError):
+        in_si(text, "m")
