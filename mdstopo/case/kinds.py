@@ -19,6 +19,12 @@ from mdstopo.case.words import did_you_mean, listed, number_text, shown
 
 Schema = dict[str, Any]
 
+
+def expressible(kind: str) -> Schema:
+    """A number (or integer) as JSON Schema, or an expression, which `definitions` makes a number."""
+    return {"type": [kind, "string"], "pattern": "^\\s*="}
+
+
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 TAKEN = ("ground", "all", "default")
 
@@ -87,10 +93,12 @@ class Number(Value):
             return " (units are SI and not written)"
         if node.plain and re.fullmatch(r"[-+]?[0-9]+,[0-9]+", node.text):
             return " (the decimal sign is a point)"
+        if re.search(r"[A-Za-z0-9_)] *[-+*/^(] *[A-Za-z0-9_(]", node.text) and not node.text.startswith(("-", "+")):
+            return " (an expression begins with =)"
         return ""
 
     def schema(self) -> Schema:
-        """type and limits."""
+        """type and limits; text that is an expression."""
         limits = {
             "minimum": self.minimum,
             "exclusiveMinimum": self.above,
@@ -98,7 +106,7 @@ class Number(Value):
             "exclusiveMaximum": self.below,
         }
         kind = "integer" if self.whole else "number"
-        return {"type": kind, **{word: limit for word, limit in limits.items() if limit is not None}}
+        return {**expressible(kind), **{word: limit for word, limit in limits.items() if limit is not None}}
 
 
 @frozen
