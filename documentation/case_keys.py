@@ -222,7 +222,8 @@ def _simple(kind: Kind) -> str:
         return "nothing yet"
     texts: dict[type, str] = {
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
-        MeshFile: "path of an STL or OBJ file", Anything: "any value", Definitions: "`{name: number or expression, ...}`",
+        MeshFile: "path of an STL or OBJ file", Anything: "any value",
+        Definitions: "`{name: number or expression, ...}`",
     }  # fmt: skip
     return texts[type(kind)]
 
