@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from mdstopo.case.definitions import Definitions
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
 from mdstopo.case.mesh_files import MeshFile
 from mdstopo.case.not_yet import NotYet, NotYetAs
@@ -222,6 +223,7 @@ def _simple(kind: Kind) -> str:
     texts: dict[type, str] = {
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
         MeshFile: "path of an STL or OBJ file", Anything: "any value",
+        Definitions: "`{name: number or expression, ...}`",
     }  # fmt: skip
     return texts[type(kind)]
 

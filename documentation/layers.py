@@ -115,7 +115,8 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
     (
         "records",
         (
-            Box(("evaluation",), "what an evaluation gives back", 0.0, 0.46),
+            Box(("evaluation",), "what comes back", 0.0, 0.2),
+            Box(("formula",), "expressions in cases", 0.2, 0.26),
             Box(("settings",), "the optimiser's options", 0.46, 0.24),
             Box(("status", "children", "installed", "_version"), "", 0.7, 0.3),
         ),

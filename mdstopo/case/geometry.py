@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 _MODULES = {2: "mdstopo.case.plane:PLANE", 3: "mdstopo.case.space:SPACE"}
 #: what may stand above `dimension`: nothing of it depends on the dimension
-_BEFORE = ("format", "dimension", "title", "time", "design", "combine", "optimizer")
+_BEFORE = ("format", "dimension", "title", "extends", "define", "time", "design", "combine", "optimizer")
 
 
 class Geometry(NamedTuple):

@@ -20,6 +20,12 @@ from mdstopo.case.words import did_you_mean, listed, number_text, shown
 
 Schema = dict[str, Any]
 
+
+def expressible(kind: str) -> Schema:
+    """A number (or integer) as JSON Schema, or text: an expression (`definitions`), or a quantity with its unit."""
+    return {"type": [kind, "string"], "pattern": "^\\s*=" if kind == "integer" else f"^\\s*=|{PATTERN}"}
+
+
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 TAKEN = ("ground", "all", "default")
 
@@ -94,20 +100,20 @@ class Number(Value):
             return f" (without quotes units are SI and not written{quoted})"
         if node.plain and re.fullmatch(r"[-+]?[0-9]+,[0-9]+", node.text):
             return " (the decimal sign is a point)"
+        if re.search(r"[A-Za-z0-9_)] *[-+*/^(] *[A-Za-z0-9_(]", node.text) and not node.text.startswith(("-", "+")):
+            return " (an expression begins with =)"
         return ""
 
     def schema(self) -> Schema:
-        """type and limits."""
+        """type and limits; text that is an expression."""
         limits = {
             "minimum": self.minimum,
             "exclusiveMinimum": self.above,
             "maximum": self.maximum,
             "exclusiveMaximum": self.below,
         }
-        limited = {word: limit for word, limit in limits.items() if limit is not None}
-        if self.whole:
-            return {"type": "integer", **limited}
-        return {"type": ["number", "string"], "pattern": PATTERN, **limited}
+        kind = "integer" if self.whole else "number"
+        return {**expressible(kind), **{word: limit for word, limit in limits.items() if limit is not None}}
 
 
 @frozen

@@ -24,10 +24,11 @@ class Node:
 
     kind: SCALAR (`text`, `plain`), SEQUENCE (`items`) or MAPPING (`entries`: key -> (key node, value node),
     merge keys applied). line, column: from 1. origin: as in `Mistake`. size: nodes below and itself, aliases
-    expanded. Nodes are not changed once the tree stands: aliases share them.
+    expanded. source: the expression that a number comes from, else empty. Nodes are not changed once the tree stands:
+    aliases share them.
     """
 
-    __slots__ = ("column", "entries", "items", "kind", "line", "origin", "plain", "size", "text")
+    __slots__ = ("column", "entries", "items", "kind", "line", "origin", "plain", "size", "source", "text")
 
     def __init__(self, kind: str, line: int, column: int, origin: str = "") -> None:
         self.kind = kind
@@ -39,11 +40,12 @@ class Node:
         self.items: list[Node] = []
         self.entries: dict[str, tuple[Node, Node]] = {}
         self.size = 1
+        self.source = ""
 
     def at(self, line: int, column: int) -> Node:
         """The same value at another place: what an alias stands for. Children are shared."""
         twin = Node(self.kind, line, column, self.origin)
-        twin.text, twin.plain, twin.size = self.text, self.plain, self.size
+        twin.text, twin.plain, twin.size, twin.source = self.text, self.plain, self.size, self.source
         twin.items, twin.entries = self.items, self.entries
         return twin
 

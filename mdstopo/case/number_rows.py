@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, Table, read_only
-from mdstopo.case.kinds import NUMBER, Number, Schema, has_unit, with_unit
+from mdstopo.case.kinds import Number, Schema, expressible, has_unit, with_unit
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.reading import BAD, Bad, Fields, Reading, found
 from mdstopo.case.records import Key, Record
@@ -190,7 +190,7 @@ class Rows(Value):
     def schema(self) -> Schema:
         """array of rows, or a file."""
         width = len(self.columns)
-        row = {"type": "array", "items": NUMBER.schema(), "minItems": width, "maxItems": width}
+        row = {"type": "array", "items": expressible("number"), "minItems": width, "maxItems": width}
         title = f"rows {self.row_text}"
         rows = {"type": "array", "title": title, "items": row, "minItems": self.at_least}
         return {"anyOf": [rows, FILE.schema()]}
@@ -302,6 +302,6 @@ class Signals(Value):
             return {"anyOf": tables}
         n = len(self.names)
         if n == 1:
-            return {"anyOf": [NUMBER.schema(), *tables]}
+            return {"anyOf": [expressible("number"), *tables]}
         part = Signals(("value",)).schema()
         return {"anyOf": [{"type": "array", "items": part, "minItems": n, "maxItems": n}, *tables]}

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 #: exponents of kg, m and s
 Dimension = tuple[int, int, int]
 
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\D.*?)\s*")
-_FACTOR = re.compile(r"([A-Za-zµ°]+|1)(?:(?:\^|\*\*)?([-+]?\d+)|([²³]))?")
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?)\s*(\D.*?)\s*")
+_FACTOR = re.compile(r"([A-Za-zµ°]+|1)(?:(?:\^|\*\*)?([-+]?\d)|([²³]))?")
 _SUPERSCRIPTS = {"²": 2, "³": 3}
 _PREFIXES = {"n": -9, "u": -6, "µ": -6, "m": -3, "c": -2, "k": 3, "M": 6, "G": 9}
 
@@ -61,6 +61,8 @@ _ALONE: dict[str, tuple[str, Dimension, int]] = {
     "rev": ("2", (0, 0, 0), 1),
     "rpm": ("1/30", (0, 0, -1), 1),
 }
+#: the longest text that is read, so that the exact arithmetic stays short
+_LONGEST = 100
 #: as a regular expression of JSON Schema: a number, then what begins like a unit
 PATTERN = r"^\s*[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?\s*[A-Za-zµ°1/].*$"
 
@@ -79,13 +81,16 @@ def in_si(text: str, needed: str) -> float:
     """The number that a text like `40 mm` means in the SI unit `needed`. Raises QuantityError."""
     from fractions import Fraction
 
-    found = _NUMBER.fullmatch(text)
+    found = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if found is None:
         raise QuantityError("allowed is a number and its unit, such as '40 mm'")
     unit = unit_of(found[2])
     if unit.dimension != unit_of(needed).dimension:
         raise QuantityError(f"allowed is a number in {needed}, or in a unit that measures the same")
-    return float(Fraction(found[1]) * unit.factor) * math.pi**unit.turns
+    try:
+        return float(Fraction(found[1]) * unit.factor) * math.pi**unit.turns
+    except OverflowError:
+        raise QuantityError("allowed is a number that is finite in SI units") from None
 
 
 @functools.cache

@@ -13,8 +13,11 @@ from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
 from mdstopo.case.contacts import build_contacts
+from mdstopo.case.definitions import MARK, SECTION, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
+from mdstopo.case.file_text import FileTextError, text_in
 from mdstopo.case.geometry import Geometry, geometry_in
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
@@ -47,24 +50,10 @@ def load_case(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None 
     """
     place = Path(path)
     try:
-        if place.exists() and not place.is_file():
-            raise CaseError([Mistake("", "this is not a file", 1, 1)], str(path))
-        data = place.read_bytes()
-    except FileNotFoundError:
-        raise CaseError([Mistake("", "there is no such file", 1, 1)], str(path)) from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise CaseError([Mistake("", f"the file cannot be read: {reason}", 1, 1)], str(path)) from None
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        before = data[: error.start]
-        line = before.count(b"\n") + 1
-        start = before.rfind(b"\n") + 1
-        column = len(before[start:].decode("utf-8-sig", "replace")) + 1
-        message = f"the byte 0x{data[error.start]:02X} is not UTF-8; save the file as UTF-8"
-        raise CaseError([Mistake("", message, line, column)], str(path)) from None
-    return read_case(text, path=place, overrides=overrides, sha256=hashlib.sha256(data).hexdigest())
+        text, digest = text_in(place)
+    except FileTextError as error:
+        raise CaseError([error.mistake], str(path)) from None
+    return read_case(text, path=place, overrides=overrides, sha256=digest)
 
 
 def read_case(
@@ -83,8 +72,17 @@ def read_case(
     place = None if path is None else Path(path)
     file = "<text>" if path is None else str(path)
     reading = Reading(Path() if place is None else place.parent)
-    root = _parsed(text, reading, file)
+    own = _parsed(text, reading, file)
+    try:
+        root = extended(own, place, reading)
+    except CannotExtendError:
+        raise CaseError(reading.mistakes, file) from None
+    whole_text = text if root is own else text_of_tree(root)
     root, texts = apply_overrides(root, overrides or {}, reading.mistakes.append)
+    if KEY in root.entries:
+        reading.mistake(KEY, "can only be stated in the file", root.entries[KEY][1])
+    if MARK in whole_text or SECTION in root.entries or any(MARK in each for each in texts.values()):
+        root = with_numbers(root, reading)
     if without:
         whole, root = root, root.at(root.line, root.column)
         root.entries = {key: entry for key, entry in whole.entries.items() if key not in without}
@@ -103,7 +101,7 @@ def read_case(
         title=top["title"],
         path=place,
         name="case" if place is None else place.stem,
-        text=text,
+        text=whole_text,
         sha256=sha256 or hashlib.sha256(text.encode()).hexdigest(),
         overrides=FrozenDict(texts),
         files=FrozenDict(reading.files),

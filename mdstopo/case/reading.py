@@ -74,6 +74,7 @@ class Reading:
         self._places: dict[str, tuple[int, int]] = {}
         self._origins: dict[str, str] = {}
         self._included: dict[str, bytes | str] = {}
+        self._ignored: set[tuple[int, int, str]] = set()
 
     def mark(self, path: str, node: Node, key: Node | None = None) -> None:
         """Note the place of `path`: its value's, or its key's where the value begins on a later line."""
@@ -93,10 +94,16 @@ class Reading:
 
     def mistake(self, path: str, message: str, node: Node | None = None) -> None:
         """Note a mistake at `node`, or where `path` (else what encloses it) stands."""
+        if node is not None and (node.line, node.column, node.origin) in self._ignored:
+            return
         if len(self.mistakes) < MOST_MISTAKES:
             self.mistakes.append(self._located(path, message, node))
         elif len(self.mistakes) == MOST_MISTAKES:
             self.mistakes.append(self._located(path, "there are more mistakes; this is the last one told", node))
+
+    def ignore(self, node: Node) -> None:
+        """Note no further mistake at a node: what is wrong there has been told."""
+        self._ignored.add((node.line, node.column, node.origin))
 
     def warning(self, path: str, message: str) -> None:
         """Note a remark at `path`."""
@@ -167,4 +174,5 @@ def found(node: Node) -> str:
         return "nothing"
     if isinstance(value, str):
         return f"the text {shown(node.text)}"
-    return shown(node.text)[1:-1]
+    told = shown(node.text)[1:-1]
+    return f"{told}, the value of {shown(node.source)}" if node.source else told

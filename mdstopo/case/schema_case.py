@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from mdstopo.case.definitions import Definitions
 from mdstopo.case.integrators import names as integrators
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import (
@@ -23,6 +24,7 @@ from mdstopo.case.kinds import (
     Version,
     explained,
 )
+from mdstopo.case.number_rows import FileName
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of
 from mdstopo.case.schema_contact import CONTACT
@@ -312,6 +314,8 @@ FORMAT = Record(
             default=2,
         ),
         Key("title", Text(), "what outputs and pictures call the case", default=""),
+        Key("extends", FileName(), "path, relative to the case file, of another case, which this one changes"),
+        Key("define", Definitions(), "names of numbers, for expressions in this case; a value may be an expression"),
         Key("gravity", PAIR, "acceleration of free fall, [x, y]", default=(0.0, 0.0), unit="m/s^2"),
         Key(
             "time",
@@ -360,13 +364,23 @@ def json_schema() -> dict[str, Any]:
     """The format as JSON Schema, draft 2020-12: completes and checks a case as it is typed."""
     from mdstopo.case.schema_space import SPACE_FORMAT
 
+    changed = {key.name: {"description": key.text} for key in FORMAT.keys}
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "mdstopo case file, format 1",
         "description": "One design problem. SI units; coordinates are global, at the start.",
-        "if": {"properties": {"dimension": {"const": 3}}, "required": ["dimension"]},
-        "then": SPACE_FORMAT.schema(),
-        "else": FORMAT.schema(),
+        "if": {"required": ["extends"]},
+        "then": {
+            "description": "What is changed of another case; it is checked when both are together.",
+            "type": "object",
+            "properties": {**changed, "extends": FileName().schema() | {"description": "the other case"}},
+            "additionalProperties": False,
+        },
+        "else": {
+            "if": {"properties": {"dimension": {"const": 3}}, "required": ["dimension"]},
+            "then": SPACE_FORMAT.schema(),
+            "else": FORMAT.schema(),
+        },
     }
 
 

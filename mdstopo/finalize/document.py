@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray
+from mdstopo.case.definitions import SECTION, with_numbers
 from mdstopo.case.mesh_files import is_mesh
 from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.number_rows import rows_in
 from mdstopo.case.overrides import apply_overrides
+from mdstopo.case.reading import Reading
 from mdstopo.case.start_geometry import Frames, frames_of
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.scaled_laws import sized as sized_law
@@ -33,14 +35,31 @@ _LARGEST = ("max", "max_abs")
 def content_of(case: Case) -> Plain:
     """The document that a case was read from, with what --set changed and the rows of included files in place.
 
-    Raises StoreError where an included file cannot be read any more, or is another than was read.
+    Expressions are the numbers that they come to. Raises StoreError where an included file cannot be read any more, or
+    is another than was read, and where defined names are uncertain, for no number would follow them any more.
     """
     root = parse(case.text.removeprefix("\ufeff"), lambda _mistake: None)
     assert root is not None  # it has been read before
     root, _ = apply_overrides(root, case.overrides, lambda _mistake: None)
+    _refuse_uncertain_names(case)
+    root = with_numbers(root, Reading(Path()))
+    root.entries.pop(SECTION, None)
     content = _plain(root, _files(case))
     assert isinstance(content, dict)
     return content
+
+
+def _refuse_uncertain_names(case: Case) -> None:
+    uncertainty = case.uncertainty
+    if uncertainty is None:
+        return
+    keys = [number.key for number in uncertainty.numbers]
+    keys += [key for scenario in uncertainty.scenarios for key in scenario.values]
+    if found := [key for key in keys if key == SECTION or key.startswith(f"{SECTION}.")]:
+        raise StoreError(
+            f"{case.path or case.name}: {found[0]} is uncertain, and expressions would become numbers that do not "
+            "follow it; state what is uncertain of the numbers themselves"
+        )
 
 
 def final_content(

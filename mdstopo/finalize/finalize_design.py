@@ -12,12 +12,12 @@ from mdstopo.case.arrays import FloatArray, IndexArray
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.case.yaml_text import text_of
 from mdstopo.evaluators import make_engine
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.equilibria import Comparison, compare_equilibria
 from mdstopo.finalize.keep import check, check_restricted, chosen, kept_values, one_alpha, places, restricted
-from mdstopo.finalize.text import text_of
 from mdstopo.finalize.values import Parameter, told_apart
 from mdstopo.scene.refusals import refusals
 from mdstopo.session.outcome import Outcome, Progress

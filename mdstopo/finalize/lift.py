@@ -22,8 +22,8 @@ from mdstopo.case.responses import RESPONSES
 from mdstopo.case.rotations import about_axis
 from mdstopo.case.signals import combined
 from mdstopo.case.words import inside, shown
+from mdstopo.case.yaml_text import text_of
 from mdstopo.finalize.document import Plain, content_of
-from mdstopo.finalize.text import text_of
 
 #: what `over_time` makes of an angle's norm is what it makes of the angle
 _UNSIGNED = ("max_abs", "rms")

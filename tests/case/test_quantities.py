@@ -115,3 +115,9 @@ def test_neither_takes_what_has_no_number_or_no_unit(text: str) -> None:
     assert not re.search(NUMBER.schema()["pattern"], text)
     with pytest.raises(QuantityError):
         in_si(text, "m")
+
+
+@pytest.mark.parametrize("text", ["1e999999999 m", "1e-999999999 m", "1 km^999999999", "1" * 5000 + " m", "1e308 km"])
+def test_numbers_and_powers_without_end_are_refused_at_once(text: str) -> None:
+    with pytest.raises(QuantityError):
+        in_si(text, "m")

@@ -13,13 +13,13 @@ from mdstopo.case.laws import LAWS
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Table
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
 from mdstopo.finalize.scaled_laws import sized
-from mdstopo.finalize.text import text_of
 
 SPRINGS = """\
 format: 1

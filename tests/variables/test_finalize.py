@@ -10,13 +10,13 @@ import pytest
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import VolumeRow
 from mdstopo.case.reader import load_case, read_case
+from mdstopo.case.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.apart import apart, unlike
 from mdstopo.finalize.document import content_of, final_content
 from mdstopo.finalize.finalize_design import ready
 from mdstopo.finalize.keep import chosen, kept_values, one_alpha, places, restricted
-from mdstopo.finalize.text import text_of
 from mdstopo.finalize.values import bound_of
 
 #: a stiffness for all, which costs; springs and energy alone, so that the final case needs no general kernels
