@@ -34,13 +34,14 @@ SECTIONS = {
     "golden": "what differs to the bit from values, gradients and iterates kept before (--check FILE, --write FILE)",
     "damage": "500 kills and 1,000 damages of result files, caches and locks: nothing is lost, nothing hangs",
     "hunt": "random scenes against a second model, differences, invariances and the error estimates (--minutes)",
+    "hunt_space": "the same with scenes in space",
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
 PEERS = ("peers", "ring", "forward", "million")
 
 #: what looks for mistakes instead of measuring
-CAMPAIGNS = ("damage", "hunt")
+CAMPAIGNS = ("damage", "hunt", "hunt_space")
 
 #: sections that take an hour, or measure nothing, are run where they are named
 NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts", "golden", "lifts")
@@ -119,7 +120,7 @@ def main() -> int:
 def _tables(name: str, chosen: argparse.Namespace) -> Iterator[Table]:
     module = "benchmarks.peers.sections" if name in PEERS else f"benchmarks.{name}"
     section: Callable[..., Iterator[Table]] = getattr(import_module(module), name)
-    if name == "hunt":
+    if name in ("hunt", "hunt_space"):
         return section(chosen.minutes, chosen.seed)
     if name == "golden":
         return section(chosen.check, chosen.write)

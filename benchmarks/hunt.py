@@ -16,10 +16,10 @@ nothing.
 import json
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -50,13 +50,26 @@ class Found:
     undecided: int = 0
 
 
-def hunt(minutes: float = 10.0, first: int = 0) -> Iterator[Table]:
+class Kind(NamedTuple):
+    """A kind of scenes: their document by seed and change, their second model, changes, and whether one can be made."""
+
+    name: str
+    scene: Callable[..., dict[str, Any]]
+    model: type[Model]
+    changes: Mapping[str, Any]
+    covariant: Callable[[dict[str, Any], Any], bool] = lambda document, change: True
+
+
+PLANAR = Kind("", scene, Model, CHANGES)
+
+
+def hunt(minutes: float = 10.0, first: int = 0, kind: Kind = PLANAR) -> Iterator[Table]:
     """Go through scenes, from seed `first` on, for so many minutes; then the bars and the worst of what was found."""
     found, began, seed = Found(), time.monotonic(), first
     while time.monotonic() < began + 60.0 * minutes:
-        look(seed, found)
+        look(seed, found, kind)
         seed += 1
-    yield bars(found, seed - first)
+    yield bars(found, seed - first, kind)
     yield worst(found)
 
 
@@ -103,10 +116,10 @@ def drawn(seed: int, document: dict[str, Any]) -> Scene:
     return Scene(seed, document, case, x)
 
 
-def look(seed: int, found: Found) -> None:
+def look(seed: int, found: Found, kind: Kind = PLANAR) -> None:
     """Everything about one scene."""
     try:
-        own = drawn(seed, scene(seed))
+        own = drawn(seed, kind.scene(seed))
         alpha, values = own.parts(own.x)
         own.result = result = mdstopo.evaluate(own.case, alpha, variables=values, error_estimate=True)
     except mdstopo.CaseError as refused:
@@ -115,8 +128,12 @@ def look(seed: int, found: Found) -> None:
     found.statuses[result.status.name] += 1
     if not result.status.ok:
         return
-    model = Model(own.document, alpha, values)
-    model.solve()
+    model = kind.model(own.document, alpha, values)
+    try:
+        model.solve()
+    except ArithmeticError as given_up:
+        found.statuses[f"second model: {given_up}"] += 1
+        return
     for name, keys in own.document["objectives"].items():
         value, size = model.objective(keys["response"], keys["over_time"])
         own.sizes[name] = size = max(size, abs(value), SMALLEST)
@@ -126,7 +143,7 @@ def look(seed: int, found: Found) -> None:
         if error > RESOLVED and error * size > ROUNDED and name in result.errors:
             found.estimates.append((result.errors[name].value / (error * size), seed, label))
     _gradients(own, found)
-    _changes(own, found)
+    _changes(own, found, kind)
 
 
 def _gradients(own: Scene, found: Found) -> None:
@@ -160,24 +177,30 @@ def _gradients(own: Scene, found: Found) -> None:
         found.gradients.append((error / scale / TOLERANCE, own.seed, label))
 
 
-def _changes(own: Scene, found: Found) -> None:
+def _changes(own: Scene, found: Found, kind: Kind) -> None:
     """The same scene written in another way, a different one for each seed."""
-    label, change = list(CHANGES.items())[own.seed % len(CHANGES)]
-    other = drawn(own.seed, scene(own.seed, change))  # the same design: variables have the unit of the forces
+    label, change = list(kind.changes.items())[own.seed % len(kind.changes)]
+    if not kind.covariant(own.document, change):
+        return
+    document = kind.scene(own.seed, change)
+    if not document["objectives"]:
+        return
+    other = drawn(own.seed, document)  # the same design: variables have the unit of the forces
     alpha, values = other.parts(other.x)
     again = mdstopo.evaluate(other.case, alpha, variables=values, gradient=False)
     if not again.status.ok:
         found.changes.append((np.inf, own.seed, f"{label}: {again.status.name}"))
         return
-    for name, keys in own.document["objectives"].items():
+    for name in document["objectives"]:
+        keys = own.document["objectives"][name]
         response = keys["response"]
-        forceful = response == "energy" or bool({"member_force", "joint_force"} & set(response))
+        forceful = response == "energy" or bool({"member_force", "joint_force", "joint_moment"} & set(response))
         factor = change.force if forceful else 1.0
         error = abs(again.objectives[name] / factor - own.result.objectives[name]) / own.sizes[name]
         found.changes.append((error / TOLERANCE, own.seed, f"{label}: {keys['over_time']} of {response}"))
 
 
-def bars(found: Found, scenes: int) -> Table:
+def bars(found: Found, scenes: int, kind: Kind = PLANAR) -> Table:
     """What is promised, and what was found."""
     rows = []
 
@@ -197,7 +220,7 @@ def bars(found: Found, scenes: int) -> Table:
     bar("estimates below a hundredth of the error", low, 100.0, 0.0)
     statuses = ", ".join(f"{name} {count}" for name, count in sorted(found.statuses.items()))
     return Table(
-        f"Hunt: {scenes} random scenes",
+        f"Hunt: {scenes} random scenes{kind.name}",
         ["what", "of", "allowed", "found", "met"],
         rows,
         [

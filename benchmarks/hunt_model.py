@@ -16,7 +16,7 @@ from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
 from benchmarks.hunt_laws import ACTS, Contact, Law
-from benchmarks.hunt_reductions import Look, highest, integral, kinks, length
+from benchmarks.hunt_reductions import AGREE, PANELS, Look, highest, integral, kinks, length
 
 Vector = np.ndarray[Any, np.dtype[np.float64]]
 QUARTER = np.array([[0.0, -1.0], [1.0, 0.0]])
@@ -54,7 +54,7 @@ def stretch(p: Point, q: Point, x: Vector, v: Vector) -> tuple[float, float, Vec
     """Distance of two points, its rate, its Jacobian (n,) and what its second derivative has beside J q''."""
     (a, va, ja, ba), (b, vb, jb, bb) = p.seen(x, v), q.seen(x, v)
     d, rate = b - a, vb - va
-    length = float(np.hypot(*d))
+    length = float(np.linalg.norm(d))
     e = d / length
     along = float(e @ rate)
     return length, along, e @ (jb - ja), float((rate @ rate - along**2) / length + e @ (bb - ba))
@@ -91,24 +91,33 @@ class Model:
 
     def __init__(self, document: dict[str, Any], alpha: Vector, values: dict[str, Vector] | None = None) -> None:
         self.document = document
-        bodies = document["bodies"]
-        self.names = list(bodies)
-        self.n = 3 * len(bodies)
+        self.names = list(document["bodies"])
+        self.end = float(document["time"]["end"])
+        self._bodies(document["bodies"])
+        self.members = self._members(alpha, values or {})
+        self.contacts = list(self._contacts())
+        self._held()
+        self.switching: list[Any] = [law for own in self.members.values() for one in own for law in one.laws]
+        self.switches = any(law.switches for law in self.switching)
+        self.switching += [contact for contact, *_ in self.contacts]
+
+    def _bodies(self, bodies: dict[str, Any]) -> None:
+        """n velocities, n_q coordinates, the state at the start, masses and weights."""
+        self.n = self.n_q = 3 * len(bodies)
         self.mass = np.array([m for b in bodies.values() for m in (b["mass"], b["mass"], b["inertia"])])
         self.q0 = np.array([c for b in bodies.values() for c in (*b["position"], 0.0)])
         self.v0 = np.array([c for b in bodies.values() for c in (*b["velocity"], b["angular_velocity"])])
-        self.end = float(document["time"]["end"])
-        self.weight = self.mass * np.tile([*document["gravity"], 0.0], len(bodies))
-        self.members = self._members(alpha, values or {})
-        self.contacts = list(self._contacts())
-        self.joints = [(joint["name"], joint["type"], *self._joint(joint)) for joint in document.get("joints", [])]
+        self.weight = self.mass * np.tile([*self.document["gravity"], 0.0], len(bodies))
+
+    def _held(self) -> None:
+        """Joints, and accelerations that are given."""
+        rows = self.document.get("joints", [])
+        self.joints = [(joint["name"], joint["type"], *self._joint(joint)) for joint in rows]
         self.driven = {
             3 * self.names.index(motion["body"]) + i: np.array(motion[key]["acceleration"]["table"]).T
-            for motion in document.get("motions", [])
+            for motion in self.document.get("motions", [])
             for i, key in enumerate(("x", "y", "angle"))
         }
-        self.switching: list[Any] = [law for own in self.members.values() for one in own for law in one.laws]
-        self.switching += [contact for contact, *_ in self.contacts]
 
     def _members(self, alpha: Vector, values: dict[str, Vector]) -> dict[str, list[Member]]:
         document, found, first = self.document, dict[str, list[Member]](), 0
@@ -126,7 +135,7 @@ class Model:
                 }
                 each = [Law(keys | given) for keys in laws]
                 ends = self.point(p["body"], a), self.point(q["body"], b)
-                own.append(Member(scale, float(np.hypot(*np.subtract(b, a))), each, *ends))
+                own.append(Member(scale, float(np.linalg.norm(np.subtract(b, a))), each, *ends))
             first += len(own)
         return found
 
@@ -201,43 +210,56 @@ class Model:
 
     def balance(self, t: float, y: Vector) -> tuple[Vector, Vector]:
         """q'' (n,) and the multipliers, in the modes that all is in."""
-        q, v = y[: self.n], y[self.n :]
-        mass, force = np.diag(self.mass), self.weight.copy()
-        for own in self.members.values():
-            for scale, free, laws, a, b in own:
-                length, rate, row, bias = stretch(a, b, q, v)
-                for law in laws:
-                    if law.inertance != 0.0:
-                        mass += scale * law.inertance * np.outer(row, row)
-                    force -= scale * (law.force(length - free, rate, t) + law.inertance * bias) * row
+        q, v = y[: self.n_q], y[self.n_q :]
+        mass, force = self._applied(t, q, v)
+        for (scale, free, laws, _, _), (now, rate, row, bias) in self._stretched(q, v):
+            for law in laws:
+                if law.inertance != 0.0:
+                    mass += scale * law.inertance * np.outer(row, row)
+                force -= scale * (law.force(now - free, rate, t) + law.inertance * bias) * row
         for contact, *where in self.contacts:
             if contact.mode == ACTS:
                 _, depth, rate, slide, axes, jacobian, there = self._touch(where, q, v)
                 force += (axes.T @ contact.force(depth, rate, slide)) @ (jacobian - there)
-        for load in self.document.get("loads", []):
-            force[3 * self.names.index(load["body"]) + 2] += np.interp(t, *np.array(load["moment"]["table"]).T)
         rows, right = self.rows(q, v, t)
         m = len(rows)
         matrix = np.block([[mass, rows.T], [rows, np.zeros((m, m))]])
         found = np.linalg.solve(matrix, np.concatenate([force, right]))
         return found[: self.n], found[self.n :]
 
+    def _stretched(self, q: Vector, v: Vector) -> Iterator[tuple[Member, Any]]:
+        """Every member with its `stretch`."""
+        yield from ((one, stretch(one.a, one.b, q, v)) for own in self.members.values() for one in own)
+
+    def _applied(self, t: float, q: Vector, v: Vector) -> tuple[Vector, Vector]:
+        """The matrix of mass (n, n), and what acts beside members, contacts and joints (n,)."""
+        force = self.weight.copy()
+        for load in self.document.get("loads", []):
+            force[3 * self.names.index(load["body"]) + 2] += np.interp(t, *np.array(load["moment"]["table"]).T)
+        return np.diag(self.mass), force
+
+    def _moved(self, q: Vector, v: Vector) -> Vector:
+        """q' (n_q,)."""
+        return v
+
+    def _given(self) -> list[Vector]:
+        """Times of the tables of motions and loads."""
+        tables = [table[0] for table in self.driven.values()]
+        return tables + [np.array(load["moment"]["table"])[:, 0] for load in self.document.get("loads", [])]
+
     def breaks(self) -> list[float]:
         """Times at which something given has a kink."""
-        tables = [table[0] for table in self.driven.values()]
-        tables += [np.array(load["moment"]["table"])[:, 0] for load in self.document.get("loads", [])]
+        tables = self._given()
         laws = [law for own in self.members.values() for law in own[0].laws]
         tables += [np.array(law.keys["table"])[:, 0] for law in laws if law.kind == "table"]
         return sorted({0.0, self.end, *(float(t) for table in tables for t in table if 0.0 < t < self.end)})
 
     def _seen(self, y: Vector) -> Iterator[tuple[Any, tuple[float, ...]]]:
         """All that switches, with what it switches by."""
-        q, v = y[: self.n], y[self.n :]
-        for own in self.members.values():
-            for one in own:
-                if any(law.switches for law in one.laws):
-                    length, rate, _, _ = stretch(one.a, one.b, q, v)
-                    yield from ((law, (length - one.free, rate)) for law in one.laws if law.switches)
+        q, v = y[: self.n_q], y[self.n_q :]
+        if self.switches:
+            for one, (now, rate, _, _) in self._stretched(q, v):
+                yield from ((law, (now - one.free, rate)) for law in one.laws if law.switches)
         for contact, *where in self.contacts:
             yield contact, self._touch(where, q, v)[:3]
 
@@ -252,6 +274,7 @@ class Model:
         self.pieces: list[Piece] = []
         switched = 0
         for high in self.breaks()[1:]:
+            self.span = t, high
             while t < high:
                 steps, who = self._steps(t, y, high)
                 self.pieces.append(Piece(t, steps[-1].t, steps, self._modes()))
@@ -266,8 +289,8 @@ class Model:
     def _steps(self, t: float, y: Vector, high: float) -> tuple[list[Any], int]:
         """Steps from a state to a time, or to where a margin is used up: that of number so much, else -1."""
         solver = DOP853(
-            lambda t, y: np.concatenate([y[self.n :], self.balance(t, y)[0]]), t, y, high, rtol=RTOL, atol=ATOL,
-            max_step=self.end / STEPS,
+            lambda t, y: np.concatenate([self._moved(y[: self.n_q], y[self.n_q :]), self.balance(t, y)[0]]),
+            t, y, high, rtol=RTOL, atol=ATOL, max_step=self.end / STEPS,
         )  # fmt: skip
         steps: list[Any] = []
         before = self._margins(y)
@@ -307,21 +330,33 @@ class Model:
 
     def _restore(self, piece: Piece) -> None:
         """Put all into the modes of a piece."""
+        self.span = piece.low, piece.high
         for each, (mode, growth) in zip(self.switching, piece.modes, strict=True):
             each.mode, each.growth = mode, growth
 
     def look(self, response: Any, t: float, y: Vector) -> Vector:
         """The components of a response at a time and state, in the modes that all is in."""
-        q, v = y[: self.n], y[self.n :]
+        q, v = y[: self.n_q], y[self.n_q :]
         if response == "energy":
             stored = [
-                one.scale * law.energy(stretch(one.a, one.b, q, v)[0] - one.free)
-                for own in self.members.values()
-                for one in own
-                for law in one.laws
+                one.scale * law.energy(now - one.free) for one, (now, *_) in self._stretched(q, v) for law in one.laws
             ]
             return np.array([sum(stored)])
         ((kind, keys),) = response.items()
+        if kind == "member_force":
+            acceleration, _ = self.balance(t, y)
+            forces = []
+            for scale, free, laws, p, end in self.members[keys["group"]]:
+                length, rate, row, bias = stretch(p, end, q, v)
+                inertial = row @ acceleration + bias
+                total = sum(law.force(length - free, rate, t) + law.inertance * inertial for law in laws)
+                forces.append(scale * float(total))
+            return np.array(forces)
+        return self._motion(kind, keys, t, y)
+
+    def _motion(self, kind: str, keys: dict[str, Any], t: float, y: Vector) -> Vector:
+        """The components of a response of bodies and joints."""
+        q, v = y[: self.n_q], y[self.n_q :]
         if kind in ("displacement", "velocity"):
             x, u, _, _ = (point := self.point(keys["body"], keys["at"])).seen(q, v)
             return x - point.fixed if kind == "displacement" else u
@@ -332,14 +367,6 @@ class Model:
         if kind == "acceleration":
             _, _, jacobian, extra = self.point(keys["body"], keys["at"]).seen(q, v)
             return np.asarray(jacobian @ acceleration + extra)
-        if kind == "member_force":
-            forces = []
-            for scale, free, laws, p, end in self.members[keys["group"]]:
-                length, rate, row, bias = stretch(p, end, q, v)
-                inertial = row @ acceleration + bias
-                total = sum(law.force(length - free, rate, t) + law.inertance * inertial for law in laws)
-                forces.append(scale * float(total))
-            return np.array(forces)
         first = 0
         for name, kind_of, *_ in self.joints:
             count = 1 if kind_of == "distance" else 2
@@ -348,10 +375,18 @@ class Model:
             first += count
         raise KeyError(kind)
 
+    def _panels(self, piece: Piece) -> tuple[float, int]:
+        """How well panels of an integral are to agree with their halves, and into how many a piece is divided."""
+        return AGREE, PANELS
+
+    def _signed(self, response: Any) -> bool:
+        """Whether a response is a number with a sign, and no length."""
+        return isinstance(response, dict) and ("angle" in response or "angular_velocity" in response)
+
     def objective(self, response: Any, over_time: str) -> tuple[float, float]:
         """The value, and the largest size that the response has at the places looked at."""
         led = isinstance(response, dict) and "member_force" in response
-        signed = isinstance(response, dict) and ("angle" in response or "angular_velocity" in response)
+        signed = self._signed(response)
         power = 2 if over_time == "rms" else 1
         size = total = value = 0.0
         best: list[float] = []
@@ -379,7 +414,7 @@ class Model:
                 signs = {"max": (1.0,), "min": (-1.0,), "max_abs": (1.0, -1.0)}[over_time]
                 best += [highest(g, every, values, sign) for sign in signs]
             else:
-                total += integral(lambda t, g=g: g(t) ** power, [piece.low, *cuts, piece.high])  # type: ignore[misc]
+                total += integral(lambda t, g=g: g(t) ** power, [piece.low, *cuts, piece.high], *self._panels(piece))  # type: ignore[misc]
         if over_time == "final":
             return value, size
         if best:

@@ -133,7 +133,7 @@ def highest(f: Callable[[float], float], grid: Vector, seen: Vector, sign: float
     return best
 
 
-def integral(f: Callable[[float], float], edges: list[float]) -> float:
+def integral(f: Callable[[float], float], edges: list[float], agree: float = AGREE, panels: int = PANELS) -> float:
     """Between edges, by Gauss-Legendre panels that are halved where they do not agree with their halves."""
     nodes, weights = np.polynomial.legendre.leggauss(NODES)
 
@@ -141,7 +141,7 @@ def integral(f: Callable[[float], float], edges: list[float]) -> float:
         middle, half = 0.5 * (a + b), 0.5 * (b - a)
         return half * float(sum(w * f(middle + half * x) for x, w in zip(nodes, weights, strict=True)))
 
-    cuts = [t for a, b in pairwise(edges) for t in np.linspace(a, b, PANELS + 1)[:-1].tolist()] + [edges[-1]]
+    cuts = [t for a, b in pairwise(edges) for t in np.linspace(a, b, panels + 1)[:-1].tolist()] + [edges[-1]]
     left = [(a, b, panel(a, b), 0) for a, b in pairwise(cuts)]
     whole = sum(abs(value) for _, _, value, _ in left)
     total = 0.0
@@ -149,7 +149,7 @@ def integral(f: Callable[[float], float], edges: list[float]) -> float:
         a, b, value, depth = left.pop()
         middle = 0.5 * (a + b)
         one, two = panel(a, middle), panel(middle, b)
-        if abs(one + two - value) <= AGREE * max(whole, SMALLEST) or depth == DEPTH or b - a <= 1e-13:
+        if abs(one + two - value) <= agree * max(whole, SMALLEST) or depth == DEPTH or b - a <= 1e-13:
             total += one + two
         else:
             left += [(a, middle, one, depth + 1), (middle, b, two, depth + 1)]

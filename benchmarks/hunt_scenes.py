@@ -101,7 +101,7 @@ def scene(seed: int, change: Change = Change()) -> dict[str, Any]:
     if more.rng.random() < 0.25:
         _legs(document, names, places, more, change)
     if more.rng.random() < 0.4:
-        _variables(document, more, change)
+        vary_parameters(document, more, change)
     _objectives(document, names, places, rng, draw, change)
     return document
 
@@ -168,7 +168,7 @@ def _legs(document: dict[str, Any], names: list[str], places: Any, draw: Source,
     document["members"][change.prefix + "legs"] = {"from": way_from, "to": way_to, "connect": "pairs", "law": law}
 
 
-def _variables(document: dict[str, Any], draw: Source, change: Change) -> None:
+def vary_parameters(document: dict[str, Any], draw: Source, change: Change) -> None:
     """Parameters of laws that are design variables, at the values that the laws have."""
     groups = [name for name, group in document["members"].items() if isinstance(group["law"], dict)]
     found: dict[str, Any] = {}
@@ -220,7 +220,7 @@ def _held(document: dict[str, Any], names: list[str], places: Any, rng: Any, dra
         document["motions"] = [{"body": change.name(names[0]), **dict(zip(("x", "y", "angle"), tables, strict=True))}]
 
 
-def _law(kind: str, draw: Any, force: float) -> Any:
+def random_law(kind: str, draw: Any, force: float) -> Any:
     """A law of the format; force: the unit."""
     k, c, f = force * draw(20.0, 120.0), force * draw(0.5, 4.0), force * draw(3.0, 12.0)
     gap, side, free = draw(0.01, 0.1), "tension" if draw(0.0, 1.0) < 0.5 else "compression", draw(0.1, 0.7)
@@ -271,7 +271,7 @@ def _groups(document: dict[str, Any], names: list[str], places: Any, rng: Any, d
         points = document.setdefault("points", {})
         points[f"p{i}"], points[f"q{i}"] = first, second
         way_from, way_to = (f"q{i}", f"p{i}") if change.swap else (f"p{i}", f"q{i}")
-        law = _law(kind, draw, change.force)
+        law = random_law(kind, draw, change.force)
         document["members"][change.prefix + f"g{i}"] = {"from": way_from, "to": way_to, "connect": "pairs", "law": law}
     document["design"] = {"initial": 0.7, "lower": 0.01, "power": 1.5 if rng.random() < 0.3 else 1}
 
