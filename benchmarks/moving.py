@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.scenes import CASES
 from mdstopo import load_case, optimize, simulate
-from mdstopo.plots.scenery import PRESENT, ends_at, outline, sizes, start_state
+from mdstopo.plots.scenery import PRESENT, ends_at, hull, points_of, sizes, start_state
 from mdstopo.plots.style import COLOURS
 from mdstopo.scene.points import points_at
 
@@ -36,7 +36,7 @@ def draw_moving(path: Path) -> None:
     times = np.linspace(motion.t[0], motion.t[-1], FRAMES)
     states = motion.at(times).q
     kept = sizes(group, result.alpha) > PRESENT
-    bodies = [(body.name, outline(case, body.name)) for body in case.bodies]
+    bodies = [(body.name, hull(points_of(case, body.name))) for body in case.bodies]
     colours = {name: COLOURS[(k + 2) % len(COLOURS)] for k, (name, _) in enumerate(bodies)}
     slower = SLOW / float(times[-1] - times[0])
 

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 from mdstopo.case.definitions import Definitions
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
-from mdstopo.case.mesh_files import MeshFile
+from mdstopo.case.mesh_files import MeshFaces, MeshFile
 from mdstopo.case.not_yet import NotYet, NotYetAs
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.schema_case import FORMAT
 from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
+from mdstopo.case.svg_path import SvgPath
 
 #: sections of a case in space that have a table on its page
 IN_SPACE = ("bodies", "joints", "motions", "points", "contacts", "loads", "objectives")
@@ -222,8 +223,8 @@ def _simple(kind: Kind) -> str:
         return "nothing yet"
     texts: dict[type, str] = {
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
-        MeshFile: "path of an STL or OBJ file", Anything: "any value",
-        Definitions: "`{name: number or expression, ...}`",
+        MeshFile: "path of an STL or OBJ file", MeshFaces: "path of an STL or OBJ file", Anything: "any value",
+        Definitions: "`{name: number or expression, ...}`", SvgPath: "text of a path",
     }  # fmt: skip
     return texts[type(kind)]
 

@@ -20,11 +20,30 @@ from mdstopo.case.value import Value, frozen
 
 
 @frozen
+class Outline(Value):
+    """What pictures show of a body; nothing else looks at it.
+
+    shape: the word of the case. corners (n, 2), in space (n, 3): in body coordinates. faces: numbers of corners; in the
+    plane each is a closed line, and what lies within two of them is a hole; in space each is a flat piece of the
+    surface, counterclockwise seen from outside. edges: pairs of corners that are drawn, in space.
+    """
+
+    shape: str
+    corners: FloatArray
+    faces: tuple[tuple[int, ...], ...]
+    edges: tuple[tuple[int, ...], ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "corners", read_only(self.corners))
+
+
+@frozen
 class Body(Value):
     """A rigid body at the start.
 
     mass in kg, inertia about the centre of mass in kg m^2, position of the centre of mass in m, angle in rad.
     stated: those of ``angle``, ``velocity``, ``angular_velocity`` that the file gives (others are defaults).
+    outline: what pictures show of it; empty where the file says nothing of it.
     """
 
     name: str
@@ -35,6 +54,7 @@ class Body(Value):
     velocity: Pair = (0.0, 0.0)
     angular_velocity: float = 0.0
     stated: frozenset[str] = frozenset()
+    outline: tuple[Outline, ...] = ()
 
 
 @frozen
@@ -45,6 +65,7 @@ class SpatialBody(Value):
     centre of mass in m; rotation (3, 3): its columns are the body axes in global coordinates; velocity in m/s and
     angular_velocity in rad/s, global components.
     stated: those of ``orientation``, ``velocity``, ``angular_velocity`` that the file gives (others are defaults).
+    outline: what pictures show of it; empty where the file says nothing of it.
     """
 
     name: str
@@ -55,6 +76,7 @@ class SpatialBody(Value):
     velocity: Triple = (0.0, 0.0, 0.0)
     angular_velocity: Triple = (0.0, 0.0, 0.0)
     stated: frozenset[str] = frozenset()
+    outline: tuple[Outline, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("inertia", "rotation"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints import JOINTS
 from mdstopo.case.loading import largest, scaled
 from mdstopo.case.model import GROUND, Body, Load, Pair
+from mdstopo.case.outlines import PLANAR, build_outlines
 from mdstopo.case.point_grids import grid_count, grid_points
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.responses import RESPONSES
@@ -52,7 +54,7 @@ def _build_body(name: str, fields: Any, path: str, angle: float | None, reading:
         good &= in_range(np.array(fields[key]), inside(path, key), reading)
     if not good:
         return None
-    return Body(
+    body = Body(
         name,
         mass,
         inertia,
@@ -62,6 +64,8 @@ def _build_body(name: str, fields: Any, path: str, angle: float | None, reading:
         fields["angular_velocity"],
         fields.stated & {"angle", "velocity", "angular_velocity"},
     )
+    outline = build_outlines(fields, body, PLANAR, _to_local, reading)
+    return None if outline is None else replace(body, outline=outline)
 
 
 def _build_load(fields: Fields, body: Body, at: Any, reading: Reading) -> Load | None:

@@ -14,7 +14,8 @@ from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
-from mdstopo.case.schema_scene import BODY, FRAME, GROUP
+from mdstopo.case.schema_frame import FRAME
+from mdstopo.case.schema_scene import BODY, GROUP
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import inside, shown

@@ -5,7 +5,8 @@ from __future__ import annotations
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import NOT_NEGATIVE, POSITIVE, Name, Ref
 from mdstopo.case.records import Key, Record
-from mdstopo.case.schema_scene import BODY, FRAME
+from mdstopo.case.schema_frame import FRAME
+from mdstopo.case.schema_scene import BODY
 
 EDGE = Record(
     "an edge",

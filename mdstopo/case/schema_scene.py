@@ -24,15 +24,10 @@ from mdstopo.case.laws import LAWS, enter_law
 from mdstopo.case.laws.law import record_of as record_of_law
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByShape, Key, ListOf, Record, Tagged, Vector
+from mdstopo.case.schema_frame import FRAME, FRAMES
+from mdstopo.case.schema_outline import OUTLINE
 
 COUNT = Number(minimum=1, whole=True)
-FRAMES = explained(
-    {
-        "global": "global coordinates in the configuration at the start",
-        "body": "the body's own coordinates: from its centre of mass, along axes that turn with it",
-    }
-)
-FRAME = Key("frame", FRAMES, "what the coordinates beside it are measured in", default="global")
 BODY = Ref("body")
 GROUP = Ref("member group")
 
@@ -54,6 +49,7 @@ BODY_KEYS = Record(
         Key("angle", NUMBER, "rotation at the start, counter-clockwise", default=0.0, unit="rad"),
         Key("velocity", PAIR, "of the centre of mass at the start, [vx, vy]", default=(0.0, 0.0), unit="m/s"),
         Key("angular_velocity", ScalarInPlane(), "at the start, counter-clockwise", default=0.0, unit="rad/s"),
+        OUTLINE,
     ),
     doc="A rigid body at the start. The fixed body `ground` is there without being declared.",
     elsewhere=(("orientation", f"in the plane it is `angle`; {IN_SPACE}"),),

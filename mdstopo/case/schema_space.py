@@ -15,13 +15,13 @@ from mdstopo.case.records import ByDepth, ByShape, Key, ListOf, Named, Record, T
 from mdstopo.case.responses import key_of
 from mdstopo.case.schema_case import CONSTRAINT, FORMAT, OBJECTIVE, SOLVER
 from mdstopo.case.schema_contact import CONTACT
+from mdstopo.case.schema_frame import FRAME, FRAMES
+from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
 from mdstopo.case.schema_scene import (
     BODY,
     BUSHING,
     COORDINATE,
     COUNT,
-    FRAME,
-    FRAMES,
     GROUP_KEYS,
     LOAD,
     LOAD_CASE,
@@ -95,6 +95,7 @@ BODY_KEYS = Record(
         ),
         Key("velocity", TRIPLE, "of the centre of mass at the start, [vx, vy, vz]", default=ZERO, unit="m/s"),
         Key("angular_velocity", TRIPLE, "at the start, global components", default=ZERO, unit="rad/s"),
+        OUTLINE_IN_SPACE,
     ),
     doc="A rigid body at the start. The fixed body `ground` is there without being declared.",
     elsewhere=(("angle", "in space it is `orientation`"),),

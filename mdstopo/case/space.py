@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,11 +13,13 @@ from mdstopo.case.geometry import Geometry
 from mdstopo.case.joints.spatial import SPATIAL_JOINTS
 from mdstopo.case.loading import largest, scaled
 from mdstopo.case.model import GROUND, Load, SpatialBody
+from mdstopo.case.outlines import build_outlines
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.rotations import about_axis, of_quaternion, orthonormal
 from mdstopo.case.schema_space import SPACE_FORMAT, ZERO
 from mdstopo.case.signals import combined
 from mdstopo.case.spatial_grids import check_grid, grid_count, grid_points
+from mdstopo.case.spatial_outlines import SPATIAL
 from mdstopo.case.spatial_responses import SPATIAL_RESPONSES
 from mdstopo.case.start_geometry import in_range
 from mdstopo.case.surfaces import surface_contact
@@ -60,7 +63,9 @@ def _build_body(name: str, fields: Any, path: str, angle: float | None, reading:
         return None
     stated = fields.stated & {"orientation", "velocity", "angular_velocity"}
     velocity, turn = fields["velocity"], fields["angular_velocity"]
-    return SpatialBody(name, mass, inertia, fields["position"], rotation, velocity, turn, stated)
+    body = SpatialBody(name, mass, inertia, fields["position"], rotation, velocity, turn, stated)
+    outline = build_outlines(fields, body, SPATIAL, _to_local, reading)
+    return None if outline is None else replace(body, outline=outline)
 
 
 def _computable(value: float, path: str, reading: Reading) -> bool:

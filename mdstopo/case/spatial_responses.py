@@ -11,7 +11,7 @@ from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
 from mdstopo.case.responses import OF_BODY, RELATIVE, RESPONSES, ResponseKind, sees_itself
 from mdstopo.case.rotations import unit
-from mdstopo.case.schema_scene import FRAME
+from mdstopo.case.schema_frame import FRAME
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside
 

@@ -150,10 +150,20 @@ class _Lift:
                 new[key] = self.normal(value)
             elif key == "angle":
                 turns = [{"axis": [0, 0, 1], "angle": value}]
+            elif key == "outline":
+                new[key] = self.outline(name)
             else:
                 new[key] = value
         turns += [self.turn] if self.is_tilted else []
         return {**new, "orientation": turns} if turns else new
+
+    def outline(self, body: str) -> list[Plain]:
+        """The same areas, flat: a circle is the polygon that is drawn of it, a path one for each of its lines."""
+        return [
+            {"polygon": [[x, y, 0] for x, y in each.corners[list(face)].tolist()], "frame": "body"}
+            for each in self.case.body(body).outline
+            for face in each.faces
+        ]
 
     def joint(self, old: Plain, path: str) -> Plain:
         """A pin turns about the normal; a weld on ground is where the plane has it."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.case.units import unit_of_value
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS, new_figure
+from mdstopo.plots.style import colour, new_figure
 from mdstopo.store.store_errors import StoreError
 
 
@@ -22,7 +22,7 @@ def draw(module: Any, source: Source) -> Any:
         panels.append(("U", np.asarray(columns["combined"], dtype=np.float64)))
     figure, axes = new_figure(module, len(panels))
     for k, (axis, (label, series)) in enumerate(zip(axes, panels, strict=True)):
-        axis.plot(np.arange(len(series)), series, color=COLOURS[k % len(COLOURS)], marker=".", markersize=2)
+        axis.plot(np.arange(len(series)), series, color=colour(k), marker=".", markersize=2)
         positive = series[np.isfinite(series)]
         if len(positive) and positive.min() > 0.0 and positive.max() > 20.0 * positive.min():
             axis.set_yscale("log")

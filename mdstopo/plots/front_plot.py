@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.case.units import unit_of_value
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS, WIDTH
+from mdstopo.plots.style import WIDTH, colour, ink
 from mdstopo.store.store_errors import StoreError
 from mdstopo.store.whole_front import whole_front
 
@@ -34,20 +34,20 @@ def draw(module: Any, source: Source, visited: bool = True, marked: int | None =
         if visited:
             seen = [np.asarray(a, dtype=np.float64) for a in source.view.under("pareto/visited").values()]
             cloud = np.concatenate(seen) if seen else np.zeros((0, m))
-            axis.plot(cloud[:, i], cloud[:, j], ".", color="#BBBBBB", markersize=1.5, label="visited", zorder=1)
+            axis.plot(cloud[:, i], cloud[:, j], ".", color=ink("faint"), markersize=1.5, label="visited", zorder=1)
         if np.any(dominated):
-            axis.plot(*points[dominated][:, [i, j]].T, "x", color=COLOURS[1], markersize=4, label="dominated")
+            axis.plot(*points[dominated][:, [i, j]].T, "x", color=colour(1), markersize=4, label="dominated")
         order = np.argsort(good[:, i])
-        axis.plot(*good[order][:, [i, j]].T, "o-" if m == 2 else "o", color=COLOURS[0], linewidth=0.6, label="front")
+        axis.plot(*good[order][:, [i, j]].T, "o-" if m == 2 else "o", color=colour(0), linewidth=0.6, label="front")
         further = asked + np.flatnonzero(~dominated[asked:])
         if len(further):
-            axis.plot(*points[further][:, [i, j]].T, "s", color=COLOURS[2], markersize=4, label="visited, on the front")
+            axis.plot(*points[further][:, [i, j]].T, "s", color=colour(2), markersize=4, label="visited, on the front")
         if len(points) <= MOST_NUMBERED:
             for number in np.flatnonzero(~dominated & np.isfinite(points).all(axis=1)).tolist():
                 place = tuple(points[number, [i, j]])
                 axis.annotate(str(number), place, xytext=(3, 3), textcoords="offset points", fontsize="small")
         if marked is not None:
-            axis.plot(*points[marked, [i, j]], "o", color="black", fillstyle="none", markersize=9, label="marked")
+            axis.plot(*points[marked, [i, j]], "o", color=ink(), fillstyle="none", markersize=9, label="marked")
         for k, limits in ((i, axis.set_xlim), (j, axis.set_ylim)):
             room = 0.12 * max(float(high[k] - low[k]), 1e-12 * abs(float(high[k])))
             limits(low[k] - room, high[k] + 2.0 * room)

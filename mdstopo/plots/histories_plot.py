@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.case.units import unit_of, words
 from mdstopo.plots.source import SAMPLES, Floats, Source
-from mdstopo.plots.style import COLOURS, DASHES, new_figure
+from mdstopo.plots.style import DASHES, colour, new_figure
 from mdstopo.plots.watch import response_history
 from mdstopo.store.store_errors import StoreError
 
@@ -29,7 +29,7 @@ def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
     figure, axes = new_figure(module, len(chosen))
     for k, (axis, objective) in enumerate(zip(axes, chosen, strict=True)):
         t, g = times[objective.load_case], series[objective.name]
-        axis.plot(t, g, color=COLOURS[k % len(COLOURS)])
+        axis.plot(t, g, color=colour(k))
         axis.set_ylabel(f"{objective.name}, {unit_of(objective.response)}")
         where = "" if len(source.load_cases) == 1 else f", load case {objective.load_case}"
         axis.set_title(words(objective.response) + where, loc="left")
@@ -54,7 +54,7 @@ def draw_sensitivities(module: Any, source: Source, members: int = 8) -> Any:
         if t is None or len(t) != len(array):
             raise StoreError(f"{source.view.path}: the times of the sensitivities of {name} are missing")
         for i in range(min(members, array.shape[1])):
-            axis.plot(t, array[:, i], linestyle=DASHES[i % len(DASHES)], color=COLOURS[i % len(COLOURS)], label=f"{i}")
+            axis.plot(t, array[:, i], linestyle=DASHES[i % len(DASHES)], color=colour(i), label=f"{i}")
         axis.set_ylabel(f"d{name}/dalpha, {unit_of(objective.response)}")
         axis.set_title(f"{method}, members", loc="left")
         axis.legend(ncols=4)

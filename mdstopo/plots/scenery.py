@@ -1,4 +1,6 @@
-"""Bodies and members: outlines from the points that stand on bodies, places of ends at any time."""
+"""Bodies and members: the points that stand on bodies, places of ends at any time."""
+
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,21 +26,22 @@ def sizes(group: MemberGroup, alpha: Floats) -> Floats:
     return np.clip(share, 0.0, 1.0)
 
 
-def outline(case: Case, body: str) -> Floats:
-    """(K, 2) corners of the convex hull of a body's points and its centre of mass, in body coordinates."""
-    points = points_of(case, body)
-    return hull(points) if len(points) else points
-
-
 def points_of(case: Case, body: str) -> Floats:
     """(K, d) a body's points and its centre of mass, in body coordinates; of ground its points only."""
-    pieces = [np.zeros((1 if body != GROUND else 0, case.dimension))]
+    middle = np.zeros((1 if body != GROUND else 0, case.dimension))
+    return np.concatenate([middle, own_points(case, body)])
+
+
+def own_points(case: Case, body: str) -> Floats:
+    """(K, d) a body's points, in body coordinates: of grids, of members, joints, bushings, loads and contacts."""
+    pieces = [np.zeros((0, case.dimension))]
     pieces += [grid.local for grid in case.points.values() if grid.body == body]
     for group in case.members:
         pieces += [group.from_local] if group.body_from == body else []
         pieces += [group.to_local] if group.body_to == body else []
-    for joint in case.joints:
-        ends = zip(joint.bodies, (joint.at_first, joint.at_second), strict=True)
+    ties: list[Any] = [*case.joints, *case.bushings]
+    for tie in ties:
+        ends = zip(tie.bodies, (tie.at_first, tie.at_second), strict=True)
         pieces += [np.array([at]) for name, at in ends if name == body]
     pieces += [contact.points for contact in case.contacts if contact.body == body]
     return np.concatenate(pieces)

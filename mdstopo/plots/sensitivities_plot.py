@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS, DASHES, MARKERS, new_figure
+from mdstopo.plots.style import DASHES, MARKERS, colour, new_figure
 from mdstopo.store.store_errors import StoreError
 
 
@@ -27,7 +27,7 @@ def draw(module: Any, source: Source, members: int | None = None) -> Any:
             values = (values / max(np.abs(values).max(), 1e-300))[: members or len(values)]
             few = len(values) <= 120
             axis.plot(
-                np.arange(len(values)), values, linestyle=DASHES[k % len(DASHES)] if few else "none", color=COLOURS[k],
+                np.arange(len(values)), values, linestyle=DASHES[k % len(DASHES)] if few else "none", color=colour(k),
                 marker=MARKERS[k] if few else ".", markersize=(4.5 - k if few else 1.5), fillstyle="none",
                 linewidth=0.7, label=method.replace("_", " "),
             )  # fmt: skip

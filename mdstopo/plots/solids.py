@@ -1,12 +1,14 @@
 """Bodies in space: what is drawn of them from the points that stand on them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from mdstopo.case.model import GROUND, Case
-from mdstopo.plots.scenery import Floats, hull, points_of
+from mdstopo.plots.scenery import Floats, hull, own_points, start_state
+from mdstopo.plots.shapes import BORDER, line_shape, others
+from mdstopo.scene.points import points_at
 from mdstopo.scene.quaternions import principal
 
 #: of the size of a cloud of points: what is thinner is flat, or a line, or a point
@@ -17,29 +19,76 @@ FLAT = 1e-9
 
 @dataclass(frozen=True)
 class Solid:
-    """A convex body: corners (n, 3) in body coordinates, faces and edges by numbers of corners.
+    """A body: corners (n, 3) in body coordinates, faces and edges by numbers of corners.
 
-    faces: corners in order, counterclockwise seen from outside; one where the body is flat, none where it is a line.
+    faces: corners in order, counterclockwise seen from outside; one where the body is flat, none where it is lines.
+    convex: whether it is the hull of its corners.
     """
 
     corners: Floats
     faces: tuple[tuple[int, ...], ...] = ()
     edges: tuple[tuple[int, int], ...] = ()
+    convex: bool = True
 
 
 def solid(case: Case, body: str) -> Solid:
-    """The convex hull of a body's points and its centre of mass; where these are one point, the box of equal inertia.
+    """What is drawn of a body: its outlines; else the convex hull of its points, where nothing of others lies in it.
 
-    Of ground only what is flat is drawn: the hull of posts around a scene would hide it.
+    Otherwise lines from its centre of mass to its points, or those that its points follow. A body whose only point is
+    its centre of mass, or that has none, is the box of equal inertia. Of ground only what is flat is drawn: the hull of
+    posts around a scene would hide it.
     """
-    points = points_of(case, body)
-    if body != GROUND:
-        found = convex(points)
-        if len(found.corners) == 1:
-            return equal_box(case.body(body).mass, case.body(body).inertia)
+    if body != GROUND and case.body(body).outline:
+        return joined([Solid(each.corners, each.faces, _pairs(each.edges)) for each in case.body(body).outline])
+    points = own_points(case, body)
+    if body == GROUND:
+        found = convex(points) if len(points) else Solid(points)
+        return found if len(found.faces) < 2 else Solid(np.zeros((0, 3)))
+    if not np.any(points):
+        return equal_box(case.body(body).mass, case.body(body).inertia)
+    found = convex(points)
+    if found.faces and not _others_within(case, body, found):
         return found
-    found = convex(points) if len(points) else Solid(points)
-    return found if len(found.faces) < 2 else Solid(np.zeros((0, 3)))
+    return _lines(points, [grid.local for grid in case.points.values() if grid.body == body])
+
+
+def joined(parts: list[Solid]) -> Solid:
+    """Several as one."""
+    if len(parts) == 1:
+        return Solid(parts[0].corners, parts[0].faces, parts[0].edges, convex=False)
+    first = np.cumsum([0, *(len(part.corners) for part in parts)]).tolist()
+    faces = [tuple(n + k for k in face) for n, part in zip(first, parts, strict=False) for face in part.faces]
+    edges = [(n + a, n + b) for n, part in zip(first, parts, strict=False) for a, b in part.edges]
+    return Solid(np.concatenate([part.corners for part in parts]), tuple(faces), tuple(edges), convex=False)
+
+
+def _pairs(edges: tuple[tuple[int, ...], ...]) -> tuple[tuple[int, int], ...]:
+    return tuple((edge[0], edge[1]) for edge in edges)
+
+
+def _others_within(case: Case, body: str, shape: Solid) -> bool:
+    """Whether a point of anything else is inside a hull at the start; on a face is outside."""
+    if len(shape.faces) < 2:
+        return False
+    state = start_state(case)[None]
+    corners = points_at(case, body, shape.corners, state)[0]
+    normals, reach = [], []
+    for face in shape.faces:
+        own = corners[list(face)]
+        way = np.cross(own - own[0], np.roll(own, -1, axis=0) - own[0]).sum(axis=0)
+        normals.append(way / max(float(np.linalg.norm(way)), 1e-300))
+        reach.append(float(normals[-1] @ own[0]))
+    inside = np.array(reach) - BORDER * float(np.ptp(corners, axis=0).max())
+    return any(bool((cloud @ np.array(normals).T < inside).all(axis=1).any()) for cloud in others(case, body))
+
+
+def _lines(points: Floats, grids: list[Floats]) -> Solid:
+    """Lines that grids follow; arms from the centre of mass to other points."""
+    shape = line_shape(points, grids)
+    if not shape.lines and not shape.arms:  # many points that show no shape: the edges of their hull
+        return replace(convex(points), faces=())
+    parts = [Solid(line, (), tuple((k, k + 1) for k in range(len(line) - 1))) for line in (*shape.lines, *shape.arms)]
+    return joined(parts)
 
 
 def convex(points: Floats) -> Solid:

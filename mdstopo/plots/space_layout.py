@@ -1,33 +1,43 @@
 """The system in space: front, top, side, all to one scale, and perspective."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from mdstopo.case.model import GROUND, Case
+from mdstopo.case.model import GROUND, Case, MemberGroup
 from mdstopo.plots.member_lines import draw_members
 from mdstopo.plots.scenery import Floats, ends_at, hull, points_of
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS, WIDTH
+from mdstopo.plots.style import WIDTH, colour, ink
 from mdstopo.plots.surface_lines import surfaces_of
+from mdstopo.plots.symbol_marks import draw_symbols, legend_handles
+from mdstopo.plots.symbols import symbols
+from mdstopo.plots.thickness import Thickness
 from mdstopo.plots.views import View, views
 from mdstopo.scene.points import points_at
 
 #: inches: a page's width, its greatest height; left of a panel, below it, above it, and for the legend
 PAGE, TALL = 2.0 * WIDTH, 9.0
-LEFT, BELOW, ABOVE, LEGEND = 0.55, 0.42, 0.22, 0.3
+LEFT, BELOW, ABOVE, LEGEND = 0.55, 0.42, 0.22, 0.45
+LEGEND_COLUMNS = 6
 #: share of the scene's size that is left free around it; the least of a panel's sides, in the longest one's
 MARGIN, LEAST = 0.07, 0.55
 #: inches: the axes' directions in the corner of the perspective
 ARROW = 0.17
 #: how many times larger than the design a scene may be before what is far off is left out of the view
 FAR = 2.0
-_JOINT, _CONTACT = "#222222", "#8A8A8A"
 _AXES = ("#B22222", "#2E7D32", "#1F4FA3")
 
 
-def draw_space(module: Any, source: Source, panels: list[tuple[float | None, Floats]]) -> Any:
+def draw_space(
+    module: Any,
+    source: Source,
+    panels: list[tuple[float | None, Floats]],
+    thick: Thickness,
+    load_case: str | None = None,
+) -> Any:
     """The four views of each state; one below the other where there are several times, each in a row."""
     case = source.case
     solids = {name: solid(case, name) for name in [*(body.name for body in case.bodies), GROUND]}
@@ -44,14 +54,22 @@ def draw_space(module: Any, source: Source, panels: list[tuple[float | None, Flo
         for name, view in seen.items():
             x, y, width, height = places[k][name]
             axis = figure.add_axes((x / inches[0], y / inches[1], width / inches[0], height / inches[1]))
-            _scene(axis, source, view, q, solids)
             _frame(axis, view, np.array([width, height]) / scale, cloud)
+            _scene(axis, source, view, q, solids)
+            draw_members(axis, source, _ends_seen(case, view, q), thick)
+            draw_symbols(axis, case, symbols(case, load_case, t), q, view.seen)
             words = name if t is None or name != "front" else f"{name}, t = {t:g} s"
             axis.set_title(words, loc="left")
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    title = "width of a line: alpha" if case.n_design else None
-    figure.legend(handles, labels, loc="upper left", ncols=6, title=title, alignment="left", borderaxespad=0.3)
+    handles, labels = legend_handles(figure.axes[0])
+    title = f"width: {thick.what}" if thick.what else None
+    figure.legend(
+        handles, labels, loc="upper left", ncols=LEGEND_COLUMNS, title=title, alignment="left", borderaxespad=0.3
+    )
     return figure
+
+
+def _ends_seen(case: Case, view: View, q: Floats) -> Callable[[MemberGroup], Floats]:
+    return lambda group: view.seen(ends_at(case, group, q))
 
 
 _Places = list[dict[str, tuple[float, float, float, float]]]
@@ -107,34 +125,52 @@ def _scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[str, S
         for k, line in enumerate(surface.lines):
             label = "contact" if number == k == 0 else None
             flat = view.seen(points_at(case, surface.body, line, state)[0])
-            axis.plot(*flat.T, "-", color=_CONTACT, linewidth=0.5, alpha=0.8, zorder=1.4, label=label)
+            axis.plot(*flat.T, "-", color=ink("middle"), linewidth=0.5, alpha=0.8, zorder=1.4, label=label)
     for k, (name, shape) in enumerate(solids.items()):
-        colour = "#555555" if name == GROUND else COLOURS[(k + 2) % len(COLOURS)]
+        own = ink("middle") if name == GROUND else colour(k + 2)
         if len(shape.corners):
-            _outline(axis, view, points_at(case, name, shape.corners, state)[0], shape, colour)
+            _outline(axis, view, points_at(case, name, shape.corners, state)[0], shape, own)
         points = [grid.local for grid in case.points.values() if grid.body == name]
         if points:
-            axis.plot(*view.seen(points_at(case, name, np.concatenate(points), state)[0]).T, ".", color=colour, ms=2)
+            axis.plot(*view.seen(points_at(case, name, np.concatenate(points), state)[0]).T, ".", color=own, ms=2)
         if name != GROUND:
-            axis.plot(*view.seen(q[7 * k : 7 * k + 3]), "+", color=colour, markersize=6, label=name)
-    draw_members(axis, source, lambda group: view.seen(ends_at(case, group, q)))
-    for number, joint in enumerate(case.joints):
-        place = view.seen(points_at(case, joint.bodies[0], np.array([joint.at_first]), state)[0])[0]
-        label = "joint" if number == 0 else None
-        axis.plot(*place, "o", color=_JOINT, ms=4, markerfacecolor="white", markeredgewidth=0.8, label=label)
+            axis.plot(*view.seen(q[7 * k : 7 * k + 3]), "+", color=own, markersize=6, label=name)
 
 
-def _outline(axis: Any, view: View, corners: Floats, shape: Solid, colour: str) -> None:
+def _outline(axis: Any, view: View, corners: Floats, shape: Solid, own: str) -> None:
     """The area that a body covers, its edges, and fainter those behind it."""
+    from matplotlib.collections import LineCollection
+
     flat = view.seen(corners)
-    if len(shape.faces):
+    if len(shape.faces) and shape.convex:
         area = hull(flat)
         if len(area) > 2:
-            axis.fill(*area.T, facecolor=colour, alpha=0.12, linewidth=0)
+            axis.fill(*area.T, facecolor=own, alpha=0.12, linewidth=0)
+    elif len(shape.faces):
+        _faces(axis, view, flat, shape, own)
     front = _in_front(view, corners, shape)
-    for a, b in shape.edges:
-        near = (a, b) in front
-        axis.plot(*flat[[a, b]].T, "-", color=colour, lw=0.8, alpha=1.0 if near else 0.3, zorder=2.5 if near else 1.5)
+    width = 0.8 if shape.faces else 1.6
+    near = [flat[list(edge)] for edge in shape.edges if (min(edge), max(edge)) in front or not shape.faces]
+    far = [flat[list(edge)] for edge in shape.edges if (min(edge), max(edge)) not in front and shape.faces]
+    for lines, alpha, order in ((near, 1.0, 2.1), (far, 0.3, 1.5)):
+        axis.add_collection(
+            LineCollection(lines, colors=own, linewidths=width, alpha=alpha, zorder=order), autolim=False
+        )
+
+
+def _faces(axis: Any, view: View, flat: Floats, shape: Solid, own: str) -> None:
+    """The faces that look to the eye, each as one area without a border."""
+    from matplotlib.collections import PolyCollection
+
+    turn = np.array([_sign(view.across), _sign(view.along)])
+    some = []
+    for face in shape.faces:
+        x, y = (flat[list(face)] * turn).T
+        if len(shape.faces) == 1 or float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > 0.0:
+            some.append(flat[list(face)])
+    axis.add_collection(
+        PolyCollection(some, facecolors=own, alpha=0.14, linewidths=0, antialiaseds=False), autolim=False
+    )
 
 
 def _in_front(view: View, corners: Floats, shape: Solid) -> set[tuple[int, int]]:
@@ -182,7 +218,7 @@ def _corner(axis: Any, view: View, size: Floats, cloud: Floats) -> None:
         spine.set_visible(False)
     inches = float(axis.get_position().width * axis.figure.get_figwidth())
     foot = middle + np.array([-0.42, -0.42]) * wide
-    for k, colour in enumerate(_AXES):
+    for k, own in enumerate(_AXES):
         way = ARROW * wide[0] / inches * np.array([view.across[k], view.along[k]])
-        axis.plot(*np.array([foot, foot + way]).T, "-", color=colour, linewidth=1.2, clip_on=False)
-        axis.text(*(foot + 1.35 * way), "xyz"[k], color=colour, ha="center", va="center", fontsize=8)
+        axis.plot(*np.array([foot, foot + way]).T, "-", color=own, linewidth=1.2, clip_on=False)
+        axis.text(*(foot + 1.35 * way), "xyz"[k], color=own, ha="center", va="center", fontsize=8)

@@ -9,6 +9,8 @@ from mdstopo.store.store_errors import StoreError
 
 #: Okabe and Ito (2008)
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C7A00")
+#: the same, as far from each other, on a dark ground
+ON_DARK = ("#56B4E9", "#FF8C42", "#2EC4A0", "#E29BC4", "#F0B429", "#9AD1F5", "#E6E6E6", "#C9B400")
 #: beside the colours, for print without them
 DASHES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)), (0, (8, 2)), (0, (3, 1)))
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -43,14 +45,46 @@ _SETTINGS: dict[str, Any] = {
 }
 
 
+_PAPER, _INK, _MIDDLE, _FAR = "#16181d", "#e8e8e8", "#9a9a9a", "#3a3d44"
+_DARK: dict[str, Any] = {
+    **dict.fromkeys(("figure.facecolor", "axes.facecolor", "savefig.facecolor"), _PAPER),
+    **dict.fromkeys(("text.color", "axes.labelcolor", "xtick.color", "ytick.color", "axes.edgecolor"), _INK),
+    "grid.color": _FAR,
+}
+
+
+def is_dark() -> bool:
+    """Whether the style that is on draws on a dark ground."""
+    import matplotlib
+
+    return bool(matplotlib.rcParams["figure.facecolor"] == _PAPER)
+
+
+def colour(number: int) -> str:
+    """The colour of a group, a body or a curve, on the ground that is drawn on."""
+    chosen = ON_DARK if is_dark() else COLOURS
+    return chosen[number % len(chosen)]
+
+
+def ink(strength: str = "full") -> str:
+    """The colour of what is neither a group nor a body: full, middle or faint."""
+    light = {"full": "#222222", "middle": "#6A6A6A", "faint": "#BBBBBB"}
+    return {"full": _INK, "middle": _MIDDLE, "faint": "#5a5d64"}[strength] if is_dark() else light[strength]
+
+
+def paper() -> str:
+    """The colour of the ground."""
+    return _PAPER if is_dark() else "#FFFFFF"
+
+
 @contextmanager
-def styled() -> Iterator[Any]:
+def styled(dark: bool = False) -> Iterator[Any]:
     """Matplotlib's figure module, with the style on. Raises StoreError where matplotlib is not installed."""
     try:
         import matplotlib
     except ImportError as error:
         raise StoreError("pictures need matplotlib: pip install 'mdstopo[plot]'") from error
-    settings: Any = _SETTINGS
+    settings: Any = _SETTINGS | (_DARK if dark else {})
     with matplotlib.rc_context(settings):
         from matplotlib import figure
 

@@ -8,25 +8,28 @@ from scipy.interpolate import CubicHermiteSpline
 
 from mdstopo._version import __version__
 from mdstopo.case.model import GROUND, Case
-from mdstopo.plots.scenery import Floats, ends_at, points_of, sizes, start_state
-from mdstopo.plots.solids import Solid, convex, solid
+from mdstopo.plots.scenery import Floats, ends_at, start_state
+from mdstopo.plots.shapes import planar_shapes
+from mdstopo.plots.solids import Solid, convex, joined, solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import COLOURS
 from mdstopo.plots.surface_lines import surfaces_of
+from mdstopo.plots.thickness import FAINT, families, strongest, thickness
+from mdstopo.plots.triangles import triangles
 from mdstopo.plots.views import upright
 from mdstopo.report.gltf_file import INDICES, LINES, POINTS, TRIANGLES, VERTICES, GltfFile
 from mdstopo.scene.quaternions import product, quaternions_of
 
-#: members that are drawn, the thickest first; share of the range of alpha below which none is
-MOST, FAINT = 1000, 0.02
+#: members that are drawn, the thickest first
+MOST = 1000
 #: between two frames no body turns by more (rad); frames of an animation, at least and at most
 TURN, FEWEST, LONGEST = 0.2, 121, 4001
 #: up to how much turn within a step of the integrator (rad) its ends are enough to know what is between them
 SMOOTH = 0.8
 #: shares of the scene's size: radius of the thickest member, of the thinnest, and of joints
 THICK, THIN, JOINT = 0.006, 0.001, 0.012
-#: sides of a member's tube
-SIDES = 8
+#: sides of a member's tube; corners up to which faces are cut from one corner
+SIDES, FAN = 8, 4
 _UP = np.array([0.0, 1.0, 0.0])
 _NEUTRAL, _CONTACT = "#555555", "#8A8A8A"
 
@@ -127,7 +130,7 @@ class _Scene:
             area = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
             places.append(corners)
             normals.append(np.tile(area / max(float(np.linalg.norm(area)), 1e-300), (len(face), 1)))
-            order += [(count, count + k, count + k + 1) for k in range(1, len(face) - 1)]
+            order += [(count + a, count + b, count + c) for a, b, c in _cut(corners)]
             count += len(face)
         attributes = {
             "POSITION": self.out.numbers(np.concatenate(places), VERTICES, bounds=True),
@@ -157,21 +160,15 @@ class _Scene:
 
     def _members(self) -> tuple[list[int], int]:
         """Tubes from end to end; how many that could be seen are left out."""
-        slices, nodes = self.case.group_slices, []
-        shares = [
-            sizes(group, self.source.alpha[slices[group.name]]) if group.design else np.full(len(group), 0.5)
-            for group in self.case.members
-        ]
-        every = np.concatenate(shares) if shares else np.zeros(0)
-        there = int((every > FAINT).sum())
-        least = float(np.sort(every)[-MOST]) if there > MOST else 0.0
-        room = MOST
-        for k, (group, share) in enumerate(zip(self.case.members, shares, strict=True)):
-            chosen = np.flatnonzero((share > FAINT) & (share >= least))[:room]
-            room -= len(chosen)
+        nodes: list[int] = []
+        shares, named = thickness(self.source).shares, families(self.case)
+        order = list(dict.fromkeys(named))
+        some = strongest(shares, MOST)
+        for group, share, chosen, family in zip(self.case.members, shares, some, named, strict=True):
             if not len(chosen):
                 continue
-            primitive = self._faces(_tube(), self._material(COLOURS[k % len(COLOURS)], 1.0))
+            own = COLOURS[order.index(family) % len(COLOURS)]
+            primitive = self._faces(_tube(), self._material(own, 1.0))
             mesh = self.out.add("meshes", name=group.name, primitives=[primitive])
             radius = self.size * (THIN + (THICK - THIN) * share)
             first = _stretched(
@@ -192,7 +189,8 @@ class _Scene:
                     name: dict(zip(("translation", "rotation", "scale"), (part[:, i] for part in parts), strict=True))
                     for name, parts in moved.items()
                 }
-        return nodes, there - (MOST - room)
+        there = sum(int((share > FAINT).sum()) for share in shares)
+        return nodes, there - sum(len(chosen) for chosen in some)
 
     def _animation(self, name: str, poses: Poses) -> None:
         if len(poses.t) < 2:
@@ -282,10 +280,27 @@ def _lifted(case: Case, points: Floats) -> Floats:
 
 
 def _shape(case: Case, body: str) -> Solid:
+    """What is drawn of a body; of areas with holes only the border."""
     if case.dimension > 2:
         return solid(case, body)
-    points = points_of(case, body)
-    return convex(_lifted(case, points)) if len(points) else Solid(np.zeros((0, 3)))
+    parts = [Solid(np.zeros((0, 3)))]
+    for shape in planar_shapes(case, body):
+        for area in shape.areas:
+            face = tuple(range(len(area)))
+            sides = tuple((k, (k + 1) % len(area)) for k in face)
+            parts.append(Solid(_lifted(case, area), (face,) if len(shape.areas) == 1 else (), sides))
+        parts += [
+            Solid(_lifted(case, line), (), tuple((k, k + 1) for k in range(len(line) - 1)))
+            for line in (*shape.lines, *shape.arms)
+        ]
+    return joined(parts)
+
+
+def _cut(corners: Floats) -> list[tuple[int, int, int]]:
+    """The triangles of a face; those with up to four corners are convex."""
+    if len(corners) <= FAN:
+        return [(0, k, k + 1) for k in range(1, len(corners) - 1)]
+    return triangles(corners)
 
 
 def _standing(case: Case) -> Floats:

@@ -18,20 +18,37 @@
     return `rgb(${mid.map((m, k) => Math.round(m + a * (end[k] - m))).join(",")})`;
   };
 
+  // words, and what the colours and the symbols mean
+  const legend = (words, coloured) => {
+    const own = data.designs[state.design].members, parts = [document.createElement("span")];
+    parts[0].textContent = words;
+    const entry = (mark, name, colour) => {
+      const part = document.createElement("span"), key = document.createElement("b");
+      part.className = "key"; key.textContent = mark; key.style = `color: ${colour}`;
+      part.appendChild(key); part.appendChild(Object.assign(document.createElement("span"), { textContent: ` ${name}` }));
+      parts.push(part);
+    };
+    if (!coloured && own.groups.length <= 16) own.groups.forEach((name, k) => entry(own.fixed[k] ? "\u2504" : "\u2501", name, COLOURS[k % COLOURS.length]));
+    const kinds = new Set(symbolsAt(data, state.load, null).map((each) => each.kind));
+    for (const kind of kinds) entry(MARKS[kind] || "\u25cb", data.glyphs[kind].words, "#222222");
+    at("legend").replaceChildren(...parts);
+  };
+  const MARKS = { fixed: "\u25a0", prismatic: "\u25ad", cylindrical: "\u25ad", planar: "\u25b1", distance: "\u2022\u2014\u2022", bushing: "\u2307", load: "\u2192", moment: "\u21ba", motion: "\u21e8", turning: "\u21bb" };
+
   const draw = () => {
     const q = current(), m = motion();
     const rows = data.designs[state.design].members.rows;
     const forces = state.colour === "force" && m && m.force ? m.force[state.frame] : null;
     const most = forces ? Math.max(1e-12, ...m.force.map((row) => row.reduce((a, f) => Math.max(a, Math.abs(f)), 0))) : 1;
-    scene.draw(q, rows, (row, k) => (forces ? shade(forces[k] / most) : COLOURS[row[0] % (data.dimension === 3 ? COLOURS.length : 2)]), Boolean(forces));
+    scene.draw(q, rows, (row, k) => (forces ? shade(forces[k] / most) : COLOURS[row[0] % COLOURS.length]), Boolean(forces), m ? m.t[state.frame] : null);
     text("clock", m ? `t = ${number(m.t[state.frame], 4)} s` : "at the start");
     const shown = `${rows.length} of ${data.designs[state.design].members.all} members are thick enough to be drawn.`;
-    text("legend", forces ? `${shown} Orange pulls, blue pushes; up to ${number(most, 3)} N.`
-      : state.colour === "force" ? `${shown} Forces are shown for springs and gaps only.` : `${shown} Width by design value; groups: ${data.designs[state.design].members.groups.join(", ")}.`);
+    legend(forces ? `${shown} Orange pulls, blue pushes; up to ${number(most, 3)} N.`
+      : state.colour === "force" ? `${shown} Forces are shown for springs and gaps only.` : `${shown}${data.designs[state.design].members.what ? ` Width: ${data.designs[state.design].members.what}.` : ""}`, Boolean(forces));
     for (const move of cursors) move();
   };
 
-  const scene = makeScene({ canvas: at("layout"), tools: at("views"), data, motion, colours: COLOURS, redraw: draw });
+  const scene = makeScene({ canvas: at("layout"), tools: at("views"), data, motion, load: () => state.load, colours: COLOURS, redraw: draw });
 
   // small charts
   const SVG = "http://www.w3.org/2000/svg";
@@ -145,7 +162,7 @@
     slider.value = state.frame;
     marks.forEach((mark, j) => mark && mark.setAttribute("stroke-width", j === state.design ? 4 : 1.5));
     document.body.dataset.design = state.design;
-    scene.fit(); responses(); draw();
+    scene.fit(data.designs[state.design].members.rows); responses(); draw();
   };
   const show = (frame) => { state.frame = frame; at("time").value = frame; document.body.dataset.frame = frame; draw(); };
 

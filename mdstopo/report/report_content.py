@@ -6,25 +6,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mdstopo.case.model import GROUND, Case, MemberGroup, SpatialJoint
+from mdstopo.case.model import GROUND, Case
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
 from mdstopo.limiting.compare import compared
-from mdstopo.plots.scenery import outline, points_of, sizes, start_state
+from mdstopo.plots.glyphs import glyphs
+from mdstopo.plots.member_forces import Chosen, forces_of
+from mdstopo.plots.scenery import points_of, start_state
+from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.solids import solid
 from mdstopo.plots.source import Source
 from mdstopo.plots.surface_lines import surfaces_of
+from mdstopo.plots.symbols import LOADS, Symbol, symbols
+from mdstopo.plots.thickness import families, strongest, thickness
 from mdstopo.plots.views import upright
 from mdstopo.plots.watch import response_history
-from mdstopo.scene.points import point_rates, points_at
 from mdstopo.store.whole_front import whole_front
 
 Floats = NDArray[np.float64]
 
 #: frames of a motion, samples of a response; designs of a front that are simulated; members that are drawn, at most
 FRAMES, SAMPLES, SIMULATED, DRAWN = 81, 161, 60, 10_000
-#: share of its range below which a member is not drawn
-FAINT = 0.02
 
 
 def content(source: Source) -> dict[str, Any]:
@@ -54,10 +56,20 @@ def content(source: Source) -> dict[str, Any]:
         "dimension": case.dimension,
         "bodies": _bodies(case),
         "start": _rounded(start_state(case)),
+        "symbols": _symbols(case),
         "designs": _designs(source),
     }  # fmt: skip
     if case.dimension > 2:
-        page |= {"upright": upright(case).tolist(), "joints": _joints(case), "surfaces": _surfaces(case)}
+        page |= {"upright": upright(case).tolist(), "surfaces": _surfaces(case)}
+    else:
+        page["contacts"] = _contacts(case)
+    told = [each for one in page["symbols"].values() for some in (one["still"], *one["loads"]) for each in some]
+    kinds = {each["kind"] for each in told} | {"ground", "gravity"}
+    page["glyphs"] = {
+        kind: {"strokes": [_rounded(stroke, 4) for stroke in glyph.strokes], "fill": glyph.fill, "words": glyph.words}
+        for kind, glyph in glyphs().items()
+        if kind in kinds
+    }
     iterations = view.under("iterations")
     if "combined" in iterations:
         page["iterations"] = {
@@ -108,31 +120,66 @@ def _bodies(case: Case) -> list[dict[str, Any]]:
 
 
 def _shape(case: Case, body: str) -> dict[str, Any]:
-    """What is drawn of a body beside its points: an outline in the plane, a solid in space."""
+    """What is drawn of a body beside its points: shapes in the plane, a solid in space."""
     if case.dimension == 2:
-        return {"outline": _rounded(outline(case, body))}
+        shapes = planar_shapes(case, body)
+        borders = [shape.border for shape in shapes if shape.border is not None]
+        return {
+            "areas": [[_rounded(area) for area in shape.areas] for shape in shapes if shape.areas],
+            "lines": [_rounded(line) for shape in shapes for line in shape.lines],
+            "arms": [_rounded(arm) for shape in shapes for arm in shape.arms],
+            "borders": [_rounded(border) for border in borders],
+        }
     shape = solid(case, body)
-    return {"corners": _rounded(shape.corners), "faces": shape.faces, "edges": shape.edges}
+    return {"corners": _rounded(shape.corners), "faces": shape.faces, "edges": shape.edges, "convex": shape.convex}
+
+
+def _contacts(case: Case) -> list[dict[str, Any]]:
+    """Edges that points may touch, in the plane, and these points."""
+    index = _numbers(case)
+    return [
+        {"edge_body": index[each.edge_body], "edge": [list(each.edge_from), list(each.edge_to)],
+         "body": index[each.body], "points": _rounded(each.points)}
+        for each in case.contacts
+    ]  # fmt: skip
+
+
+def _numbers(case: Case) -> dict[str, int]:
+    """Bodies by their names, ground last."""
+    return {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
+
+
+def _symbols(case: Case) -> dict[str, Any]:
+    """Of each load case: what stands still, and the loads over its time, FRAMES of them evenly."""
+    found = {}
+    for each in case.load_cases:
+        still = [_symbol(case, symbol) for symbol in symbols(case, each.name) if symbol.kind not in LOADS]
+        times = np.linspace(each.start, each.end, FRAMES).tolist()
+        loads = [
+            [_symbol(case, symbol) for symbol in symbols(case, each.name, t) if symbol.kind in LOADS] for t in times
+        ]
+        found[each.name] = {
+            "still": still, "start": each.start, "end": each.end, "gravity": list(each.gravity),
+            "loads": loads[:1] if all(some == loads[0] for some in loads) else loads,
+        }  # fmt: skip
+    return found
+
+
+def _symbol(case: Case, symbol: Symbol) -> dict[str, Any]:
+    index = _numbers(case)
+    end = None if symbol.end is None else [index[symbol.end[0]], _rounded(symbol.end[1])]
+    way = None if symbol.way is None else _rounded(symbol.way, 4)
+    return {"kind": symbol.kind, "body": index[symbol.body], "at": _rounded(symbol.at), "end": end, "way": way,
+            "axes": index[symbol.axes], "size": round(symbol.size, 3)}  # fmt: skip
 
 
 def _surfaces(case: Case) -> list[dict[str, Any]]:
     """Lines of the surfaces that points may touch."""
-    index = {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
+    index = _numbers(case)
     return [
         {"body": index[each.body], "lines": [_rounded(line) for line in each.lines], "endless": each.endless}
         for each in surfaces_of(case)
     ]
-
-
-def _joints(case: Case) -> list[dict[str, Any]]:
-    """Where joints are on their first body, and their axes there."""
-    index = {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
-    return [
-        {"name": joint.name, "type": joint.type, "body": index[joint.bodies[0]], "at": _rounded(joint.at_first),
-         "axis": _rounded(joint.axes_first[0]) if joint.axis_key else None}
-        for joint in case.joints
-        if isinstance(joint, SpatialJoint)
-    ]  # fmt: skip
 
 
 def _designs(source: Source) -> list[dict[str, Any]]:
@@ -150,7 +197,7 @@ def _designs(source: Source) -> list[dict[str, Any]]:
 
 def _design(source: Source, engine: Evaluator, alpha: Floats, moves: bool = True) -> dict[str, Any]:
     case = source.case
-    members, kept = _members(case, alpha)
+    members, kept = _members(source, alpha)
     design: dict[str, Any] = {"members": members, "motions": {}}
     for load_case in case.load_cases if moves else ():
         motion = engine.trajectory(alpha, load_case.name)
@@ -159,7 +206,7 @@ def _design(source: Source, engine: Evaluator, alpha: Floats, moves: bool = True
             continue
         frames = np.linspace(motion.t[0], last, FRAMES)
         states = motion.at(frames)
-        forces = _forces(case, alpha, kept, states.q, states.v)
+        forces = forces_of(case, alpha, kept, states.q, states.v)
         times = np.linspace(motion.t[0], last, SAMPLES)
         histories = response_history(engine, alpha, load_case.name, times)
         design["motions"][load_case.name] = {
@@ -180,58 +227,25 @@ def _objective(case: Case, name: str) -> Any:
     return next(each for each in case.objectives if each.name == name)
 
 
-def _members(case: Case, alpha: Floats) -> tuple[dict[str, Any], list[tuple[MemberGroup, NDArray[np.int64]]]]:
+def _members(source: Source, alpha: Floats) -> tuple[dict[str, Any], Chosen]:
     """Members that are thick enough to be seen, the thickest first where there are many; and which they are."""
-    slices = case.group_slices
-    shares = []
-    for group in case.members:
-        if group.design:
-            shares.append(sizes(group, alpha[slices[group.name]]))
-        else:
-            shares.append(np.ones(len(group)))
-    every = np.concatenate(shares) if shares else np.zeros(0)
-    least = max(FAINT, float(np.sort(every)[-DRAWN]) if len(every) > DRAWN else 0.0)
-    index = {name: i for i, name in enumerate([*(body.name for body in case.bodies), GROUND])}
+    case = source.case
+    thick = thickness(source, alpha[: case.n_design])
+    index, named = _numbers(case), families(case)
+    order = list(dict.fromkeys(named))
     kept, rows = [], []
-    for g, (group, share) in enumerate(zip(case.members, shares, strict=True)):
-        chosen = np.flatnonzero(share >= least)
+    every = zip(case.members, thick.shares, strongest(thick.shares, DRAWN), named, strict=True)
+    for group, share, chosen, family in every:
         kept.append((group, chosen))
         a, b = index[group.body_from], index[group.body_to]
         p, q = group.p_local[chosen], group.q_local[chosen]
         for k, i in enumerate(chosen.tolist()):
-            rows.append([g, a, b, *_rounded(p[k]), *_rounded(q[k]), round(float(share[i]), 3), i])
-    return {"groups": [group.name for group in case.members], "rows": rows, "all": len(every)}, kept
-
-
-def _forces(
-    case: Case, alpha: Floats, kept: list[tuple[MemberGroup, NDArray[np.int64]]], q: Floats, v: Floats
-) -> Floats | None:
-    """f* (T, K) of the members that are drawn, pull positive.
-
-    None where a law's force depends on more than elongation and rate, or acts for a time, and where laws vary.
-    """
-    slices, columns = case.group_slices, []
-    if case.variables:
-        return None
-    for group, chosen in kept:
-        if not all(law.active_from is None and law.active_until is None for law in group.laws):
-            return None
-        p = points_at(case, group.body_from, group.p_local[chosen], q)
-        r = points_at(case, group.body_to, group.q_local[chosen], q) - p
-        length = np.linalg.norm(r, axis=2)
-        parting = point_rates(case, group.body_to, group.q_local[chosen], q, v)
-        parting = parting - point_rates(case, group.body_from, group.p_local[chosen], q, v)
-        rate = np.einsum("tki,tki->tk", r, parting) / np.where(length > 0.0, length, 1.0)
-        scale = alpha[slices[group.name]][chosen] ** group.power if group.design else np.ones(len(chosen))
-        total = np.zeros_like(length)
-        for law in group.laws:
-            stated = getattr(law, "free_length", None)
-            force = law.force_at(length - (group.length[chosen] if stated is None else stated), rate)
-            if force is None:
-                return None
-            total += force
-        columns.append(scale * total)
-    return np.concatenate(columns, axis=1) if columns else np.zeros((len(q), 0))
+            own = [*_rounded(p[k]), *_rounded(q[k]), round(float(share[i]), 3), i]
+            rows.append([order.index(family), a, b, *own])
+    fixed = [all(not group.design for group, each in zip(case.members, named, strict=True) if each == family)
+             for family in order]  # fmt: skip
+    found = {"groups": order, "fixed": fixed, "what": thick.what, "rows": rows, "all": case.n_members}
+    return found, kept
 
 
 def _rounded(array: Any, digits: int = 6) -> Any:

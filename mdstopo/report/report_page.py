@@ -10,9 +10,10 @@ from typing import Any
 def page(data: dict[str, Any]) -> str:
     """HTML that needs nothing else."""
     folder = files("mdstopo.report")
-    names = ("page.css", "scene_space.js" if data["dimension"] > 2 else "scene_plane.js", "page.js", "page.html")
-    style, scene, script, body = ((folder / name).read_text(encoding="utf-8") for name in names)
+    scene = "scene_space.js" if data["dimension"] > 2 else "scene_plane.js"
+    names = ("page.css", "glyphs.js", scene, "page.js", "page.html")
+    style, *scripts, body = ((folder / name).read_text(encoding="utf-8") for name in names)
     # neither "</script" nor "<!--<script" in a case file may mean anything to the page
     text = json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-    parts = {"title": escape(str(data["title"])), "style": style, "data": text, "script": scene + script}
+    parts = {"title": escape(str(data["title"])), "style": style, "data": text, "script": "".join(scripts)}
     return re.sub(r"\{(title|style|data|script)\}", lambda found: parts[found[1]], body)

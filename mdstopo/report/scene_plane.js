@@ -1,60 +1,117 @@
 "use strict";
-// The scene of a plane. canvas: where it is drawn; data: the page's; motion: the one that is shown, or nothing;
-// colours: of bodies and groups. fit: choose the window; draw: bodies at q, members (rows) in colour(row, k).
-const makeScene = ({ canvas, data, motion, colours }) => {
+// The scene of a plane. canvas: where it is drawn; data: the page's; motion: the one that is shown, or nothing; load:
+// the load case; colours: of bodies and groups. fit: choose the window; draw: bodies at q, members (rows) in
+// colour(row, k), at a time.
+const makeScene = ({ canvas, data, motion, load, colours }) => {
+  const WIDTH = 760, HEIGHT = 560, g = sharpened(canvas, WIDTH, HEIGHT), glyphs = makeGlyphs(g, data.glyphs);
+  const count = data.start.length / 3, GROUND = "#666666";
   // places: body coordinates to global ones
-  const place = (body, x, y, q) => {
-    if (body >= q.length / 3) return [x, y];
+  const place = (body, [x, y], q) => {
+    if (body >= count) return [x, y];
     const c = Math.cos(q[3 * body + 2]), s = Math.sin(q[3 * body + 2]);
     return [q[3 * body] + c * x - s * y, q[3 * body + 1] + s * x + c * y];
   };
+  const indexOf = (body, b) => (body.name === "ground" && b === data.bodies.length - 1 ? count : b);
 
   // one window for all frames of a motion, so that it stands still
   let view = null;
-  const fit = () => {
+  const fit = (rows) => {
     const low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+    const take = (p) => { for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); } };
     const m = motion();
     const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
     for (const q of frames) data.bodies.forEach((body, b) => {
-      const index = body.name === "ground" ? q.length : b;
-      for (const [x, y] of body.outline.concat(body.points)) {
-        const p = place(index, x, y, q);
-        for (const k of [0, 1]) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
-      }
+      const index = indexOf(body, b), all = body.areas.flat(2).concat(body.lines.flat(), body.arms.flat(), body.borders.flat(), body.points);
+      for (const p of index < count ? all.concat([[0, 0]]) : all) take(place(index, p, q));
     });
-    const room = 30;
-    const scale = Math.min((canvas.width - 2 * room) / Math.max(high[0] - low[0], 1e-9), (canvas.height - 2 * room) / Math.max(high[1] - low[1], 1e-9));
-    view = { scale, x: canvas.width / 2 - scale * (low[0] + high[0]) / 2, y: canvas.height / 2 + scale * (low[1] + high[1]) / 2 };
+    for (const q of frames) for (const row of rows) { take(place(row[1], row.slice(3, 5), q)); take(place(row[2], row.slice(5, 7), q)); }
+    const room = 42;
+    const scale = Math.min((WIDTH - 2 * room) / Math.max(high[0] - low[0], 1e-9), (HEIGHT - 2 * room) / Math.max(high[1] - low[1], 1e-9));
+    view = { scale, x: WIDTH / 2 - scale * (low[0] + high[0]) / 2, y: HEIGHT / 2 + scale * (low[1] + high[1]) / 2 };
   };
   const screen = (p) => [view.x + view.scale * p[0], view.y - view.scale * p[1]];
 
-  const draw = (q, rows, colour, coloured) => {
-    const g = canvas.getContext("2d");
-    g.clearRect(0, 0, canvas.width, canvas.height);
-    const named = [];
-    const name = (text, x, y) => {  // below the names that would be written over
-      while (named.some(([x0, y0, w]) => x < x0 + w && x0 < x + g.measureText(text).width && Math.abs(y - y0) < 12)) y += 12;
-      named.push([x, y, g.measureText(text).width]);
-      g.fillText(text, x, y);
-    };
-    data.bodies.forEach((body, b) => {
-      const ground = body.name === "ground", index = ground ? q.length : b;
+  const trace = (points, closed) => {
+    points.forEach((p, k) => (k ? g.lineTo(...p) : g.moveTo(...p)));
+    if (closed) g.closePath();
+  };
+  const strokes = (lines, q, index, colour, width, dash, closed) => {
+    g.strokeStyle = colour; g.lineWidth = width;
+    if (g.setLineDash) g.setLineDash(dash);
+    for (const line of lines) { g.beginPath(); trace(line.map((p) => screen(place(index, p, q))), closed); g.stroke(); }
+    if (g.setLineDash) g.setLineDash([]);
+  };
+  const bodies = (q) => data.bodies.forEach((body, b) => {
+    const index = indexOf(body, b), colour = index === count ? GROUND : colours[(b + 2) % colours.length];
+    for (const loops of body.areas) {
       g.beginPath();
-      body.outline.forEach(([x, y], k) => { const p = screen(place(index, x, y, q)); k ? g.lineTo(...p) : g.moveTo(...p); });
-      g.closePath();
-      const colour = ground ? "#555555" : colours[(b + 2) % colours.length];
-      g.globalAlpha = 0.12; g.fillStyle = colour; g.fill(); g.globalAlpha = 1; g.strokeStyle = colour; g.lineWidth = 1; g.stroke();
-      g.fillStyle = colour;
-      for (const [x, y] of body.points) { const p = screen(place(index, x, y, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
-      if (!ground) { const p = screen(place(index, 0, 0, q)); name(body.name, p[0] + 5, p[1] - 5); g.fillRect(p[0] - 3, p[1] - 0.5, 6, 1); g.fillRect(p[0] - 0.5, p[1] - 3, 1, 6); }
+      for (const loop of loops) trace(loop.map((p) => screen(place(index, p, q))), true);
+      g.globalAlpha = 0.13; g.fillStyle = colour; g.fill("evenodd"); g.globalAlpha = 1;
+      strokes(loops, q, index, colour, 1, [], true);
+    }
+    g.globalAlpha = 0.85;
+    strokes(body.lines, q, index, colour, 2.2, [], false);
+    g.globalAlpha = 0.7;
+    strokes(body.arms, q, index, colour, body.lines.length ? 1 : 3, body.lines.length ? [6, 4] : [], false);
+    strokes(body.borders, q, index, colour, 1, [5, 4], true);
+    g.globalAlpha = 1; g.fillStyle = colour;
+    for (const point of body.points) { const p = screen(place(index, point, q)); g.fillRect(p[0] - 1.5, p[1] - 1.5, 3, 3); }
+  });
+  const contacts = (q) => {
+    for (const each of data.contacts) {
+      g.globalAlpha = 0.8;
+      strokes([each.edge], q, each.edge_body, "#222222", 1.8, [], false);
+      g.globalAlpha = 1; g.strokeStyle = "#222222"; g.lineWidth = 0.8;
+      for (const point of each.points) { const p = screen(place(each.body, point, q)); g.beginPath(); g.arc(p[0], p[1], 2.5, 0, 2 * Math.PI); g.stroke(); }
+    }
+  };
+  const names = (q) => {
+    const written = [];
+    g.font = "13px system-ui, sans-serif"; g.textAlign = "start";
+    data.bodies.forEach((body, b) => {
+      const index = indexOf(body, b);
+      if (index === count) return;
+      const p = screen(place(index, [0, 0], q)), colour = colours[(b + 2) % colours.length], wide = g.measureText(body.name).width;
+      g.fillStyle = colour; g.fillRect(p[0] - 4, p[1] - 0.75, 8, 1.5); g.fillRect(p[0] - 0.75, p[1] - 4, 1.5, 8);
+      const x = Math.min(p[0] + 6, WIDTH - wide - 2);
+      let y = p[1] - 6; // below the names that would be written over
+      while (written.some(([x0, y0, w]) => x < x0 + w && x0 < x + wide && Math.abs(y - y0) < 14)) y += 14;
+      written.push([x, y, wide]);
+      if (g.strokeText) { g.lineWidth = 3; g.strokeStyle = "#ffffff"; g.strokeText(body.name, x, y); }
+      g.fillText(body.name, x, y);
     });
+  };
+  // a length to measure by, and which way is down
+  const measures = () => {
+    const raw = WIDTH / 6 / view.scale, size = 10 ** Math.floor(Math.log10(raw)), length = [5, 2, 1].map((k) => k * size).find((s) => s <= raw * (1 + 1e-9));
+    const x = 14, y = HEIGHT - 14, wide = length * view.scale;
+    g.globalAlpha = 1; g.strokeStyle = "#222222"; g.lineWidth = 1.2;
+    g.beginPath(); trace([[x, y - 4], [x, y], [x + wide, y], [x + wide, y - 4]], false); g.stroke();
+    g.fillStyle = "#222222"; g.font = "12px system-ui, sans-serif"; g.textAlign = "start";
+    g.fillText(`${Number(length.toPrecision(3))} m`, x + wide + 6, y);
+    const gravity = data.symbols[load()].gravity;
+    if (gravity[0] || gravity[1]) { glyphs.draw("gravity", [WIDTH - 24, 16], Math.atan2(gravity[1], gravity[0]), 1, false); g.fillStyle = "#222222"; g.fillText("g", WIDTH - 16, 26); }
+  };
+
+  const draw = (q, rows, colour, coloured, time) => {
+    g.globalAlpha = 1;
+    g.clearRect(0, 0, WIDTH, HEIGHT);
+    bodies(q);
+    contacts(q);
+    const wide = Math.max(0.8, 3.2 - 0.9 * Math.log10(Math.max(1, rows.length / 10)));
     rows.forEach((row, k) => {
-      const p = screen(place(row[1], row[3], row[4], q)), r = screen(place(row[2], row[5], row[6], q));
+      const p = screen(place(row[1], row.slice(3, 5), q)), r = screen(place(row[2], row.slice(5, 7), q));
       g.strokeStyle = colour(row, k);
-      g.globalAlpha = coloured ? 0.9 : 0.25 + 0.65 * row[7];
-      g.lineWidth = 0.4 + 2 * row[7];
+      g.globalAlpha = coloured ? 0.9 : 0.45 + 0.45 * row[7];
+      g.lineWidth = 0.6 + wide * row[7];
       g.beginPath(); g.moveTo(...p); g.lineTo(...r); g.stroke();
     });
+    for (const symbol of symbolsAt(data, load(), time)) {
+      const at = place(symbol.body, symbol.at, q), o = symbol.way && place(symbol.axes, [0, 0], q), w = symbol.way && place(symbol.axes, symbol.way, q);
+      glyphs.symbol(symbol, screen(at), w && [w[0] - o[0], w[1] - o[1]], symbol.end && screen(place(symbol.end[0], symbol.end[1], q)));
+    }
+    names(q);
+    measures();
     g.globalAlpha = 1;
   };
   return { fit, draw };

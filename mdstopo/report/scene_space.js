@@ -1,9 +1,10 @@
 "use strict";
 // The scene in space: it turns under the mouse. canvas: where it is drawn; tools: where its buttons go; data: the
-// page's; motion: the one that is shown, or nothing; colours: of bodies and groups; redraw: draws all anew.
-// fit: choose the window; draw: bodies at q, members (rows) in colour(row, k). What is farther is drawn first.
-const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
-  const g = canvas.getContext("2d"), [right, away, up] = data.upright;
+// page's; motion: the one that is shown, or nothing; load: the load case; colours: of bodies and groups; redraw: draws
+// all anew. fit: choose the window; draw: bodies at q, members (rows) in colour(row, k), at a time. What is farther is
+// drawn first.
+const makeScene = ({ canvas, tools, data, motion, load, colours, redraw }) => {
+  const WIDTH = 760, HEIGHT = 560, g = sharpened(canvas, WIDTH, HEIGHT), glyphs = makeGlyphs(g, data.glyphs), [right, away, up] = data.upright;
   const DISTANCE = 4, GRID = "#c9c9c9", CONTACT = "#8a8a8a", AXES = ["#B22222", "#2E7D32", "#1F4FA3"]; // distance of the eye in radii
   const VIEWS = { front: [0, 0], top: [0, 90], side: [90, 0], perspective: [32, 24] }; // degrees: turn, rise
   const camera = { turn: 0, rise: 0, zoom: 1, x: 0, y: 0, flat: false };
@@ -38,11 +39,11 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
   const seen = (p) => {
     const r = sum(p, 1, middle, -1), near = dot(r, toward);
     const s = scale * camera.zoom / (camera.flat ? 1 : Math.max(1 - near / (DISTANCE * radius), 0.02));
-    return [canvas.width / 2 + camera.x + s * dot(r, across), canvas.height / 2 + camera.y - s * dot(r, along), near];
+    return [WIDTH / 2 + camera.x + s * dot(r, across), HEIGHT / 2 + camera.y - s * dot(r, along), near];
   };
 
   // one window for all frames of a motion, so that it stands still
-  const fit = () => {
+  const fit = (rows) => {
     const m = motion(), cloud = [];
     const frames = m ? m.q.filter((_, i) => i % 8 === 0 || i === m.q.length - 1) : [data.start];
     frames.forEach((q, f) => {
@@ -52,6 +53,7 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
         if (f && index === data.start.length / 7) return;
         for (const p of body.corners.concat(body.points)) cloud.push(place(all[index], p));
       });
+      for (const row of rows) cloud.push(place(all[row[1]], row.slice(3, 6)), place(all[row[2]], row.slice(6, 9)));
       for (const surface of data.surfaces) if (!surface.endless) for (const p of surface.lines.flat()) cloud.push(place(all[surface.body], p));
     });
     const reach = (pick, k) => cloud.reduce((a, p) => pick(a, p[k]), cloud.length ? cloud[0][k] : 0);
@@ -59,7 +61,7 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
     high = [0, 1, 2].map((k) => reach(Math.max, k));
     middle = sum(low, 0.5, high, 0.5);
     radius = Math.max(0.5 * Math.hypot(...sum(high, 1, low, -1)), 1e-9);
-    scale = 0.56 * Math.min(canvas.width, canvas.height) / radius;
+    scale = 0.56 * Math.min(WIDTH, HEIGHT) / radius;
   };
 
   const stepOf = (length) => { const size = 10 ** Math.floor(Math.log10(length / 9)); return [1, 2, 5, 10].map((k) => k * size).find((s) => s >= length / 9 * (1 - 1e-9)); };
@@ -87,23 +89,23 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
   };
   const corner = () => {
     g.font = "bold 13px system-ui, sans-serif"; g.textAlign = "center";
-    const foot = [48, canvas.height - 48];
+    const foot = [48, HEIGHT - 48];
     [0, 1, 2].forEach((k) => {
       const tip = [foot[0] + 30 * across[k], foot[1] - 30 * along[k]];
       line(foot, tip, AXES[k], 2, 1);
       write("xyz"[k], [foot[0] + 40 * across[k], foot[1] - 40 * along[k] + 4], AXES[k]);
     });
     g.textAlign = "start"; g.font = "12px system-ui, sans-serif";
-    write(`grid: ${Number(stepOf(2 * radius).toPrecision(3))} m`, [14, canvas.height - 6], "#777777");
+    write(`grid: ${Number(stepOf(2 * radius).toPrecision(3))} m`, [14, HEIGHT - 6], "#777777");
   };
 
   const polygon = (points, colour, alpha) => { g.globalAlpha = alpha; g.fillStyle = colour; g.beginPath(); points.forEach((p, i) => (i ? g.lineTo(p[0], p[1]) : g.moveTo(p[0], p[1]))); g.closePath(); g.fill(); };
   const mean = (points) => points.reduce((a, p) => a + p[2], 0) / points.length;
 
-  const draw = (q, rows, colour, coloured) => {
+  const draw = (q, rows, colour, coloured, time) => {
     aim();
     g.globalAlpha = 1;
-    g.clearRect(0, 0, canvas.width, canvas.height);
+    g.clearRect(0, 0, WIDTH, HEIGHT);
     ground();
     const all = seats(q), things = [], names = []; // things: how near, and what draws it
     data.bodies.forEach((body, b) => {
@@ -112,10 +114,11 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
       for (const face of body.faces) {
         const points = face.map((k) => corners[k]);
         const area = points.reduce((a, p, i) => { const r = points[(i + 1) % points.length]; return a + p[0] * r[1] - r[0] * p[1]; }, 0);
+        if (!body.convex && body.faces.length > 1 && area > 0) continue; // of what is not a hull only the front
         const alpha = body.faces.length < 2 ? 0.15 : area < 0 ? 0.24 : 0.1; // those that look to the eye are stronger
         things.push([mean(points), () => polygon(points, own, alpha)]);
       }
-      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, 1.2, 0.9)]);
+      for (const [m, n] of body.edges) things.push([(corners[m][2] + corners[n][2]) / 2, () => line(corners[m], corners[n], own, body.faces.length ? 1.2 : 2.4, 0.9)]);
       for (const p of body.points) { const s = seen(place(seat, p)); things.push([s[2], () => { g.globalAlpha = 1; g.fillStyle = own; g.fillRect(s[0] - 1.5, s[1] - 1.5, 3, 3); }]); }
       if (!fixed) names.push([body.name, seen(seat[3]), own]);
     });
@@ -128,14 +131,14 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
       const clear = 0.8 + 0.2 * Math.max(-1, Math.min(1, near / radius)); // what is farther is paler
       things.push([near, () => line(a, b, colour(row, k), 0.4 + 2.4 * row[9], clear * (coloured ? 0.95 : 0.25 + 0.7 * row[9]))]);
     });
-    for (const joint of data.joints) {
-      const seat = all[joint.body], centre = place(seat, joint.at), s = seen(centre);
-      if (joint.axis) {
-        const way = sum(place(seat, joint.axis), 1, seat[3], -1);
+    for (const symbol of symbolsAt(data, load(), time)) {
+      const centre = place(all[symbol.body], symbol.at), s = seen(centre), end = symbol.end && seen(place(all[symbol.end[0]], symbol.end[1]));
+      const seat = all[symbol.axes], way = symbol.way && [0, 1, 2].map((k) => dot(seat[k], symbol.way));
+      if (way && !["load", "motion"].includes(symbol.kind)) { // its axis, as long as it is in perspective
         const [a, b] = [-0.07, 0.07].map((t) => seen(sum(centre, 1, way, t * radius)));
         things.push([s[2], () => line(a, b, "#222222", 1.5, 1)]);
       }
-      things.push([s[2] + 1e-6 * radius, () => { g.globalAlpha = 1; g.fillStyle = "#ffffff"; g.strokeStyle = "#222222"; g.lineWidth = 1.4; g.beginPath(); g.arc(s[0], s[1], 4, 0, 2 * Math.PI); g.fill(); g.stroke(); }]);
+      things.push([s[2] + 1e-6 * radius, () => glyphs.symbol(symbol, s, way && [dot(way, across), dot(way, along)], end)]);
     }
     things.sort((a, b) => a[0] - b[0]);
     for (const [, paint] of things) paint();
@@ -154,11 +157,11 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
     camera.turn -= 0.01 * dx;
     camera.rise = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, camera.rise + 0.01 * dy));
   };
-  const inside = (event) => { const r = canvas.getBoundingClientRect(), k = canvas.width / (r.width || canvas.width); return [k * (event.clientX - r.left), k * (event.clientY - r.top)]; };
+  const inside = (event) => { const r = canvas.getBoundingClientRect(), k = WIDTH / (r.width || WIDTH); return [k * (event.clientX - r.left), k * (event.clientY - r.top)]; };
   const zoom = (factor, [x, y]) => { // the place under the pointer stays
     const next = Math.max(0.05, Math.min(50, camera.zoom * factor)), k = next / camera.zoom;
-    camera.x = (1 - k) * (x - canvas.width / 2) + k * camera.x;
-    camera.y = (1 - k) * (y - canvas.height / 2) + k * camera.y;
+    camera.x = (1 - k) * (x - WIDTH / 2) + k * camera.x;
+    camera.y = (1 - k) * (y - HEIGHT / 2) + k * camera.y;
     camera.zoom = next;
   };
   let asked = false; // many moves of the mouse, one picture
@@ -184,7 +187,7 @@ const makeScene = ({ canvas, tools, data, motion, colours, redraw }) => {
   canvas.addEventListener("dblclick", () => { look("perspective"); redraw(); });
   canvas.addEventListener("keydown", (event) => {
     const moves = { ArrowLeft: [-10, 0], ArrowRight: [10, 0], ArrowUp: [0, -10], ArrowDown: [0, 10] }[event.key];
-    if (moves) turn(...moves); else if (event.key === "+" || event.key === "-") zoom(event.key === "+" ? 1.15 : 1 / 1.15, [canvas.width / 2, canvas.height / 2]); else return;
+    if (moves) turn(...moves); else if (event.key === "+" || event.key === "-") zoom(event.key === "+" ? 1.15 : 1 / 1.15, [WIDTH / 2, HEIGHT / 2]); else return;
     event.preventDefault(); redraw();
   });
   for (const name of Object.keys(VIEWS)) {

@@ -12,9 +12,11 @@ from scipy.integrate import trapezoid
 
 from mdstopo.cli.group import run_group
 from mdstopo.plots.plot_table import PLOTS, fitting
-from mdstopo.plots.scenery import edge_at, hull, outline, sizes, start_state
+from mdstopo.plots.scenery import edge_at, hull, sizes, start_state
+from mdstopo.plots.shapes import planar_shapes
 from mdstopo.plots.source import Source
 from mdstopo.plots.style import styled
+from mdstopo.plots.thickness import FAINT, stored_peaks
 from mdstopo.plots.watch import response_history
 from mdstopo.report.report_content import content
 from tests.front.support import CASE
@@ -104,7 +106,7 @@ def test_edges_of_contacts_ride_on_their_body_and_points_on_theirs():
     q = start_state(case)
     q[:3] += 1.0, 2.0, np.pi / 2.0  # the deck
     assert edge_at(case, case.contacts[1], q) == pytest.approx(np.array([[0.9, 2.13], [-0.2, 2.13]]))
-    corners = outline(case, "crate")
+    ((corners,),) = (shape.areas for shape in planar_shapes(case, "crate"))
     assert all((corners == point).all(axis=1).any() for point in case.contacts[1].points[1:])
 
 
@@ -166,11 +168,17 @@ def test_members_without_a_range_are_drawn(final):
     with styled() as module:
         (axis,) = PLOTS["layout"].draw(module, source).axes
         assert [len(each.get_segments()) for each in axis.collections] == [1] * 14
-        assert len({float(width) for each in axis.collections for width in each.get_linewidths()}) == 1
+        widths = [float(width) for each in axis.collections for width in each.get_linewidths()]
+        assert len({each.get_color()[0].tobytes() for each in axis.collections}) == 1  # one family
     page = content(source)
     rows = page["designs"][0]["members"]["rows"]
     assert len(rows) == 14
-    assert {row[7] for row in rows} == {1.0}
+    shares = np.array([row[7] for row in rows])
+    assert shares.max() == 1.0
+    assert np.array_equal(np.argsort(shares), np.argsort(widths))
+    peaks = np.concatenate(stored_peaks(source, source.alpha))
+    assert shares == pytest.approx(np.maximum(peaks / peaks.max(), 2.0 * FAINT), abs=6e-4)
+    assert peaks.min() < 0.9 * peaks.max()
 
 
 def test_a_size_is_a_share_of_the_range_or_alpha_itself_where_there_is_none(results):
@@ -186,8 +194,9 @@ def test_a_size_is_a_share_of_the_range_or_alpha_itself_where_there_is_none(resu
 def test_a_legend_names_groups_only_while_it_leaves_room_for_the_picture(results, final):
     with styled() as module:
         few, many = (PLOTS["layout"].draw(module, Source(path)) for path in (results["run"], final))
-    assert [text.get_text() for text in few.legends[0].get_texts()] == ["torso", "vehicle", "belts"]
-    assert [text.get_text() for text in many.legends[0].get_texts()] == ["torso", "vehicle"]
+    for picture in (few, many):  # of a final design, whose members are groups, the families
+        words = [text.get_text() for text in picture.legends[0].get_texts()]
+        assert words == ["torso", "vehicle", "belts", "moment"]
 
 
 @pytest.mark.parametrize("kind", ["run", "pareto", "gradient"])

@@ -15,6 +15,7 @@ from mdstopo.case.reader import read_case
 from mdstopo.plots.scenery import ends_at, start_state
 from mdstopo.plots.solids import convex, equal_box, solid
 from mdstopo.plots.surface_lines import surfaces_of
+from mdstopo.plots.thickness import thickness
 from mdstopo.plots.views import upright, views
 from mdstopo.report import report_content
 from mdstopo.report.gltf_motion import motion_file
@@ -198,7 +199,7 @@ def test_layouts_have_three_views_of_one_scale_and_a_perspective(source, tmp_pat
     with styled() as module:
         start = start_state(source.case)
         for panels in ([(None, start)], [(0.0, start), (0.5, states(source.case, np.array([0.5]))[0][0])]):
-            figure = draw_space(module, source, panels)
+            figure = draw_space(module, source, panels, thickness(source))
             assert len(figure.axes) == 4 * len(panels)
             scales, labels = [], []
             for axis in figure.axes:
@@ -234,7 +235,9 @@ def test_the_page_is_one_file_and_a_title_is_only_words(written):
     assert found["title"] == TITLE
     assert found["dimension"] == 3
     assert [len(body["faces"]) for body in found["bodies"]] == [6, 0, 1]
-    assert found["joints"][0]["at"] == pytest.approx(Rotation.from_rotvec([0, 0, -0.2]).apply([0.5, 0, 0]), abs=1e-5)
+    (elbow,) = found["symbols"]["default"]["still"]
+    assert elbow["kind"] == "revolute"
+    assert elbow["at"] == pytest.approx(Rotation.from_rotvec([0, 0, -0.2]).apply([0.5, 0, 0]), abs=1e-5)
 
 
 def test_forces_in_the_page_are_those_of_the_springs(source, written):

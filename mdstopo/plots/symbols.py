@@ -1,0 +1,120 @@
+"""Joints, bushings, loads and prescribed motions: which symbol stands where, and where it points."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.arrays import Table
+from mdstopo.case.model import GROUND, Case, Load, LoadCase
+from mdstopo.plots.scenery import Floats
+from mdstopo.scene.points import points_at
+
+#: of the largest: what is smaller has no arrow
+TINY = 1e-6
+#: kinds that change with time
+LOADS = ("load", "moment")
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """kind: of `glyphs`. at (d,): in coordinates of `body`; end: the same of another body, to which a line is drawn.
+
+    way (d,): where it points, in coordinates of `axes`, a body or ground; zero where it points nowhere. size: of the
+    largest of its kind, negative for a turn that is clockwise in the plane.
+    """
+
+    kind: str
+    body: str
+    at: Floats
+    end: tuple[str, Floats] | None = None
+    way: Floats | None = None
+    axes: str = GROUND
+    size: float = 1.0
+
+
+def symbols(case: Case, load_case: str | None = None, time: float | None = None) -> list[Symbol]:
+    """Everything that is drawn of a load case, the first where none is named.
+
+    time: at which loads are shown; None shows each at its largest. What stands in several places is there once.
+    """
+    chosen = case.load_cases[0] if load_case is None else case.load_case(load_case)
+    return [*_ties(case), *_motions(case, chosen), *_loads(case, chosen, time)]
+
+
+def _ties(case: Case) -> Iterator[Symbol]:
+    for joint in case.joints:
+        far = (joint.bodies[1], np.array(joint.at_second)) if joint.type == "distance" else None
+        way = getattr(joint, "axis", None)
+        if case.dimension == 3:
+            own: Any = joint
+            way = own.axes_first[0] if own.axis_key else None
+        axis = None if way is None else np.array(way, dtype=np.float64)
+        yield Symbol(joint.type, joint.bodies[0], np.array(joint.at_first), far, axis, joint.bodies[0])
+    for bushing in case.bushings:
+        yield Symbol("bushing", bushing.bodies[0], np.array(bushing.at_first))
+
+
+def _motions(case: Case, chosen: LoadCase) -> Iterator[Symbol]:
+    middle = np.zeros(case.dimension)
+    for motion in chosen.motions:
+        for k, name in enumerate("xyz"[: case.dimension]):
+            if getattr(motion, name) is not None:
+                yield Symbol("motion", motion.body, middle, way=np.eye(case.dimension)[k])
+        if motion.angle is not None or motion.rotation is not None:
+            yield Symbol("turning", motion.body, middle)
+
+
+def _loads(case: Case, chosen: LoadCase, time: float | None) -> Iterator[Symbol]:
+    d = case.dimension
+    found: list[tuple[str, Load, Floats]] = []
+    for load in chosen.loads:
+        found.append(("load", load, _shown(load.force, time)))
+        turning = load.angular_acceleration if load.angular_acceleration is not None else load.moment
+        found.append(("moment", load, _shown(turning if isinstance(turning, tuple) else (turning,), time)))
+    largest = {
+        kind: max((float(np.linalg.norm(_shown(_signals(each, kind), None))) for _, each, _ in found), default=0.0)
+        for kind in ("load", "moment")
+    }
+    for kind, load, value in found:
+        size = float(np.linalg.norm(value))
+        if size <= TINY * largest[kind] or size == 0.0:
+            continue
+        axes = load.body if load.frame == "body" else GROUND
+        way = value / size if kind == "load" or d == 3 else None
+        share = float(np.copysign(size / largest[kind], value[0] if way is None else 1.0))
+        yield Symbol(kind, load.body, np.array(load.at_local), None, way, axes, share)
+
+
+def _signals(load: Load, kind: str) -> tuple[Any, ...]:
+    if kind == "load":
+        return load.force
+    turning = load.angular_acceleration if load.angular_acceleration is not None else load.moment
+    return turning if isinstance(turning, tuple) else (turning,)
+
+
+def _shown(signals: tuple[Any, ...], time: float | None) -> Floats:
+    """The vector at a time; without one, where its norm is largest."""
+    if time is not None:
+        return np.array([_value(each, time) for each in signals])
+    times = np.unique(np.concatenate([[0.0], *(each.times for each in signals if isinstance(each, Table))]))
+    values = np.array([[_value(each, t) for each in signals] for t in times.tolist()])
+    return np.asarray(values[int(np.linalg.norm(values, axis=1).argmax())])
+
+
+def _value(signal: Any, time: float) -> float:
+    if isinstance(signal, Table):
+        return float(np.interp(time, signal.times, signal.values[:, 0]))
+    return float(signal)
+
+
+def placed(case: Case, symbol: Symbol, q: Floats) -> tuple[Floats, Floats | None, Floats | None]:
+    """At a state q: its place (d,), its direction (d,), and the place (d,) of its other end."""
+    state = q[None]
+    at = points_at(case, symbol.body, symbol.at[None], state)[0, 0]
+    end = None if symbol.end is None else points_at(case, symbol.end[0], symbol.end[1][None], state)[0, 0]
+    if symbol.way is None:
+        return at, None, end
+    ends = points_at(case, symbol.axes, np.array([symbol.way, np.zeros_like(symbol.way)]), state)[0]
+    return at, np.asarray(ends[0] - ends[1]), end

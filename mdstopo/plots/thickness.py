@@ -1,0 +1,131 @@
+"""How thick each member is drawn: by its design value, or in a final design by its largest force or its law."""
+
+import itertools
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mdstopo.case.laws.law import with_role
+from mdstopo.case.model import Case
+from mdstopo.plots.member_forces import forces_of
+from mdstopo.plots.scenery import Floats, sizes
+from mdstopo.plots.source import Source
+from mdstopo.plots.style import MOST_NAMED
+
+#: share of members without any size of their own; of the largest, what is smaller is not drawn
+PLAIN, FAINT = 0.5, 0.02
+#: states of a stored motion, and members, up to which forces are computed
+STATES, MANY = 400, 20_000
+
+
+@dataclass(frozen=True)
+class Thickness:
+    """shares: of each group (M,), from 0 to 1, relative to the largest; what: what they show, in words."""
+
+    shares: tuple[Floats, ...]
+    what: str
+
+
+def thickness(source: Source, alpha: Floats | None = None) -> Thickness:
+    """Of every group of the case. alpha: another design than the one of the file.
+
+    Where a group has a range, members are as thick as their share of it, relative to the thickest; those that are not
+    varied have half of that. Where nothing is varied, their largest forces in the motions that the file has; without
+    these, the factor of their laws where these are of one kind.
+    """
+    case = source.case
+    design = source.alpha if alpha is None else alpha
+    slices = case.group_slices
+    varied = [group.design and group.upper > group.lower for group in case.members]
+    if not any(varied):
+        return _of_final(source, design)
+    shares = [sizes(group, design[slices[group.name]]) if group.design else None for group in case.members]
+    ranged = [share for share, varies in zip(shares, varied, strict=True) if varies and share is not None]
+    most = max((float(share.max(initial=0.0)) for share in ranged), default=0.0) or 1.0
+    found = []
+    for group, share, varies in zip(case.members, shares, varied, strict=True):
+        if varies and share is not None:
+            found.append(share / most)
+        else:
+            found.append(np.full(len(group), PLAIN) if share is None else share)
+    return Thickness(tuple(found), f"alpha, up to {most:.3g}")
+
+
+def _of_final(source: Source, design: Floats) -> Thickness:
+    case = source.case
+    peaks = stored_peaks(source, design) if case.n_members <= MANY else None
+    what = "largest force"
+    if peaks is None or not any(np.any(each) for each in peaks):
+        peaks, what = _factors(case, design), "size"
+    if peaks is None:
+        return Thickness(tuple(np.full(len(group), PLAIN) for group in case.members), "")
+    most = max((float(each.max(initial=0.0)) for each in peaks), default=0.0) or 1.0
+    # a member that never pulls is there all the same
+    shares = tuple(np.maximum(each / most, 2.0 * FAINT) for each in peaks)
+    return Thickness(shares, what if what == "size" else f"{what}, up to {most:.3g} N")
+
+
+def stored_peaks(source: Source, design: Floats) -> list[Floats] | None:
+    """(M,) of each group: the largest |f*| of all load cases in the motions of the file; None where it cannot be told.
+
+    At the steps that the file has, so a little below the peaks between them.
+    """
+    case = source.case
+    every = [(group, np.arange(len(group))) for group in case.members]
+    found = np.zeros(case.n_members)
+    for name in source.load_cases:
+        stored = source.view.under(f"trajectories/{name}")
+        if "q" not in stored or "v" not in stored or not len(stored["q"]):
+            return None
+        chosen = np.unique(np.linspace(0, len(stored["q"]) - 1, STATES).astype(int))
+        forces = forces_of(case, design, every, stored["q"][chosen], stored["v"][chosen])
+        if forces is None:
+            return None
+        found = np.maximum(found, np.abs(forces).max(axis=0, initial=0.0))
+    return [found[part] for part in _parts(case)]
+
+
+def _parts(case: Case) -> list[slice]:
+    ends = np.cumsum([0, *(len(group) for group in case.members)]).tolist()
+    return [slice(a, b) for a, b in itertools.pairwise(ends)]
+
+
+def _factors(case: Case, design: Floats) -> list[Floats] | None:
+    """(M,) of each group: alpha^mu times what scales its laws, where the laws of all are of one kind; else None."""
+    kinds = {tuple(law.type for law in group.laws) for group in case.members}
+    names = {tuple(with_role(type(law), "scales")) for group in case.members for law in group.laws}
+    if len(kinds) != 1 or not all(len(each) for each in names):
+        return None
+    slices = case.group_slices
+    found = []
+    for group in case.members:
+        numbers = [getattr(law, name) for law in group.laws for name in with_role(type(law), "scales")]
+        plain = [abs(float(number)) for number in numbers if isinstance(number, int | float)]
+        if not plain:
+            return None
+        scale = design[slices[group.name]] ** group.power if group.design else np.ones(len(group))
+        found.append(scale * max(plain))
+    return found
+
+
+def families(case: Case) -> list[str]:
+    """What each group is called in a legend, and coloured by: in a final design, where each member is a group, its name
+    without the number."""
+    names = [group.name for group in case.members]
+    if len(names) <= MOST_NAMED:
+        return names
+    return [re.sub(r"_\d+$", "", name) for name in names]
+
+
+def strongest(shares: tuple[Floats, ...], most: int) -> list[NDArray[np.int64]]:
+    """Of each group the members that are thick enough to be seen, in order; of many the thickest."""
+    every = np.concatenate(shares) if shares else np.zeros(0)
+    least = float(np.partition(every, -most)[-most]) if len(every) > most else 0.0
+    found, room = [], most
+    for share in shares:
+        chosen = np.flatnonzero((share > FAINT) & (share >= least))[:room]
+        room -= len(chosen)
+        found.append(chosen)
+    return found
