@@ -85,6 +85,7 @@ def main() -> int:
         action="store_true",
         help="write the tables of applications, bounds and other programs into docs, designs into cases/designs",
     )
+    parser.add_argument("--only", metavar="NAME", action="append", help="applications: this one alone; may be repeated")
     chosen = parser.parse_args()
     unknown = [name for name in chosen.sections if name not in SECTIONS]
     if unknown:
@@ -107,7 +108,7 @@ def main() -> int:
         if chosen.readme and name in PAGES:
             replace_block(Path(PAGES[name]), name, "\n".join([*printed, machine]))
         if chosen.pages and name == "applications":
-            write_pages(printed, machine)
+            write_pages(printed, machine, chosen.only)
         if chosen.pages and name == "bound":
             replace_block(Path("docs/theory/bound.md"), name, "\n".join([*printed, machine]))
         if chosen.pages and name in PEERS:
@@ -124,7 +125,9 @@ def _tables(name: str, chosen: argparse.Namespace) -> Iterator[Table]:
         return section(chosen.minutes, chosen.seed)
     if name == "golden":
         return section(chosen.check, chosen.write)
-    return section(folder=Path("cases/designs")) if name == "applications" and chosen.pages else section()
+    if name == "applications":
+        return section(chosen.only, Path("cases/designs") if chosen.pages else None)
+    return section()
 
 
 if __name__ == "__main__":

@@ -6,19 +6,22 @@ from numpy.typing import NDArray
 from mdstopo import Case, simulate
 from mdstopo.case.model import GROUND, ActuatorLaw, CrushLaw, GapLaw, SpringLaw
 from mdstopo.case.parts import MemberGroup
+from mdstopo.integrators.trajectory import Trajectory
 
 Floats = NDArray[np.float64]
+#: a motion, or None: it is simulated
+Motion = Trajectory | None
 
 #: places in time
 PLACES = 4000
 
 
-def whole_forces(case: Case, alpha: Floats, group: MemberGroup, load_case: str) -> Floats:
+def whole_forces(case: Case, alpha: Floats, group: MemberGroup, load_case: str, motion: Motion = None) -> Floats:
     """The largest |f| (M,) in N that each member of a group would carry in this motion if it were whole.
 
-    Raises ValueError for a law that is not written out here.
+    motion: that of the design, if it is known. Raises ValueError for a law that is not written out here.
     """
-    times, x, rate = _elongations(case, alpha, group, load_case)
+    times, x, rate = _elongations(case, group, motion or simulate(case, alpha, load_case))
     total = np.zeros_like(x)
     for law in group.laws:
         until = np.inf if law.active_until is None else law.active_until
@@ -29,14 +32,17 @@ def whole_forces(case: Case, alpha: Floats, group: MemberGroup, load_case: str) 
     return np.asarray(np.abs(total).max(axis=0))
 
 
-def strokes(case: Case, alpha: Floats, group: MemberGroup, load_case: str) -> Floats:
-    """By how much each member (M,) of a group becomes shorter or longer in this motion, at most, in m."""
-    return np.asarray(np.abs(_elongations(case, alpha, group, load_case)[1]).max(axis=0))
+def strokes(case: Case, alpha: Floats, group: MemberGroup, load_case: str, motion: Motion = None) -> Floats:
+    """By how much each member (M,) of a group becomes shorter or longer in this motion, at most, in m.
+
+    motion: that of the design, if it is known.
+    """
+    motion = motion or simulate(case, alpha, load_case)
+    return np.asarray(np.abs(_elongations(case, group, motion)[1]).max(axis=0))
 
 
-def _elongations(case: Case, alpha: Floats, group: MemberGroup, load_case: str) -> tuple[Floats, Floats, Floats]:
+def _elongations(case: Case, group: MemberGroup, motion: Trajectory) -> tuple[Floats, Floats, Floats]:
     """Times (T,), elongations and their rates (T, M)."""
-    motion = simulate(case, alpha, load_case)
     times = np.linspace(motion.t[0], motion.t[-1], PLACES)
     states = motion.at(times)
     p, vp = _points(case, group.body_from, group.from_local[group.from_index], states.q, states.v)
@@ -46,14 +52,29 @@ def _elongations(case: Case, alpha: Floats, group: MemberGroup, load_case: str) 
 
 
 def _points(case: Case, body: str, local: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
-    """Places and velocities (T, M, 2) of points on a body."""
+    """Places and velocities (T, M, 2), in space (T, M, 3), of points on a body."""
     if body == GROUND:
         return np.broadcast_to(local, (len(q), *local.shape)), np.zeros((len(q), *local.shape))
-    k = 3 * [each.name for each in case.bodies].index(body)
-    c, s = np.cos(q[:, k + 2])[:, None], np.sin(q[:, k + 2])[:, None]
+    k = [each.name for each in case.bodies].index(body)
+    if case.dimension == 3:
+        return _spatial_points(local, q[:, 7 * k : 7 * k + 7], v[:, 6 * k : 6 * k + 6])
+    q, v = q[:, 3 * k : 3 * k + 3], v[:, 3 * k : 3 * k + 3]
+    c, s = np.cos(q[:, 2])[:, None], np.sin(q[:, 2])[:, None]
     arm = np.stack([c * local[:, 0] - s * local[:, 1], s * local[:, 0] + c * local[:, 1]], axis=2)
-    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=2) * v[:, None, k + 2 : k + 3]
-    return q[:, None, k : k + 2] + arm, v[:, None, k : k + 2] + turned
+    turned = np.stack([-arm[..., 1], arm[..., 0]], axis=2) * v[:, None, 2:]
+    return q[:, None, :2] + arm, v[:, None, :2] + turned
+
+
+def _spatial_points(local: Floats, q: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Places and velocities (T, M, 3) of points of one body with q (T, 7) and v (T, 6).
+
+    The arm turned by the quaternion (w, u) is r + 2 w (u x r) + 2 u x (u x r).
+    """
+    w, u = q[:, None, 3:4], np.broadcast_to(q[:, None, 4:], (len(q), *local.shape))
+    once = 2.0 * np.cross(u, local[None])
+    arm = local + w * once + np.cross(u, once)
+    turn = np.broadcast_to(v[:, None, 3:], arm.shape)
+    return q[:, None, :3] + arm, v[:, None, :3] + np.cross(turn, arm)
 
 
 def _force(law: object, x: Floats, rate: Floats) -> Floats:

@@ -3,7 +3,7 @@
 `python -m benchmarks golden --check FILE` computes everything that is kept in the file and tells what differs;
 `--write FILE` keeps what is computed now. Kept are, for every case in `cases/`, each integrator and each sensitivity
 method that the case can use, objectives, constraints and gradients at one design; and the iterates of the paper's
-scenes.
+scenes. Of cases in space, whose kernels compile for minutes, what `auto` chooses is kept.
 
 Bits are the same only with the same processor and the same versions of the compiler (docs/accuracy.md). On others, what
 is computed has to agree to the case's tolerance.
@@ -36,6 +36,8 @@ Item = dict[str, dict[str, Any]]
 
 #: steps of `generalized_alpha`
 STEPS = 100
+#: integrator and method for cases in space
+IN_SPACE = "runge_kutta/adjoint"
 #: cases whose iterates are kept, and how many
 ITERATED, ITERATIONS = ("fig6", "fig6-stiff", "fig7", "fig7-g1", "fig7-g2"), 30
 #: where bits may differ: how many tolerances of the case values and gradients may differ by, relative to their size
@@ -65,9 +67,10 @@ class Finding:
 
 def names() -> list[str]:
     """All items: CASE/INTEGRATOR/METHOD and CASE/iterates."""
-    cases = sorted(path.stem for path in CASES.glob("*.yaml"))
     methods = [name for name in SENSITIVITIES if name != "auto"]
-    single = [f"{case}/{integrator}/{method}" for case in cases for integrator in INTEGRATORS for method in methods]
+    ways = {2: [f"{integrator}/{method}" for integrator in INTEGRATORS for method in methods], 3: [IN_SPACE]}
+    cases = [load_case(path) for path in sorted(CASES.glob("*.yaml"))]
+    single = [f"{case.name}/{way}" for case in cases for way in ways[case.dimension]]
     return single + [f"{case}/iterates" for case in ITERATED]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo import Case
+from mdstopo.case.parts import MemberGroup
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer.gsao import Gsao
@@ -23,9 +24,11 @@ from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.settings.optimizer_presets import settings
 
 Floats = NDArray[np.float64]
+#: a point in the plane or in space
+Place = tuple[float, ...]
 #: ends P and Q of one member, in m, global axes, at the start
-Ends = tuple[tuple[float, float], tuple[float, float]]
-#: by part, whose first word is a group: the members that share one size
+Ends = tuple[Place, Place]
+#: by part: the members that share one size. Its first word is a group, or how the names of several groups begin
 Hand = Mapping[str, Sequence[Ends]]
 
 #: iterations that its sizes are given, and shares of the upper bounds that they begin with
@@ -35,6 +38,18 @@ ITERATIONS, STARTS = 40, (0.5, 1.0)
 def mirrored(*members: Ends) -> list[Ends]:
     """Members and their mirror images, x against -x."""
     return [((side * p[0], p[1]), (side * q[0], q[1])) for side in (1, -1) for p, q in members]
+
+
+def of_four_legs(*members: Ends) -> list[Ends]:
+    """Members of the leg on the x axis with their mirror images, y against -y, and those of three more legs, each
+    turned by a quarter about z."""
+    return [
+        ((c * p[0] - s * side * p[1], s * p[0] + c * side * p[1], p[2]),
+         (c * q[0] - s * side * q[1], s * q[0] + c * side * q[1], q[2]))
+        for c, s in ((1, 0), (0, 1), (-1, 0), (0, -1))
+        for side in (1, -1)
+        for p, q in members
+    ]  # fmt: skip
 
 
 HANDS: dict[str, Hand] = {
@@ -74,6 +89,14 @@ HANDS: dict[str, Hand] = {
         "left_struts lower": [((-1.9, 0), (-1, 0.9)), ((-1.9, 0), (-0.6, 0.9))],
         "right_struts lower": [((1.9, 0), (1, 0.9)), ((1.9, 0), (0.6, 0.9))],
     },
+    "touchdown": {
+        # as the lunar module: two crushable struts high up, close together, springs beside them, and a pair of braces
+        # to the lower corners, which are crushable too
+        "crush upper": of_four_legs(((2.2, 0, 0), (1, 0.2, 2.1))),
+        "crush lower": of_four_legs(((2.2, 0, 0), (1, 1, 0.9))),
+        "struts upper": of_four_legs(((2.2, 0, 0), (1, 0.2, 2.1))),
+        "struts lower": of_four_legs(((2.2, 0, 0), (1, 1, 0.9))),
+    },
 }  # fmt: skip
 
 
@@ -82,50 +105,72 @@ def places(case: Case, hand: Hand) -> list[tuple[str, list[int]]]:
 
     Raises ValueError where the case has no such member (nearest ends off by more than 2 cm).
     """
-    found = []
-    for part, members in hand.items():
-        group = next(each for each in case.design_groups if each.name == part.split()[0])
-        first = case.group_slices[group.name].start
-        p, q = group.from_world[group.from_index], group.to_world[group.to_index]
-        chosen = []
-        for ends in members:
-            off = np.hypot(*(p - ends[0]).T) + np.hypot(*(q - ends[1]).T)
-            if off.min() > 0.02:
-                raise ValueError(f"{case.name}: no member of {group.name} joins {ends[0]} with {ends[1]}")
-            chosen.append(first + int(off.argmin()))
-        found.append((part, chosen))
+    return [(part, [_place(case, part.split()[0], ends) for ends in members]) for part, members in hand.items()]
+
+
+def _place(case: Case, word: str, ends: Ends) -> int:
+    """The place in the design vector of the member with these ends, of the groups whose names begin with a word."""
+    best, place = np.inf, -1
+    for group in case.design_groups:
+        if f"{group.name}_".startswith(f"{word}_"):
+            p, q = group.from_world[group.from_index], group.to_world[group.to_index]
+            off = np.linalg.norm(p - ends[0], axis=1) + np.linalg.norm(q - ends[1], axis=1)
+            if off.min() < best:
+                best, place = float(off.min()), case.group_slices[group.name].start + int(off.argmin())
+    if best > 0.02:
+        raise ValueError(f"{case.name}: no member of {word} joins {ends[0]} with {ends[1]}")
+    return place
+
+
+def alike(case: Case) -> list[list[MemberGroup]]:
+    """The design groups, those together whose members have the same alphas."""
+    found: list[list[MemberGroup]] = []
+    for group in case.design_groups:
+        others = {name for names in case.mirrored if group.name in names for name in names}
+        with_it = next((each for each in found if each[0].name in others), None)
+        if with_it is None:
+            found.append([group])
+        else:
+            with_it.append(group)
     return found
 
 
 def even(case: Case) -> list[tuple[str, list[int]]]:
-    """The simplest rule, as parts of a design: all candidates of a group have one size."""
-    ranges = ((group.name, case.group_slices[group.name]) for group in case.design_groups)
-    return [(name, list(range(own.start, own.stop))) for name, own in ranges]
+    """The simplest rule, as parts of a design: all candidates of a group, and of those like it, have one size."""
+    ranges = [(groups[0].name, [case.group_slices[group.name] for group in groups]) for groups in alike(case)]
+    return [(name, [i for own in slices for i in range(own.start, own.stop)]) for name, slices in ranges]
 
 
 class Sizes:
-    """The problem of a case with one variable for each part of a hand design; all other members are at their bound."""
+    """The problem of a case with one variable for each part of a hand design; all other members are at their bound.
+
+    Raises ValueError where a part has some of the members that share an alpha, and not all of them.
+    """
 
     def __init__(self, problem: DesignProblem, parts: list[tuple[str, list[int]]]) -> None:
         self.problem = problem
         self.spread = np.zeros((len(problem.initial), len(parts)))
-        for k, (_, chosen) in enumerate(parts):
-            self.spread[chosen, k] = 1.0
+        for k, (part, chosen) in enumerate(parts):
+            whole = np.zeros(problem.space.length)
+            whole[chosen] = 1.0
+            self.spread[:, k] = problem.space.reduce(whole)
+            if not np.isin(self.spread[:, k], (0.0, 1.0)).all():
+                raise ValueError(f"{part}: all members that share an alpha belong to it, or none")
         rest = problem.lower * (1.0 - self.spread.sum(axis=1))
         self.rest = rest
-        self.lower = np.array([problem.lower[chosen].max() for _, chosen in parts])
-        self.upper = np.array([problem.upper[chosen].min() for _, chosen in parts])
+        self.lower = np.array([problem.lower[own > 0.0].max() for own in self.spread.T])
+        self.upper = np.array([problem.upper[own > 0.0].min() for own in self.spread.T])
         self.initial = 0.5 * self.upper
         rows = problem.linear
         self.linear = LinearRows(rows.A @ self.spread, rows.b - rows.A @ rest, rows.equal)
 
-    def design(self, sizes: Floats) -> Floats:
-        """alpha (N,)."""
+    def variables(self, sizes: Floats) -> Floats:
+        """The problem's own variables x (n,)."""
         return np.asarray(self.rest + self.spread @ sizes)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """A sample of the case, seen from the sizes."""
-        sample = self.problem.evaluate(self.design(x), gradient)
+        sample = self.problem.evaluate(self.variables(x), gradient)
         if not len(sample.gradients):
             return sample
         slopes = {
@@ -142,4 +187,4 @@ def sized(case: Case, parts: list[tuple[str, list[int]]], score: Scalarisation) 
     chosen = settings(max_iterations=ITERATIONS)
     ends = [run(Gsao(problem, chosen), Gsao(problem, chosen).start(share * problem.upper)) for share in STARTS]
     best = min(ends, key=lambda state: (max(state.best_violation, 1e-6), state.best_objective))
-    return problem.design(best.best_alpha)
+    return case.space.expand(problem.variables(best.best_alpha))

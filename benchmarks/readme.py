@@ -1,6 +1,7 @@
 """Numbers in the README, and in pages of the documentation, stand between marks; only this module writes there."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 README, PERFORMANCE, COMPARISON = Path("README.md"), Path("docs/performance.md"), Path("docs/comparison.md")
@@ -20,11 +21,11 @@ def replace_block(path: Path, name: str, text: str) -> None:
     path.write_text(pattern.sub(lambda _: f"{begin}\n\n{text.strip()}\n\n{end}", whole, count=1), encoding="utf-8")
 
 
-def write_pages(tables: list[str], machine: str) -> None:
-    """Put the tables of `applications` into the pages: a group that ends with the table of its summary for each."""
+def write_pages(tables: list[str], machine: str, names: Sequence[str] | None = None) -> None:
+    """Put the tables of `applications` into the pages of these (None: of all): equally many for each."""
     from benchmarks.applications import APPLICATIONS, TABLES
 
-    for i, name in enumerate(APPLICATIONS):
+    for i, name in enumerate(names or APPLICATIONS):
         own = tables[i * TABLES : (i + 1) * TABLES]
         replace_block(Path(f"docs/applications/{name}.md"), name, "\n".join([*own, machine]))
 

@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from benchmarks.applications import APPLICATIONS, HELD, PRESENT, excess, finer, scorer
+from benchmarks.applications import APPLICATIONS, HELD, PRESENT, combined, excess, finer, scorer
 from benchmarks.forces import strokes, whole_forces
-from benchmarks.hand import HANDS, even, places
+from benchmarks.hand import HANDS, Sizes, alike, even, of_four_legs, places
 from benchmarks.motions import DATA, texts
 from benchmarks.scenes import CASES
 from mdstopo import Case, evaluate, load_case, optimize
 from mdstopo.case.model import CrushLaw, VolumeRow
+from mdstopo.design_problem import DesignProblem
+from mdstopo.engine import Evaluator
 from mdstopo.scene.refusals import refusals
 from mdstopo.store.design_files import read_design
 
@@ -38,7 +40,8 @@ def test_each_has_several_kinds_of_members_that_cost_and_two_objectives_at_least
 def test_a_hand_design_is_made_of_candidates(name: str) -> None:
     case = case_of(name)
     found = places(case, HANDS[name])
-    assert {part.split()[0] for part, _ in found} <= {group.name for group in case.design_groups}
+    names = [f"{group.name}_" for group in case.design_groups]
+    assert all(any(name.startswith(f"{part.split()[0]}_") for name in names) for part, _ in found)
     chosen = [member for _, members in found for member in members]
     assert len(set(chosen)) == len(chosen) > 3
 
@@ -47,13 +50,21 @@ def test_a_hand_design_is_made_of_candidates(name: str) -> None:
 def test_an_even_design_has_every_candidate_once(name: str) -> None:
     case = case_of(name)
     parts = even(case)
-    assert [part for part, _ in parts] == [group.name for group in case.design_groups]
-    assert [member for _, members in parts for member in members] == list(range(case.n_design))
+    assert [part for part, _ in parts] == [groups[0].name for groups in alike(case)]
+    assert sorted(member for _, members in parts for member in members) == list(range(case.n_design))
 
 
 def test_a_hand_design_with_a_member_that_is_none_is_refused() -> None:
     with pytest.raises(ValueError, match="no member of chains joins"):
         places(case_of("tiedown"), {"chains": [((0.0, 0.0), (1.0, 1.0))]})
+
+
+def test_a_part_of_a_hand_design_with_some_of_the_members_that_share_an_alpha_is_refused() -> None:
+    case = case_of("touchdown")
+    problem = DesignProblem(Evaluator(case), combined(case))
+    east = places(case, {"crush upper": of_four_legs(((2.2, 0, 0), (1, 0.2, 2.1)))[:2]})
+    with pytest.raises(ValueError, match="crush upper: all members that share an alpha belong to it, or none"):
+        Sizes(problem, east)
 
 
 def test_tables_of_time_are_what_their_formulas_give() -> None:
@@ -135,6 +146,42 @@ def test_the_cartridges_of_the_lander_are_crushed_and_stay_so() -> None:
             far = strokes(case, design, group, "level")[there]
             assert far.max() > 5 * law.force / law.stiffness
             assert np.all(far < 0.7 * group.length[there])
+
+
+@pytest.mark.slow
+def test_forces_in_space_that_are_written_out_again_agree_with_the_response() -> None:
+    groups = ("struts_wl", "crush_er")
+    rows = [
+        {"response": {"member_force": {"group": group}}, "over_time": "max", "load_case": "downhill", "limit": 1e4}
+        for group in groups
+    ]
+    case = case_of("touchdown", constraints=rows)
+    design = read_design(CASES / "designs" / "touchdown.txt", case.n_design)
+    found = evaluate(case, design, gradient=False)
+    for i, name in enumerate(groups):
+        group = next(each for each in case.design_groups if each.name == name)
+        own = whole_forces(case, design, group, "downhill") * design[case.group_slices[name]]
+        assert own.max() == pytest.approx(found.constraints[i] + 1e4, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_the_lander_on_a_slope_stops_no_softer_than_anything_can_and_all_its_legs_are_crushed() -> None:
+    """Along the slope's normal the hull has 2.85 m/s to lose, and the travel of its centre of mass is at most that of
+    the nozzle and what the tilt adds: v^2 / 2 s bounds the acceleration of every design."""
+    case = case_of("touchdown")
+    design = read_design(CASES / "designs" / "touchdown.txt", case.n_design)
+    shock = evaluate(case, design, gradient=False).objectives["corner"]
+    slope, tilt, arm, clear = 0.13963, 0.2, 1.2, 0.51
+    speed = 3.05 * np.cos(slope) - 1.22 * np.sin(slope)
+    travel = clear + arm * (np.cos(slope) - np.cos(slope + tilt))
+    assert shock > speed**2 / (2.0 * travel)
+    for groups in alike(case):
+        for group in groups if groups[0].name.startswith("crush") else ():
+            there = design[case.group_slices[group.name]] >= 0.5
+            law = group.laws[0]
+            assert isinstance(law, CrushLaw)
+            far = max(strokes(case, design, group, each.name)[there].max() for each in case.load_cases)
+            assert 5 * law.force / law.stiffness < far < 0.7 * group.length[there].min()
 
 
 @pytest.mark.slow
