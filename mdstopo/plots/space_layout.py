@@ -9,14 +9,16 @@ from mdstopo.plots.member_lines import draw_members
 from mdstopo.plots.scenery import Floats, ends_at, hull, points_of
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import COLOURS, WIDTH
+from mdstopo.plots.style import COLOURS, MOST_NAMED, WIDTH
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.views import View, views
 from mdstopo.scene.points import points_at
 
-#: inches: a page's width, its greatest height; left of a panel, below it, above it, and for the legend
+#: inches: a page's width, its greatest height; left of a panel, below it, above it; a line of the legend, its title
 PAGE, TALL = 2.0 * WIDTH, 9.0
-LEFT, BELOW, ABOVE, LEGEND = 0.55, 0.42, 0.22, 0.3
+LEFT, BELOW, ABOVE, LINE, HEAD = 0.55, 0.42, 0.22, 0.14, 0.22
+#: inches: a name in the legend has so much beside its letters, and so much for each
+BESIDE, LETTER = 0.55, 0.062
 #: share of the scene's size that is left free around it; the least of a panel's sides, in the longest one's
 MARGIN, LEAST = 0.07, 0.55
 #: inches: the axes' directions in the corner of the perspective
@@ -37,7 +39,8 @@ def draw_space(module: Any, source: Source, panels: list[tuple[float | None, Flo
     seen = views(case, middle, max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
     extent = np.maximum(high - low, LEAST * max(float((high - low).max()), 1e-9)) * (1.0 + 2.0 * MARGIN)
     sizes = [float(extent @ np.abs(row)) for row in (seen["front"].across, seen["top"].along, seen["front"].along)]
-    places, inches, scale = _arrange(sizes, len(panels))
+    columns, lines = _legend(case)
+    places, inches, scale = _arrange(sizes, len(panels), HEAD + LINE * lines)
     figure = module.Figure(figsize=inches)
     figure.set_layout_engine("none")  # the panels' places give all views one scale
     for k, (t, q) in enumerate(panels):
@@ -50,18 +53,29 @@ def draw_space(module: Any, source: Source, panels: list[tuple[float | None, Flo
             axis.set_title(words, loc="left")
     handles, labels = figure.axes[0].get_legend_handles_labels()
     title = "width of a line: alpha" if case.n_design else None
-    figure.legend(handles, labels, loc="upper left", ncols=6, title=title, alignment="left", borderaxespad=0.3)
+    figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, alignment="left", borderaxespad=0.3)
     return figure
 
 
 _Places = list[dict[str, tuple[float, float, float, float]]]
 
 
-def _arrange(sizes: list[float], count: int) -> tuple[_Places, tuple[float, float], float]:
+def _legend(case: Case) -> tuple[int, int]:
+    """How many columns and lines the names in the legend take, at most six columns."""
+    names = [body.name for body in case.bodies]
+    names += ["contact"] * bool(surfaces_of(case)) + ["joint"] * bool(case.joints)
+    names += [group.name for group in case.members] if len(case.members) <= MOST_NAMED else []
+    wide = BESIDE + LETTER * max(map(len, names))
+    columns = min(6, max(1, int((PAGE - 0.2) / wide)), len(names))
+    return columns, -(-len(names) // columns)
+
+
+def _arrange(sizes: list[float], count: int, legend: float) -> tuple[_Places, tuple[float, float], float]:
     """Where the panels of each state are (x, y, width, height in inches), the picture's size, and inches in a metre.
 
-    sizes: how much there is to be seen across, away and up. One state has two rows, the top view above the front view
-    and the side view to the right of it, as on a drawing; of several states each has a row.
+    sizes: how much there is to be seen across, away and up. legend: its height in inches. One state has two rows, the
+    top view above the front view and the side view to the right of it, as on a drawing; of several states each has a
+    row.
     """
     across, away, up = sizes
     if count == 1:
@@ -70,7 +84,6 @@ def _arrange(sizes: list[float], count: int) -> tuple[_Places, tuple[float, floa
     else:
         columns, rows = [across, across, away, max(across, away)], [max(away, up)] * count
         where = {"front": (0, 0), "top": (1, 0), "side": (2, 0), "perspective": (3, 0)}
-    legend = LEGEND + 0.2
     free = TALL - legend - len(rows) * (BELOW + ABOVE)
     scale = min((PAGE - len(columns) * LEFT - 0.1) / sum(columns), max(free, 1.0) / sum(rows))
     height = legend + len(rows) * (BELOW + ABOVE) + scale * sum(rows)
