@@ -5,17 +5,23 @@ from typing import Any
 import numpy as np
 
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import MOST_NAMED, colour, new_figure
+from mdstopo.plots.style import HEIGHT, MOST_NAMED, colour, new_figure
 
+#: groups whose names have room beside the stems; letters of a name of which two have room in a line; a line in inches
+FEW, SHORT, LINE = 4, 22, 0.14
 #: members that still are stems of their own
 STEMS = 400
 
 
 def draw(module: Any, source: Source) -> Any:
     """alpha by member, group beside group."""
-    figure, (axis,) = new_figure(module)
+    groups = source.case.group_slices
+    above = FEW < len(groups) <= MOST_NAMED  # names beside the stems would hide some
+    columns = 2 if max(map(len, groups), default=0) <= SHORT else 1
+    lines = -(-len(groups) // columns) if above else 0
+    figure, (axis,) = new_figure(module, height=HEIGHT + LINE * lines)
     alpha = source.alpha
-    for k, (name, part) in enumerate(source.case.group_slices.items()):
+    for k, (name, part) in enumerate(groups.items()):
         places = np.arange(part.start, part.stop)
         own = colour(k)
         if len(alpha) <= STEMS:
@@ -24,6 +30,8 @@ def draw(module: Any, source: Source) -> Any:
     axis.set_xlabel("member")
     axis.set_ylabel("alpha")
     axis.set_ylim(bottom=min(0.0, float(alpha.min(initial=0.0))))
-    if 1 < len(source.case.group_slices) <= MOST_NAMED:
+    if above:
+        axis.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, markerscale=2.0)
+    elif 1 < len(groups) <= FEW:
         axis.legend()
     return figure

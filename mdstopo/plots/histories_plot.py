@@ -1,5 +1,6 @@
 """What the objectives look at, over time; on demand sensitivities over time."""
 
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ from mdstopo.plots.source import SAMPLES, Floats, Source
 from mdstopo.plots.style import DASHES, colour, new_figure
 from mdstopo.plots.watch import response_history
 from mdstopo.store.store_errors import StoreError
+
+#: letters of a title that a column is wide enough for
+LETTERS = 48
 
 
 def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
@@ -32,7 +36,7 @@ def draw(module: Any, source: Source, load_case: str | None = None) -> Any:
         axis.plot(t, g, color=colour(k))
         axis.set_ylabel(f"{objective.name}, {unit_of(objective.response)}")
         where = "" if len(source.load_cases) == 1 else f", load case {objective.load_case}"
-        axis.set_title(words(objective.response) + where, loc="left")
+        axis.set_title(fill(words(objective.response) + where, LETTERS), loc="left")
     axes[-1].set_xlabel("time, s")
     return figure
 

@@ -6,22 +6,24 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.model import GROUND, Case, MemberGroup
+from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_lines import draw_members
 from mdstopo.plots.scenery import Floats, ends_at, hull, points_of
 from mdstopo.plots.solids import Solid, solid
 from mdstopo.plots.source import Source
-from mdstopo.plots.style import WIDTH, colour, ink
+from mdstopo.plots.style import MOST_NAMED, WIDTH, colour, ink
 from mdstopo.plots.surface_lines import surfaces_of
 from mdstopo.plots.symbol_marks import draw_symbols, legend_handles
 from mdstopo.plots.symbols import symbols
-from mdstopo.plots.thickness import Thickness
+from mdstopo.plots.thickness import Thickness, families
 from mdstopo.plots.views import View, views
 from mdstopo.scene.points import points_at
 
-#: inches: a page's width, its greatest height; left of a panel, below it, above it, and for the legend
+#: inches: a page's width, its greatest height; left of a panel, below it, above it; a line of the legend, its title
 PAGE, TALL = 2.0 * WIDTH, 9.0
-LEFT, BELOW, ABOVE, LEGEND = 0.55, 0.42, 0.22, 0.45
-LEGEND_COLUMNS = 6
+LEFT, BELOW, ABOVE, LINE, HEAD = 0.55, 0.42, 0.22, 0.14, 0.22
+#: inches: a name in the legend has so much beside its letters, and so much for each
+BESIDE, LETTER = 0.55, 0.062
 #: share of the scene's size that is left free around it; the least of a panel's sides, in the longest one's
 MARGIN, LEAST = 0.07, 0.55
 #: inches: the axes' directions in the corner of the perspective
@@ -47,7 +49,8 @@ def draw_space(
     seen = views(case, middle, max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
     extent = np.maximum(high - low, LEAST * max(float((high - low).max()), 1e-9)) * (1.0 + 2.0 * MARGIN)
     sizes = [float(extent @ np.abs(row)) for row in (seen["front"].across, seen["top"].along, seen["front"].along)]
-    places, inches, scale = _arrange(sizes, len(panels))
+    columns, lines = _legend(case, load_case)
+    places, inches, scale = _arrange(sizes, len(panels), HEAD + LINE * lines)
     figure = module.Figure(figsize=inches)
     figure.set_layout_engine("none")  # the panels' places give all views one scale
     for k, (t, q) in enumerate(panels):
@@ -62,9 +65,7 @@ def draw_space(
             axis.set_title(words, loc="left")
     handles, labels = legend_handles(figure.axes[0])
     title = f"width: {thick.what}" if thick.what else None
-    figure.legend(
-        handles, labels, loc="upper left", ncols=LEGEND_COLUMNS, title=title, alignment="left", borderaxespad=0.3
-    )
+    figure.legend(handles, labels, loc="upper left", ncols=columns, title=title, alignment="left", borderaxespad=0.3)
     return figure
 
 
@@ -75,11 +76,23 @@ def _ends_seen(case: Case, view: View, q: Floats) -> Callable[[MemberGroup], Flo
 _Places = list[dict[str, tuple[float, float, float, float]]]
 
 
-def _arrange(sizes: list[float], count: int) -> tuple[_Places, tuple[float, float], float]:
+def _legend(case: Case, load_case: str | None) -> tuple[int, int]:
+    """How many columns and lines the names in the legend take, at most six columns."""
+    groups = dict.fromkeys(families(case))
+    names = [*(body.name for body in case.bodies), GROUND, *["contact"] * bool(surfaces_of(case))]
+    names += {glyphs()[each.kind].words: None for each in symbols(case, load_case)}
+    names += groups if len(groups) <= MOST_NAMED else []
+    wide = BESIDE + LETTER * max(map(len, names))
+    columns = min(6, max(1, int((PAGE - 0.2) / wide)), len(names))
+    return columns, -(-len(names) // columns)
+
+
+def _arrange(sizes: list[float], count: int, legend: float) -> tuple[_Places, tuple[float, float], float]:
     """Where the panels of each state are (x, y, width, height in inches), the picture's size, and inches in a metre.
 
-    sizes: how much there is to be seen across, away and up. One state has two rows, the top view above the front view
-    and the side view to the right of it, as on a drawing; of several states each has a row.
+    sizes: how much there is to be seen across, away and up. legend: its height in inches. One state has two rows, the
+    top view above the front view and the side view to the right of it, as on a drawing; of several states each has a
+    row.
     """
     across, away, up = sizes
     if count == 1:
@@ -88,7 +101,6 @@ def _arrange(sizes: list[float], count: int) -> tuple[_Places, tuple[float, floa
     else:
         columns, rows = [across, across, away, max(across, away)], [max(away, up)] * count
         where = {"front": (0, 0), "top": (1, 0), "side": (2, 0), "perspective": (3, 0)}
-    legend = LEGEND + 0.2
     free = TALL - legend - len(rows) * (BELOW + ABOVE)
     scale = min((PAGE - len(columns) * LEFT - 0.1) / sum(columns), max(free, 1.0) / sum(rows))
     height = legend + len(rows) * (BELOW + ABOVE) + scale * sum(rows)

@@ -55,6 +55,8 @@ members:
 objectives:
   sway: {response: {displacement: {body: hull, component: norm}}, over_time: max}
 """.replace("TITLE", TITLE)
+#: parts of the names of groups
+WAYS = ("fore_port", "fore_starboard", "aft_port", "aft_starboard")
 #: rad/s about a global axis, m/s, of the hull; the ball stays
 SPIN, DRIFT = np.array([0.0, 9.0, 12.0]), np.array([0.1, 0.0, 0.3])
 
@@ -212,6 +214,61 @@ def test_layouts_have_three_views_of_one_scale_and_a_perspective(source, tmp_pat
             for ending in ("svg", "png"):
                 save(figure, tmp_path / f"layout.{ending}")
                 assert (tmp_path / f"layout.{ending}").stat().st_size > 5000
+
+
+@pytest.fixture(scope="module")
+def named(source):
+    """The same with eight groups whose names are long."""
+    group = "  lashings: {from: corners, to: posts, law: {type: spring, stiffness: 800}}\n"
+    eight = [group.replace("lashings", f"lashings_of_the_{way}_quarter_{k}") for k in (1, 2) for way in WAYS]
+    case = read_case(CASE.replace(group, "".join(eight)).replace("body: hull, component", "body: ball, component"))
+    alpha = np.linspace(0.001, 1.0, case.n_design)
+    return SimpleNamespace(**{**vars(source), "case": case, "alpha": alpha, "design": alpha})
+
+
+def inside(figure, artist) -> bool:
+    """Whether an artist is within the picture, as it is drawn."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    box, whole = artist.get_window_extent(canvas.get_renderer()), figure.bbox
+    return bool(box.x0 >= whole.x0 and box.x1 <= whole.x1 and box.y0 >= whole.y0 and box.y1 <= whole.y1)
+
+
+def test_long_names_are_whole_and_hide_nothing(named):
+    pytest.importorskip("matplotlib")
+    from mdstopo.plots import design_plot
+    from mdstopo.plots.space_layout import draw_space
+    from mdstopo.plots.style import styled
+
+    with styled() as module:
+        start = start_state(named.case)
+        layout = draw_space(module, named, [(None, start)])
+        (legend,) = layout.legends
+        assert inside(layout, legend)
+        assert len(legend.get_texts()) == 12
+        below = legend.get_window_extent().y0
+        assert all(axis.get_window_extent().y1 <= below for axis in layout.axes)
+        design = design_plot.draw(module, named)
+        (axis,) = design.axes
+        assert inside(design, axis.get_legend())
+        assert axis.get_legend().get_window_extent().y0 >= axis.get_window_extent().y1 - 5.0
+
+
+def test_a_long_title_of_a_history_is_whole(named, monkeypatch):
+    pytest.importorskip("matplotlib")
+    from mdstopo.plots import histories_plot
+    from mdstopo.plots.style import styled
+
+    times = np.linspace(0.0, 2.0, histories_plot.SAMPLES)
+    monkeypatch.setattr(histories_plot, "response_history", lambda *_: {"sway": 0.3 * times})
+    monkeypatch.setattr(histories_plot, "words", lambda _: "displacement y of the cargo relative to the ship's deck")
+    with styled() as module:
+        figure = histories_plot.draw(module, SimpleNamespace(**{**vars(named), "load_cases": ("default", "rolling")}))
+        (axis,) = figure.axes
+        assert axis.get_title("left").endswith("load case default")
+        assert inside(figure, axis._left_title)
 
 
 @pytest.fixture(scope="module")
