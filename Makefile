@@ -11,6 +11,7 @@
 #   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
 #   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
 #   make readme                   measure everything, put the tables into docs/, five rows into the README
+#   make wheel                    a wheel with compiled kernels, into dist/ (some minutes)
 #   make clean                    remove the environment and whatever was made; results stay
 
 PYTHON ?= $(or $(shell command -v python3.11),python3)
@@ -36,10 +37,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-lowest test-numba lint types docs reproduce bench peers readme clean
+.PHONY: help run test test-lowest test-numba lint types docs reproduce bench peers readme wheel clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,14p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,15p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -59,7 +60,11 @@ run: $(VENV)/.ready
 	   $(BIN)/mdstopo show --json $(RESULT) 2>/dev/null | grep -Eq '"status": "(running|interrupted)"'; then \
 	  args=--resume; fi; \
 	echo mdstopo run $(CASE) $$args; \
-	exec $(BIN)/mdstopo run $(CASE) $$args
+	$(BIN)/mdstopo run $(CASE) $$args || exit; \
+	case " $$args " in *" --out "*) ;; *) printf '%s\n' 'What next, with $(BIN)/mdstopo:' \
+	  '  mdstopo show $(RESULT)     the result in words' \
+	  '  mdstopo report $(RESULT)   one page with the motion' \
+	  '  mdstopo new --list         templates of cases of your own';; esac
 
 $(VENV)/.ready-plot: $(VENV)/.ready
 	$(BIN)/python -m pip install --quiet --editable '.[plot]'
@@ -137,6 +142,12 @@ $(VENV)/.ready-peers: $(VENV)/.ready
 
 peers: $(VENV)/.ready-peers
 	$(BIN)/python -m benchmarks $(or $(SECTIONS),peers ring forward million)
+
+# Machine code is compiled with an empty cache for each kind of processor, and put into the wheel.
+wheel: $(VENV)/.ready
+	$(BIN)/python packaging/ship_kernels.py build/kernels
+	MDSTOPO_KERNELS=$(CURDIR)/build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --wheel-dir dist .
+	@ls -l dist/*.whl
 
 readme: $(VENV)/.ready-bench
 	$(BIN)/python -m benchmarks --readme

@@ -4,7 +4,7 @@ Four calls run the same engine as the command line: `load_case`, `simulate`, `ev
 Names are resolved on first use, so that importing the package costs nothing.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mdstopo._version import __version__
 
@@ -35,16 +35,18 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    if name in __all__:
-        from mdstopo import api
+if not TYPE_CHECKING:  # for type checkers, names that are not there are mistakes
 
-        value = getattr(api, name)
-        globals()[name] = value
-        return value
-    raise AttributeError(f"module 'mdstopo' has no attribute {name!r}")
+    def __getattr__(name):
+        if name in __all__:
+            from mdstopo import api
+
+            value = getattr(api, name)
+            globals()[name] = value
+            return value
+        raise AttributeError(f"module 'mdstopo' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    """All names, those not resolved yet too, so that `dir` and completion show the calls."""
-    return sorted({*globals(), *__all__})
+    """What there is to use, whether it has been resolved or not."""
+    return sorted([*__all__, "__doc__", "__file__", "__name__", "__path__"])

@@ -23,6 +23,7 @@ from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.border import border_of
 from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
 from mdstopo.sensitivity.springs_driver import SPRINGS
@@ -252,7 +253,11 @@ class Evaluator:
 
     def natural_frequencies(self, alpha: FloatArray, load_case: str) -> FloatArray:
         """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
-        return self.driver(load_case).natural_frequencies(self.design(alpha))
+        return self.start_modes(alpha, load_case).frequencies
+
+    def start_modes(self, alpha: FloatArray, load_case: str) -> Modes:
+        """Small motion about the start; freedoms are those of `scenes[load_case].bodies`, in their order."""
+        return self.driver(load_case).start_modes(self.design(alpha))
 
     # -- how
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from mdstopo.shown import html_of
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
@@ -90,3 +91,15 @@ class Evaluation(NamedTuple):
     variables: Mapping[str, FloatArray] = _NONE
     variable_gradients: Mapping[str, Mapping[str, FloatArray]] = _NONE
     constraint_variable_gradients: Mapping[str, FloatArray] = _NONE
+
+    def __repr__(self) -> str:
+        parts = [self.status.value + (f" ({self.message})" if self.message else "")]
+        parts += [f"{name} = {value:.9g}" for name, value in self.objectives.items()]
+        if self.gradients:
+            parts.append(f"gradients by {len(next(iter(self.gradients.values()))):,} members")
+        if len(self.constraints):
+            parts.append(f"largest excess of a constraint {self.constraints.max():.3g}")
+        return f"<Evaluation: {'; '.join(parts)}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)

@@ -14,7 +14,7 @@ from pathlib import Path
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
 from mdstopo.children import command
-from mdstopo.compiler.store import cache_folder
+from mdstopo.compiler.store import are_kept, cache_folder, is_kept
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
 
@@ -38,7 +38,7 @@ def _marker(integrator: str) -> Path:
 
 def is_compiled(integrator: str) -> bool:
     """Whether an integrator and what evaluates responses have been compiled for this source on this machine."""
-    return _marker(integrator).exists()
+    return is_kept(_marker(integrator).name)
 
 
 def mark_compiled(integrator: str) -> None:
@@ -57,8 +57,7 @@ def compiling(case: Case) -> str:
 def compilation_due(case: Case) -> bool:
     """Whether the kernels of this version have never been compiled here for such a case."""
     include_kernels(case)
-    pattern = "mdstopo.general.*" if beyond_springs(case) else "mdstopo.integrators.*"
-    return next(cache_folder().glob(pattern), None) is None
+    return not are_kept("mdstopo.general." if beyond_springs(case) else "mdstopo.integrators.")
 
 
 class Beside:

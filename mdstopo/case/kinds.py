@@ -140,7 +140,8 @@ def with_unit(node: Node, path: str, reading: Reading) -> float | Bad:
     try:
         if not needed or needed == "the number's unit":
             raise QuantityError("allowed is a number: units are read where a key has one of its own")
-        return in_si(node.text, needed)
+        reading.measured[path] = in_si(node.text, needed)
+        return reading.measured[path]
     except QuantityError as error:
         reading.mistake(path, f"found {found(node)}; {error}", node)
     return BAD

@@ -72,6 +72,7 @@ from mdstopo.case.parts import (
 from mdstopo.case.uncertain import Uncertainty
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import GROUND
+from mdstopo.shown import counted, html_of
 
 __all__ = [
     "GROUND",
@@ -169,6 +170,16 @@ class Case(Value):
     variables: tuple[Variable, ...] = ()
     contacts: tuple[AnyContact, ...] = ()
     dimension: int = 2
+
+    def __repr__(self) -> str:
+        parts = [counted(len(self.bodies), "body"), f"{counted(self.n_members, 'member')}, {self.n_design:,} designed"]
+        parts += [counted(len(self.joints), "joint")] if self.joints else []
+        parts += [f"objectives {', '.join(each.name for each in self.objectives) or 'none'}"]
+        parts += [counted(len(self.constraints), "constraint")]
+        return f"<Case {self.title or self.name!r}: {'; '.join(parts)}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @property
     def design_groups(self) -> tuple[MemberGroup, ...]:

@@ -29,6 +29,7 @@ from mdstopo.case.nodes import MAPPING, Node, YamlSyntaxError, parse
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reading import BAD, Fields, Reading, found
 from mdstopo.case.settings import build_optimizer, build_solver, warn_assemble
+from mdstopo.case.shipped import case_file, names
 from mdstopo.case.start_geometry import Frames, build_points
 from mdstopo.case.words import inside
 
@@ -45,14 +46,18 @@ _SECTIONS = {
 def load_case(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Case:
     """The case in a file, every value in SI units, defaults filled in.
 
-    overrides: key path -> value, as the command line's ``--set KEY=VALUE``; text is read as YAML. Raises
-    CaseError with every mistake that one reading finds.
+    path: of the file; the bare name of a case that comes with the package will do, with or without `.yaml`, where there
+    is no such file. overrides: key path -> value, as the command line's ``--set KEY=VALUE``; text is read as YAML.
+    Raises CaseError with every mistake that one reading finds.
     """
-    place = Path(path)
+    place = case_file(Path(path))
     try:
         text, digest = text_in(place)
     except FileTextError as error:
-        raise CaseError([error.mistake], str(path)) from None
+        mistake = error.mistake
+        if not place.exists() and Path(path).name == str(path):
+            mistake = Mistake("", f"{mistake.message}; cases that come with mdstopo: {', '.join(names())}", 1, 1)
+        raise CaseError([mistake], str(path)) from None
     return read_case(text, path=place, overrides=overrides, sha256=digest)
 
 
@@ -109,6 +114,13 @@ def read_case(
         warnings=tuple(reading.warnings),
         **parts,
     )
+
+
+def measured(root: Node) -> dict[str, float]:
+    """By their key path, the SI values of all numbers of a case's document that are written with a unit."""
+    reading = Reading(Path())
+    geometry_in(root, reading).format.read(root, "", reading)
+    return reading.measured
 
 
 def _parsed(text: str, reading: Reading, file: str) -> Node:

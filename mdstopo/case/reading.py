@@ -66,6 +66,8 @@ class Reading:
         self.folder = folder
         #: the unit of the key that is read, as its description has it
         self.unit = ""
+        #: by their path, the SI values of numbers that were written with a unit
+        self.measured: dict[str, float] = {}
         self.mistakes: list[Mistake] = []
         self.warnings: list[Mistake] = []
         self.files: dict[str, str] = {}

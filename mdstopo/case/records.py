@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Container, Mapping
 from typing import Any
 
 from mdstopo.case.distributions import Brought, BroughtError
@@ -310,7 +310,8 @@ class Record(Value):
     doc: what it stands for, a sentence. one_of: of each of these sets exactly one key is needed; any_of: at least
     one of these; never_both: pairs; needs: a key -> the one that must stand beside it. more: keys of other
     distributions, each of which stands for one of the first set of `one_of`. elsewhere: an unknown key -> where it
-    would be right, or what stands in its place here.
+    would be right, or what stands in its place here. unit_of: the unit of keys that state none, by what else the
+    mapping has.
     """
 
     what: str
@@ -322,6 +323,7 @@ class Record(Value):
     doc: str = ""
     more: Brought[Key] | None = None
     elsewhere: tuple[tuple[str, str], ...] = ()
+    unit_of: Callable[[Node], str] | None = None
 
     @property
     def all_keys(self) -> tuple[Key, ...]:
@@ -349,6 +351,9 @@ class Record(Value):
         known = {key.name: key for key in self.all_keys}
         fields = Fields(path, (name for name in node.entries if name in known))
         meant = self._unknown(node, path, reading, known)
+        around = reading.unit
+        if self.unit_of is not None:
+            reading.unit = self.unit_of(node)
         for name, key in known.items():
             entry = node.entries.get(name)
             if entry is not None:
@@ -362,6 +367,7 @@ class Record(Value):
                     reading.mistake(path, f"the key {name!r} is missing{explained}")
             else:
                 fields[name] = key.default
+        reading.unit = around
         self._together(fields, meant, path, reading)
         return fields
 

@@ -12,6 +12,7 @@ from mdstopo.case.aims import Response
 from mdstopo.case.distributions import Brought
 from mdstopo.case.joints.joint import PAIR
 from mdstopo.case.kinds import Ref, explained
+from mdstopo.case.nodes import SCALAR, SEQUENCE, Node
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.records import Key, Record
 from mdstopo.case.schema_frame import FRAME
@@ -183,6 +184,18 @@ def kind_of(response: Response) -> ResponseKind:
     if response.kind not in RESPONSES:  # a process that has not read the case
         OF_OTHERS.find(response.kind)
     return RESPONSES[response.kind]
+
+
+def unit_stated(node: Node) -> str:
+    """The unit of the bounds of a constraint as the case file has it; empty where it bounds no known response."""
+    entry = node.entries.get("response")
+    if entry is None or entry[1].kind == SEQUENCE:
+        return ""
+    words = [entry[1].text] if entry[1].kind == SCALAR else list(entry[1].entries)[:1]
+    kind = RESPONSES.get(words[0]) if words else None
+    over_time = node.entries.get("over_time")
+    integral = over_time is not None and over_time[1].kind == SCALAR and over_time[1].text == "integral"
+    return "" if kind is None else f"{kind.unit} s" if integral else kind.unit
 
 
 def key_of(kind: ResponseKind) -> Key:

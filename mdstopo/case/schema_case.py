@@ -26,7 +26,7 @@ from mdstopo.case.kinds import (
 )
 from mdstopo.case.number_rows import FileName
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
-from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of
+from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of, unit_stated
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_scene import (
     BODY_KEYS,
@@ -218,6 +218,7 @@ CONSTRAINT = Record(
     one_of=(("volume", "response"), SENSES),
     needs=(("over_time", "response"), ("load_case", "response"), ("fraction", "volume")),
     doc="A bound on a volume or on a response. Bounds on a response are in its own unit.",
+    unit_of=unit_stated,
 )
 
 

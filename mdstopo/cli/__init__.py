@@ -39,7 +39,7 @@ def main() -> None:
     try:
         status = _dispatch(sys.argv[1:])
     except KeyboardInterrupt:
-        _complain("interrupted")
+        _complain(_interrupted())
         status = 3
     except BrokenPipeError:
         status = 0  # the reader has seen enough
@@ -50,9 +50,18 @@ def main() -> None:
         # an interrupt in the middle of a compilation makes the compiler stumble over what it left half done
         if not _began_with_interrupt(error):
             raise
-        _complain("interrupted")
+        _complain(_interrupted())
         status = 3
     _end(status)
+
+
+def _interrupted() -> str:
+    """What is said of an interruption that leaves nothing to continue: the command begins anew."""
+    if len(sys.argv) < 2:
+        return "interrupted"
+    import shlex
+
+    return f"interrupted, nothing is saved; to begin again: {shlex.join(['mdstopo', *sys.argv[1:]])}"
 
 
 def _end(status: int) -> None:

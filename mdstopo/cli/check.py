@@ -10,7 +10,9 @@ from mdstopo.cli.output import Output, number
 from mdstopo.cli.uncertain_numbers import say_sample
 
 if TYPE_CHECKING:
+    from mdstopo.case.errors import CaseError
     from mdstopo.case.model import Case
+    from mdstopo.engine import Evaluator
 
 _SOFT_BRANCH = (
     "A volume limit that need not be spent has a soft branch here: stored energy also falls when members",
@@ -30,13 +32,20 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
     from mdstopo.cli.check_numbers import frequencies, material, totals
+    from mdstopo.cli.check_scene import odd_scales
     from mdstopo.scene.refusals import refusals
 
     output = Output(json=as_json, quiet=quiet)
-    case = load_case(case_path, overrides)
+    try:
+        case = load_case(case_path, overrides)
+    except CaseError as error:
+        output.document(_mistaken(case_path, error))
+        raise
     refused = refusals(case)
     for remark in case.warnings:
         output.notice(f"warning: {remark.located(str(case_path))}")
+    for question in odd_scales(case):
+        output.notice(f"warning: {question}")
     output.say(f"{case.title or case.name} ({case_path})")
     _say_bodies(output, case)
     _say_joints(output, case)
@@ -84,6 +93,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
             if rest is not None:
                 output.say(f"load case {name}: {rest}")
         _say_frequencies(output, case, found)
+        document |= _say_doubts(output, case, engine)
         output.say("left out, because nothing asks for it")
         for sentence in engine.skipped or ("nothing",):
             output.say(f"  {sentence}")
@@ -93,6 +103,40 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     if refused:
         raise CaseError(refused, str(case_path))
     return 0
+
+
+def _mistaken(case_path: Path, error: "CaseError") -> dict[str, Any]:
+    """What is told of a case that cannot be read."""
+    return {
+        "command": "check",
+        "case": case_path.stem,
+        "mistakes": [
+            {
+                "key": mistake.path_key,
+                "message": mistake.message,
+                "line": mistake.line,
+                "column": mistake.column,
+                "origin": mistake.origin or str(case_path),
+            }
+            for mistake in error.mistakes
+        ],
+    }
+
+
+def _say_doubts(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any]:
+    """What nothing holds, what has no stiffness, and steps that are too long."""
+    from mdstopo.cli.check_scene import in_words, long_step, odd_scales, restraint
+
+    held, steps = {}, []
+    for name, scene in engine.scenes.items():
+        modes = engine.start_modes(case.start, name)
+        held[name] = restraint(case, case.load_case(name), modes, scene.bodies)
+        for sentence in in_words(held[name]):
+            output.say(f"load case {name}: {sentence}")
+        if too_long := long_step(case, modes, scene.bodies):
+            steps.append(too_long)
+            output.notice(f"warning: load case {name}: {too_long}")
+    return {"restraint": held, "long_steps": steps, "odd_scales": odd_scales(case)}
 
 
 def _say_bodies(output: Output, case: "Case") -> None:

@@ -40,3 +40,16 @@ class FileOf(click.Path):
         entries = [each for each in entries if each.name.startswith(begun) and (begun or each.name[0] != ".")]
         folders = [f"{each.name}/" for each in entries if each.is_dir()]
         return [each.name for each in entries if each.name.endswith(self.endings) and each.is_file()] + folders
+
+
+class CaseFile(FileOf):
+    """The path of a case file, or the name of a case that comes with the package."""
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Files, and names of cases that begin so, where something was typed."""
+        found = super().shell_complete(ctx, param, incomplete)
+        if not incomplete or "/" in incomplete:
+            return found
+        from mdstopo.case.shipped import names
+
+        return found + [CompletionItem(name) for name in names() if name.startswith(incomplete)]

@@ -3,6 +3,7 @@
 import math
 import shlex
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from mdstopo.cli.interrupt import Interrupts
 from mdstopo.cli.options import EXIT, FILE, output_options, result_argument, set_option
 from mdstopo.cli.output import Output, number
 from mdstopo.cli.progress import display
+from mdstopo.shown import counted
 
 if TYPE_CHECKING:
     from mdstopo.case.model import Case
@@ -97,7 +99,7 @@ def command(
             kept,
             reduced,
             place=place,
-            head=_head(case, len(kept)),
+            head=partial(_head, case),
             on_iteration=show,
             stop_requested=interrupts.stop_requested,
             notify=output.notice,
@@ -142,7 +144,9 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
     if done.difference is not None:
         rows.append(["the case repeats", f"objectives within {number(done.difference, 2)} of themselves"])
     if done.text:
-        rows.append(["case", str(place)])
+        count = len(done.kept)
+        left_out = f"; {count - done.written} of {count} have no size and are left out" if count > done.written else ""
+        rows.append(["case", f"{place}, {counted(done.written, 'member')}{left_out}"])
     output.table(rows)
 
 
@@ -186,7 +190,8 @@ def _trouble(column: Any) -> str:
 
 
 def _warnings(done: "Finalized") -> tuple[str, ...]:
-    return (*done.outcome.warnings, *done.told, *([done.equilibria.moved] if done.equilibria.moved else []))
+    moved = [done.equilibria.moved] if done.equilibria.moved else []
+    return (*done.outcome.warnings, *done.told, *moved, *done.worse)
 
 
 def _why(done: "Finalized") -> str:
@@ -235,6 +240,7 @@ def _document(done: "Finalized", place: Path) -> dict[str, Any]:
         "evaluations": done.outcome.evaluations,
         "verified_with": done.tighter or None,
         "difference": done.difference,
+        "written": done.written,
         "warnings": _warnings(done),
         "path": str(place) if done.text else None,
         "not_written": None if done.text else _why(done),

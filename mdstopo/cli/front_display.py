@@ -1,5 +1,6 @@
 """How a front or a sweep shows that it is going: a live table on a terminal, now and then a line elsewhere."""
 
+import math
 import sys
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ if TYPE_CHECKING:
     from mdstopo.front.run_front import Snapshot
 
 _ROWS = 25  # points that a table shows at once
+_SOON = 1.0  # seconds below which no guess of the time left is told
 
 
 class Plain(displays.Plain["Snapshot"]):
@@ -40,8 +42,15 @@ def line(snapshot: "Snapshot") -> str:
     total = len(snapshot.directions)
     return (
         f"{len(snapshot.best)} of {total} points have a design, {len(snapshot.running)} are worked on; "
-        f"{snapshot.done} solves, {snapshot.evaluations} evaluations, about {duration(snapshot.left)} left"
+        f"{snapshot.done} solves, {snapshot.evaluations} evaluations, {_left(snapshot.left)}"
     )
+
+
+def _left(seconds: float) -> str:
+    """The time that is left in words, where it is known."""
+    if math.isnan(seconds):
+        return "time left not known"
+    return f"about {duration(seconds)} left" if seconds >= _SOON else f"less than {duration(_SOON)} left"
 
 
 def picture(snapshot: "Snapshot") -> "Table":

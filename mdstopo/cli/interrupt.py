@@ -46,7 +46,7 @@ class Interrupts:
 def saying_how_to_go_on(
     output: Output, command: str, case: str, path: Path, resume: bool, again: str
 ) -> Iterator[None]:
-    """Where what is done here is interrupted, say by which command it goes on, if anything of it has been saved.
+    """Where what is done here is interrupted, say by which command it goes on; it begins again if nothing was saved.
 
     output: where it is said.
     command, case: their names.
@@ -54,7 +54,8 @@ def saying_how_to_go_on(
     resume: whether one of before is continued.
     again: the command that goes on.
 
-    Raises click's Exit with the status of an interruption then, else KeyboardInterrupt.
+    Raises click's Exit with the status of an interruption then. What was not saved is left to who catches
+    KeyboardInterrupt, which tells the command as it was typed.
     """
     before = _stamp(path)
     try:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from mdstopo.cli.files import FileOf
+from mdstopo.cli.files import CaseFile, FileOf
 from mdstopo.cli.output import Output
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 FILE = click.Path(path_type=Path)
 #: exit statuses of what runs, by how it ended
 EXIT = {"converged": 0, "max_iterations": 0, "stalled": 0, "failed": 1, "interrupted": 3}
-CASE_FILE = FileOf((".yaml", ".yml"))
+CASE_FILE = CaseFile((".yaml", ".yml"))
 RESULT_FILE = FileOf((".h5",))
 DESIGN_FILE = FileOf((".npy", ".txt", ".h5"))
 
@@ -132,4 +132,4 @@ def announce_compilation(output: Output, case: "Case") -> None:
     from mdstopo.warm import compilation_due, compiling
 
     if compilation_due(case):
-        output.notice(compiling(case))
+        output.announce(compiling(case))

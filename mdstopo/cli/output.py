@@ -4,10 +4,15 @@ import json
 import math
 import os
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TextIO
 
 from mdstopo.cli import lost
+from mdstopo.compiler.told import listeners
+
+#: seconds between two notices that kernels are being compiled
+_EVERY = 10.0
 
 
 class Output:
@@ -20,6 +25,14 @@ class Output:
     def __init__(self, *, json: bool = False, quiet: bool = False) -> None:
         self.json = json
         self.quiet = quiet
+        self._compiling = _Compiling(self.notice)
+        if not quiet:
+            listeners[:] = [self._compiling]  # a command speaks with one voice
+
+    def announce(self, sentence: str) -> None:
+        """Say that kernels are going to be compiled: the first of them need not be told."""
+        self._compiling.began()
+        self.notice(sentence)
 
     def say(self, text: str = "") -> None:
         """A line of the result, for people."""
@@ -41,6 +54,30 @@ class Output:
         if self.json:
             plainly = (sys.stdout.encoding or "").lower().replace("-", "") != "utf8"
             write(sys.stdout, json.dumps(plain(content), ensure_ascii=plainly, allow_nan=False))
+
+
+class _Compiling:
+    """Says that a kernel is compiled: the first, and then one every ten seconds."""
+
+    def __init__(self, notice: Callable[[str], None]) -> None:
+        self._notice = notice
+        self._begun: float | None = None
+        self._said = 0.0
+        self._count = 0
+
+    def began(self) -> None:
+        """It has been said."""
+        self._begun = self._said = time.monotonic()
+
+    def __call__(self, name: str) -> None:
+        """Another one is compiled."""
+        now, self._count = time.monotonic(), self._count + 1
+        if self._begun is None:
+            self.began()
+            self._notice(f"compiling kernels that are not kept yet, once for this version; the first is {name}")
+        elif now - self._said >= _EVERY:
+            self._said = now
+            self._notice(f"still compiling: {name} is number {self._count}, after {duration(now - self._begun)}")
 
 
 #: what a terminal would obey, and what turns the order of letters around, in letters that JSON reads as the same

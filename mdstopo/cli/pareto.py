@@ -93,7 +93,7 @@ def command(
     if workers is not None and cluster is not None:
         raise click.UsageError("--workers and --cluster exclude each other")
     if case_path == DEFAULT_CASE and not case_path.exists():
-        raise click.UsageError(f"no CASE given, and the default, {DEFAULT_CASE}, is not here")
+        case_path = Path(DEFAULT_CASE.name)  # the one that comes with the package
     output = Output(json=as_json, quiet=quiet)
     interrupts = Interrupts(quiet)
     case = open_case(case_path, overrides)

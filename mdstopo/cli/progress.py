@@ -46,7 +46,9 @@ class Rate:
         rate = self._count / elapsed
         left = progress.max_iterations - progress.iteration
         left += (progress.starts - 1 - progress.start) * progress.max_iterations
-        return f"{number(rate, 3)}/s, at most {duration(max(left, 0) / rate)} left"
+        if left <= 0:
+            return f"{number(rate, 3)}/s, the last iteration"
+        return f"{number(rate, 3)}/s, at most {duration(left / rate)} left"
 
 
 def line(progress: "Progress") -> str:

@@ -70,6 +70,7 @@ def command(
     with output_file(path, case, "simulate", overwrite=overwrite, notify=output.notice, command=command_line) as file:
         announce_compilation(output, case)
         from mdstopo.engine import Evaluator
+        from mdstopo.session.coarse_steps import coarse_steps
         from mdstopo.status import RunStatus, Status
         from mdstopo.store.contents import design_part, trajectory_part
 
@@ -114,6 +115,8 @@ def command(
             "path": str(path),
         }
     )
+    for warning in filter(None, (coarse_steps(case, *each) for each in motions.items())):
+        output.notice(f"warning: {warning}")
     return 1 if failed else 0
 
 

@@ -131,8 +131,9 @@ class Entry(Kernel):
         return None if code is None else Native(self.py_func.__qualname__, code, types)
 
     def _built(self, path: Path, types: str) -> Code | None:
-        from mdstopo.compiler import store, tried
+        from mdstopo.compiler import store, told, tried
 
+        told.compiling(f"{self.py_func.__module__.removeprefix('mdstopo.')}.{self.py_func.__name__}")
         way()
         found = tried.private()
         if found is None:

@@ -16,8 +16,19 @@ from typing import NamedTuple
 from mdstopo.compiler.trusted import make_private, open_lock, read_private, write_private
 from mdstopo.installed import version_of
 
-#: folders of the package that hold no kernels and that no kernel takes a number from; `tests/compiler` looks after that
-WITHOUT_KERNELS = ("bench", "cli", "finalize", "front", "plots", "report", "session", "store")
+#: folders and modules of the package that hold no kernels and that no kernel takes a number from; `tests/compiler`
+#: looks after that
+WITHOUT_KERNELS = (
+    "bench", "cli", "finalize", "front", "plots", "report", "session", "store",
+    "api.py", "functions.py", "jax.py", "openmdao.py", "shown.py", "torch.py",
+)  # fmt: skip
+#: the folder of the package with machine code that came with it, a folder for a kind of processor, and what it is of
+SHIPPED, MANIFEST = "kernels", "manifest.json"
+#: kinds of x86-64 processors that code is shipped for, the best first: what LLVM calls them, and what they have to have
+PROCESSORS = {
+    "avx512": ("x86-64-v4", ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl", "avx2", "fma", "bmi", "bmi2")),
+    "avx2": ("x86-64-v3", ("avx2", "fma", "bmi", "bmi2", "f16c", "lzcnt", "movbe", "popcnt")),
+}
 _COMPILER = ("numba", "llvmlite", "numpy")
 #: what decides for which processor, and how, kernels are compiled
 SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
@@ -129,7 +140,6 @@ def _folder(foreign: str) -> Path:
 def _key() -> str:
     from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
-    package = Path(__file__).parent.parent
     digest = hashlib.sha256(f"{sys.version} {sys.platform} {get_host_cpu_name()}".encode())
     with contextlib.suppress(RuntimeError):  # a processor whose features LLVM cannot tell
         digest.update(get_host_cpu_features().flatten().encode())
@@ -137,11 +147,63 @@ def _key() -> str:
         digest.update(f"{name} {version_of(name)}".encode())
     for setting in SETTINGS:
         digest.update(f"{setting}={os.environ.get(setting)}".encode())
+    digest.update(digest_of_sources().encode())
+    return digest.hexdigest()[:16]
+
+
+@functools.cache
+def digest_of_sources() -> str:
+    """A hash over all modules that may hold kernels, or numbers that kernels take."""
+    package = Path(__file__).parent.parent
+    digest = hashlib.sha256()
     for source in _sources(package):
         digest.update(source.encode())
         with open(os.path.join(package, source), "rb") as stream:
             digest.update(stream.read())
-    return digest.hexdigest()[:16]
+    return digest.hexdigest()
+
+
+def layout() -> str:
+    """What machine code takes for granted of where it runs, beside the processor."""
+    return f"{sys.platform} {sys.implementation.name} {object.__basicsize__} {sys.byteorder} {sys.maxsize}"
+
+
+@functools.cache
+def shipped_folder() -> Path | None:
+    """The folder of machine code that came with the package and fits here; None where there is none.
+
+    It has to be of exactly these sources, and none of the settings that decide how kernels are compiled may be made.
+    What lies in the package is trusted as its modules are.
+    """
+    place = Path(__file__).parent.parent / SHIPPED
+    try:
+        manifest = json.loads((place / MANIFEST).read_bytes())
+    except (OSError, ValueError):
+        return None
+    if any(os.environ.get(setting) for setting in SETTINGS):
+        return None
+    if (manifest.get("layout"), manifest.get("sources")) != (layout(), digest_of_sources()):
+        return None
+    from llvmlite.binding import get_host_cpu_features
+
+    try:
+        has = get_host_cpu_features()
+    except RuntimeError:  # a processor whose features LLVM cannot tell
+        return None
+    fitting = (place / name for name, (_, needed) in PROCESSORS.items() if all(has.get(each) for each in needed))
+    return next((folder for folder in fitting if folder.is_dir()), None)
+
+
+def is_kept(name: str) -> bool:
+    """Whether a file of that name came with the package, or lies in the folder of this source."""
+    shipped = None if _foreign else shipped_folder()
+    return (shipped is not None and (shipped / name).exists()) or (cache_folder() / name).exists()
+
+
+def are_kept(prefix: str) -> bool:
+    """The same of any file whose name begins so."""
+    places = [cache_folder()] if _foreign else [shipped_folder(), cache_folder()]
+    return any(next(place.glob(f"{prefix}*"), None) is not None for place in places if place is not None)
 
 
 def _sources(package: Path) -> list[str]:
@@ -150,6 +212,7 @@ def _sources(package: Path) -> list[str]:
     for folder, inner, names in os.walk(package):
         if folder == str(package):
             inner[:] = [name for name in inner if name not in WITHOUT_KERNELS]
+            names = [name for name in names if name not in WITHOUT_KERNELS]
         place = os.path.relpath(folder, package)
         found += [os.path.join(place, name) for name in names if name.endswith(".py")]
     return sorted(found)
@@ -172,8 +235,13 @@ def path_of(module: str, name: str, types: str) -> Path:
 
 
 def read(path: Path) -> Code | None:
-    """The code in a file; nothing where there is none, or where it is not what was written."""
-    data = read_checked(path)
+    """The code in a file, or in the one of that name that came with the package.
+
+    Nothing where there is none, or where it is not what was written.
+    """
+    data = read_shipped(path.name)
+    if data is None:
+        data = read_checked(path)
     if data is None:
         return None
     start, _, rest = data.partition(b"\n")
@@ -189,9 +257,24 @@ def write(path: Path, code: Code) -> None:
     write_checked(path, json.dumps([len(code.body), code.result]).encode() + b"\n" + code.body + code.glue)
 
 
+def read_shipped(name: str) -> bytes | None:
+    """What is in a file that came with the package; nothing where there is none."""
+    place = None if _foreign else shipped_folder()
+    if place is None:
+        return None
+    try:
+        return _checked((place / name).read_bytes())
+    except OSError:
+        return None
+
+
 def read_checked(path: Path) -> bytes | None:
     """What `write_checked` has put in a file; nothing where there is none, or anything else."""
-    data = read_private(path)
+    return _checked(read_private(path))
+
+
+def _checked(data: bytes | None) -> bytes | None:
+    """What stands behind a checksum that is right."""
     if data is None or not data.startswith(_MAGIC) or len(data) < len(_MAGIC) + 4:
         return None
     rest = data[len(_MAGIC) + 4 :]

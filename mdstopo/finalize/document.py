@@ -21,8 +21,10 @@ from mdstopo.case.model import Case, MemberGroup, VolumeRow
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node, parse
 from mdstopo.case.number_rows import rows_in
 from mdstopo.case.overrides import apply_overrides
+from mdstopo.case.reader import measured
 from mdstopo.case.reading import Reading
 from mdstopo.case.start_geometry import Frames, frames_of
+from mdstopo.case.words import inside
 from mdstopo.finalize.apart import free_name
 from mdstopo.finalize.scaled_laws import sized as sized_law
 from mdstopo.finalize.values import Given, bound_of, differ, given, never_late, with_values
@@ -44,7 +46,7 @@ def content_of(case: Case) -> Plain:
     _refuse_uncertain_names(case)
     root = with_numbers(root, Reading(Path()))
     root.entries.pop(SECTION, None)
-    content = _plain(root, _files(case))
+    content = _plain(root, _files(case), measured(root), "")
     assert isinstance(content, dict)
     return content
 
@@ -100,17 +102,18 @@ def final_content(
     return {key: value for key, value in final.items() if value not in (None, {}, [])}, told
 
 
-def _plain(node: Node, files: Mapping[str, Any]) -> Any:
+def _plain(node: Node, files: Mapping[str, Any], known: Mapping[str, float], path: str) -> Any:
+    """A node as plain values; known: by path, those of numbers with units."""
     if node.kind == SCALAR:
-        return node.scalar()
+        return known.get(path, node.scalar())
     if node.kind == SEQUENCE:
-        return [_plain(item, files) for item in node.items]
+        return [_plain(item, files, known, f"{path}[{i}]") for i, item in enumerate(node.items)]
     assert node.kind == MAPPING
     if set(node.entries) == {"file"}:
         name = node.entries["file"][1]
         if name.kind == SCALAR and name.text in files:
             return files[name.text]
-    return {key: _plain(value, files) for key, (_, value) in node.entries.items()}
+    return {key: _plain(value, files, known, inside(path, key)) for key, (_, value) in node.entries.items()}
 
 
 def _files(case: Case) -> Plain:

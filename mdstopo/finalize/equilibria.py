@@ -18,6 +18,7 @@ from mdstopo.engine import Evaluator
 from mdstopo.general.general_driver import GeneralDriver
 from mdstopo.general.settle import settle
 from mdstopo.general.start import size_of
+from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 
 #: the farthest that an equilibrium goes in one step of the sizes: in sizes of the scene, and in rad
 NEAR, TURN = 0.01, 0.05
@@ -54,12 +55,13 @@ def compare_equilibria(case: Case, design: FloatArray, end: FloatArray, reduced:
         if begun is None or ended is None:
             continue
         where = f"in load case {load_case.name} " if len(case.load_cases) > 1 else ""
-        far = _Distance(case, begun.q, ended.q)
-        words = f"{where}the final design rests {far} away from where the full one does"
         driver = whole.driver(load_case.name)
         assert isinstance(driver, GeneralDriver)  # what settles is no scene of springs alone
+        bodies = driver.scene.kinematics
+        far = _Distance(case, bodies, begun.q, ended.q)
+        words = f"{where}the final design rests {far} away from where the full one does"
         tracked = _followed(driver, case, design, end, begun.q)
-        if tracked is None or _Distance(case, tracked, ended.q).is_beyond(NEAR, TURN):
+        if tracked is None or _Distance(case, bodies, tracked, ended.q).is_beyond(NEAR, TURN):
             return Comparison(f"{words}, at another equilibrium: the members kept do not hold it")
         if far.is_beyond(FAR, TURNED):
             moved = moved or words
@@ -67,15 +69,15 @@ def compare_equilibria(case: Case, design: FloatArray, end: FloatArray, reduced:
 
 
 class _Distance:
-    """How far the bodies of a case are apart in two states (n,)."""
+    """How far the bodies of a case are apart in two states (n_q,); bodies: how they move."""
 
-    def __init__(self, case: Case, one: FloatArray, other: FloatArray) -> None:
-        shift = np.abs(one - other).reshape(-1, 3)
-        distance = np.hypot(shift[:, 0], shift[:, 1])
+    def __init__(self, case: Case, bodies: Kinematics, one: FloatArray, other: FloatArray) -> None:
+        shift, turn = bodies.shifts_and_turns(bodies.difference(other, one))
+        distance, angle = np.linalg.norm(shift, axis=1), np.linalg.norm(turn, axis=1)
         names = [body.name for body in case.bodies]
         self.size = size_of(case)
         self.distance, self.body = float(distance.max()), names[int(distance.argmax())]
-        self.angle, self.turned = float(shift[:, 2].max()), names[int(shift[:, 2].argmax())]
+        self.angle, self.turned = float(angle.max()), names[int(angle.argmax())]
 
     def is_beyond(self, sizes: float, angle: float) -> bool:
         """Whether a body is farther away than so many sizes of the scene, or turned by more than an angle, rad."""
@@ -98,7 +100,7 @@ def _followed(
         driver.take(begin + (share + step) * (end - begin))
         driver.start_from(q)
         found = settle(driver, driver.alpha.copy(), q, size)
-        if isinstance(found, str) or _Distance(case, found.q, q).is_beyond(NEAR, TURN):
+        if isinstance(found, str) or _Distance(case, driver.scene.kinematics, q, found.q).is_beyond(NEAR, TURN):
             if step <= SHORTEST:
                 return None
             step /= 4.0

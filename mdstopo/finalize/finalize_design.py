@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -35,6 +35,8 @@ TIGHTER = 100.0
 """By how much the tolerance of the verification is below the case's."""
 TIGHTEST = 1e-13
 """Tolerances below it are lost in rounding."""
+WORSE = 0.05
+"""Share by which an objective may be worse than the full design's without a word."""
 SHORTER = 10.0
 """The same for fixed steps: errors of second order fall a hundredfold."""
 
@@ -75,6 +77,12 @@ class Finalized:
     difference: float | None
     values: list[Parameter]
     equilibria: Comparison = field(default_factory=Comparison)
+    worse: tuple[str, ...] = ()
+
+    @property
+    def written(self) -> int:
+        """How many members the text has: those without a size are left out of it."""
+        return int(np.count_nonzero(self.alpha**self.reduced.power > 0.0)) if self.text else 0
 
 
 def opened(
@@ -144,7 +152,7 @@ def finalize(
     reduced: Case,
     *,
     place: Path,
-    head: str = "",
+    head: Callable[[int], str] = lambda _: "",
     on_iteration: Callable[[Progress], None] = ignore,
     stop_requested: Callable[[], bool] = never,
     notify: Callable[[str], None] = ignore,
@@ -158,7 +166,7 @@ def finalize(
     kept (n,): which of its members are kept, as `ready` gave them.
     reduced: the case with only these, as `ready` gave it.
     place: where the text is going to stand.
-    head: its first lines, comments.
+    head: its first lines, comments, by how many members it has.
     on_iteration: called after each iteration of the optimiser.
     stop_requested: asked after each iteration whether to stop.
     notify: is given sentences for the user.
@@ -184,8 +192,9 @@ def finalize(
     def made(columns: tuple[Column, ...], words: str, text: str, told: list[str], gap: float | None) -> Finalized:
         sizes, stated = now[:count], before[:count]
         return Finalized(
-            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, equilibria
-        )
+            case, reduced, kept, own, stated, sizes, columns, outcome, words, text, told, gap, values, equilibria,
+            worse_than_promised(case, columns),
+        )  # fmt: skip
 
     if outcome.status is RunStatus.INTERRUPTED:
         return made((), "", "", [], None)
@@ -197,7 +206,7 @@ def finalize(
     source, sized = reduced, now
     if found.status.usable and (not count or np.any(now[:count] ** reduced.power > 0.0)):
         content, told = final_content(content_of(case), reduced, own, now)
-        text = head + text_of(content)
+        text = head(int(np.count_nonzero(now[:count] ** reduced.power > 0.0))) + text_of(content)
         final = _read(text, place)
         difference = _difference(final, found)
         if reduced.variables and _says_all(final, reduced):
@@ -216,6 +225,22 @@ def finalize(
     if equilibria.lost:
         return made(columns, words, "", [], None)
     return made(columns, words, text, told, difference)
+
+
+def worse_than_promised(case: Case, columns: Sequence[Column]) -> tuple[str, ...]:
+    """Sentences about objectives that are more than `WORSE` worse in the last column than in the first."""
+    if not columns or not all(columns[k].found.status.usable for k in (0, -1)):
+        return ()
+    told = []
+    for objective in case.objectives:
+        before, now = (columns[k].found.objectives[objective.name] for k in (0, -1))
+        loss = (before - now if objective.sense == "maximize" else now - before) / abs(before) if before else 0.0
+        if loss > WORSE:
+            told.append(
+                f"{objective.name} of the final design is {loss:.1%} worse than the full design promised: "
+                f"{now:.6g} in place of {before:.6g}; keep more members"
+            )
+    return tuple(told)
 
 
 def _says_all(final: Case, reduced: Case) -> bool:

@@ -62,7 +62,10 @@ class Ask:
 
 @dataclass(frozen=True)
 class Snapshot:
-    """A front in the making: best by point, points that are being worked on, tasks done, seconds left (a guess)."""
+    """A front in the making: best by point, points that are being worked on, tasks done.
+
+    left: seconds that are left, a guess; NaN where there is none, because more tasks than usual have been needed.
+    """
 
     directions: Floats
     names: tuple[str, ...]
@@ -334,6 +337,7 @@ class _FrontRun:
             if each.point >= 0 and each.usable and each.iterate < 0:
                 best.setdefault(each.point, each)
         at_once = self.pool.at_once if self.pool is not None else 1
+        to_come = self.expected - len(done)
         self.on_progress(
             Snapshot(
                 self.ask.directions,
@@ -342,7 +346,7 @@ class _FrontRun:
                 tuple(sorted({point for point in list(running.values())[: at_once or None] if point >= 0})),
                 len(done),
                 sum(each.evaluations for each in done),
-                max(self.expected - len(done), len(running)) * mean / max(at_once, 1),
+                max(to_come, len(running)) * mean / max(at_once, 1) if to_come > 0 else float("nan"),
             )
         )
 

@@ -51,6 +51,7 @@ from mdstopo.integrators.steps import (
 from mdstopo.mechanics.joints.table import describe
 from mdstopo.scene.diagnosis import fastest_body, member_in_words
 from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.modes import Modes
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
@@ -434,13 +435,13 @@ class GeneralDriver:
 
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the design of the last run."""
-        return float(self.natural_frequencies(np.concatenate([self._alpha, self._values])).max(initial=0.0))
+        return float(self.start_modes(np.concatenate([self._alpha, self._values])).frequencies.max(initial=0.0))
 
-    def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
-        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
-        from mdstopo.general.vibration import natural_frequencies
+    def start_modes(self, alpha: FloatArray) -> Modes:
+        """Small motion about the start."""
+        from mdstopo.general.vibration import start_modes
 
-        return natural_frequencies(self, alpha)
+        return start_modes(self, alpha)
 
     def settled(self, alpha: FloatArray) -> "Settled | None":
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""

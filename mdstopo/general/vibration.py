@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mdstopo.scene.model import FloatArray
+from mdstopo.scene.modes import Modes, modes_of
 
 if TYPE_CHECKING:
     from mdstopo.general.general_driver import GeneralDriver
@@ -13,8 +14,8 @@ if TYPE_CHECKING:
 HELD = 1e-9
 
 
-def natural_frequencies(driver: "GeneralDriver", alpha: FloatArray) -> FloatArray:
-    """Angular frequencies (rad/s), rising, at the modes that members have at the start; unstable ones are left out."""
+def start_modes(driver: "GeneralDriver", alpha: FloatArray) -> Modes:
+    """Small motion with the modes that members have at the start; shapes are of all freedoms, driven ones at rest."""
     from mdstopo.general.start_entry import linearise
 
     model = driver.scene.model
@@ -26,13 +27,7 @@ def natural_frequencies(driver: "GeneralDriver", alpha: FloatArray) -> FloatArra
     linearise(driver.ints, driver.floats, driver.alpha.copy(), driver.member_state, stiffness, mass, rows)
     free = np.flatnonzero(model.free)
     k, m, j = stiffness[np.ix_(free, free)], mass[np.ix_(free, free)], rows[:, free]
-    root = np.linalg.cholesky(m)
-    inverse = np.linalg.inv(root)
-    j = j @ inverse.T
-    _, sizes, basis = np.linalg.svd(j) if len(j) else (None, np.zeros(0), np.eye(len(free)))
-    rank = int(np.sum(sizes > HELD * sizes.max(initial=0.0)))
-    motion = basis[rank:].T
-    values = np.linalg.eigvals(motion.T @ inverse @ k @ inverse.T @ motion).real
-    rounding = 1e-12 * np.abs(values).max(initial=0.0)
-    frequencies: FloatArray = np.sort(np.sqrt(values[values > rounding]))
-    return frequencies
+    found = modes_of(k, np.linalg.inv(np.linalg.cholesky(m)), j, HELD)
+    basis = np.zeros((n, found.basis.shape[1]))
+    basis[free] = found.basis
+    return Modes(found.matrix, basis)

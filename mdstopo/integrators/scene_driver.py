@@ -14,6 +14,7 @@ from mdstopo.case.integrators import IntegratorKind
 from mdstopo.case.model import Case, LoadCase, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.scene.model import FloatArray, IndexArray
+from mdstopo.scene.modes import Modes
 from mdstopo.status import Status
 
 if TYPE_CHECKING:
@@ -181,8 +182,8 @@ class SceneDriver(Protocol):
     def rate_at_start(self) -> float:
         """Fastest vibration at the start, rad/s, with the design of the last run."""
 
-    def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
-        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
+    def start_modes(self, alpha: FloatArray) -> Modes:
+        """Small motion about the start."""
 
     def settled(self, alpha: FloatArray) -> "Settled | None":
         """How far the start moves to be at rest with a design; None where the case does not settle, or cannot."""

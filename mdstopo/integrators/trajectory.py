@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from mdstopo.integrators.scene_driver import Steps
 from mdstopo.scene.border import Border
 from mdstopo.scene.model import FloatArray
+from mdstopo.shown import counted, html_of
 from mdstopo.status import Status
 
 
@@ -23,7 +24,7 @@ class States:
     lam: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Trajectory:
     """One simulated load case.
 
@@ -48,6 +49,14 @@ class Trajectory:
     steps: Steps = field(repr=False)
     reactions: Mapping[str, FloatArray] = field(default_factory=dict)
     border: Border | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        why = f" ({self.message})" if self.message else ""
+        steps, end = counted(len(self.t) - 1, "step"), f"{self.t[0]:g} to {self.t[-1]:g} s"
+        return f"<Trajectory of load case {self.load_case!r}: {self.status.value}{why}; {steps} from {end}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @classmethod
     def of(

@@ -1,4 +1,4 @@
-"""Natural frequencies of springs between free bodies, at the start."""
+"""Small motion about the start of springs between free bodies."""
 
 import numpy as np
 
@@ -7,14 +7,12 @@ from mdstopo.mechanics.start_entry import start_tangents
 from mdstopo.scene.compile import Scene
 from mdstopo.scene.grids import places_of
 from mdstopo.scene.model import COUNT, DESIGN, MEMBER, STIFFNESS, FloatArray
+from mdstopo.scene.modes import Modes, modes_of
 from mdstopo.scene.packing import pack
 
 
-def natural_frequencies(case: Case, scene: Scene, design: FloatArray) -> FloatArray:
-    """Angular frequencies (rad/s), rising, of small undamped motion about the start; unstable modes are left out.
-
-    design: alpha (N,).
-    """
+def start_modes(case: Case, scene: Scene, design: FloatArray) -> Modes:
+    """Small undamped motion about the start; design: alpha (N,)."""
     model, n, pairs = scene.model, len(scene.model.inv_mass), len(scene.model.pair)
     strength = model.member[STIFFNESS:MEMBER].copy()
     for block, group in zip(model.block.tolist(), case.members, strict=True):
@@ -31,8 +29,4 @@ def natural_frequencies(case: Case, scene: Scene, design: FloatArray) -> FloatAr
         matrix[np.ix_(rows, rows)] += k[0, p]
     for body in range(0, n, 3):
         matrix[body : body + 3, body + 2] -= turn[0, body : body + 3]
-    root = np.sqrt(model.inv_mass)
-    values = np.linalg.eigvals(root[:, None] * matrix * root[None, :]).real
-    rounding = 1e-12 * np.abs(values).max(initial=0.0)  # bodies that move freely
-    frequencies: FloatArray = np.sort(np.sqrt(values[values > rounding]))
-    return frequencies
+    return modes_of(matrix, np.diag(np.sqrt(model.inv_mass)), np.zeros((0, n)), 0.0)

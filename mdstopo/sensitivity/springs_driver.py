@@ -12,6 +12,7 @@ from mdstopo.integrators.scene_driver import Differentiated, DriverOptions, Resp
 from mdstopo.scene.compile import Scene, compile_members, compile_scene, state_order
 from mdstopo.scene.diagnosis import Diagnosis
 from mdstopo.scene.model import FloatArray
+from mdstopo.scene.modes import Modes
 from mdstopo.sensitivity.reductions import INTEGRALS, REDUCTIONS
 from mdstopo.status import Status
 
@@ -68,11 +69,11 @@ class SpringsDriver(Driver):
         """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
         return self._diagnosis.explain(alpha, status, time, q, v)
 
-    def natural_frequencies(self, alpha: FloatArray) -> FloatArray:
-        """Angular frequencies (rad/s) of small motion about the start, rising; unstable modes are left out."""
-        from mdstopo.mechanics.start_frequencies import natural_frequencies
+    def start_modes(self, alpha: FloatArray) -> Modes:
+        """Small motion about the start."""
+        from mdstopo.mechanics.start_frequencies import start_modes
 
-        return natural_frequencies(self.case, self.scene, alpha)
+        return start_modes(self.case, self.scene, alpha)
 
     def settled(self, alpha: FloatArray) -> "Settled | None":
         """None: a case that settles is none of springs between free bodies."""

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from mdstopo.case.model import Case
 from mdstopo.children import command, end_with_parent
-from mdstopo.compiler.store import cache_folder
+from mdstopo.compiler.store import cache_folder, is_kept
 from mdstopo.evaluators import evaluator_of
 from mdstopo.optimizer.wide import MANY
 from mdstopo.optimizer.wide_numbers import WIDE
@@ -29,7 +29,7 @@ from mdstopo.warm import compiling, tiny
 def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
     """Have another process compile what the case needs, unless that is known to be cached."""
     marker = _marker(case)
-    if marker.exists():
+    if is_kept(marker.name):
         return
     try:
         marker.parent.mkdir(mode=0o700, parents=True, exist_ok=True)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.optimizer.state import State
 from mdstopo.session.start_in_stages import iterations_of
+from mdstopo.shown import counted, html_of
 from mdstopo.status import RunStatus
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ class Progress:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Outcome:
     """A run that has ended, or was stopped.
 
@@ -94,6 +95,17 @@ class Outcome:
     integrator_reason: str
     conclusion: "Conclusion | None" = None
     variables: Mapping[str, Floats] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        parts = [f"{self.status.value}: {self.reason}"]
+        parts += [
+            f"{name} {self.initial_objectives[name]:.9g} -> {value:.9g}" for name, value in self.objectives.items()
+        ]
+        parts.append(f"{counted(self.iterations, 'iteration')}, {counted(self.evaluations, 'evaluation')}")
+        return f"<Result of {self.case.title or self.case.name!r}: {'; '.join(parts)}>"
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
 
     @property
     def kkt(self) -> float:

@@ -19,6 +19,7 @@ from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.optimizer.state import State
 from mdstopo.plan.stored_tasks import read_begun, read_tasks
 from mdstopo.session.advice import advise, without_slope
+from mdstopo.session.coarse_steps import coarse_steps
 from mdstopo.session.combining import Combining
 from mdstopo.session.compiling_apart import compile_apart
 from mdstopo.session.outcome import Outcome, Progress
@@ -373,6 +374,7 @@ class _Run:
             if not motion.status.ok:
                 self.warnings += (f"the motion in load case {name} is not whole: {motion.status.value}",)
         self.warnings += advise(self.case, design, self.before, after)
+        self.warnings += tuple(filter(None, (coarse_steps(self.case, *each) for each in after.items())))
         if evaluation.status.usable:
             self.warnings += without_slope(self.case, evaluation)
         by_variable = getattr(evaluation, "variable_gradients", {})

@@ -96,8 +96,27 @@ def test_a_prescribed_angle_is_no_length() -> None:
             read_case(CASE.format(**SI) + motion.format(coordinate, value))
 
 
+@pytest.mark.parametrize(
+    ("row", "bound"),
+    [
+        ('response: energy, limit: "3 kJ"', 3000.0),
+        ('response: {displacement: {body: b}}, limit: "250 mm"', 0.25),
+        ('response: {angle: {body: b}}, over_time: max_abs, at_least: "90 deg"', math.pi / 2),
+        ('response: energy, over_time: integral, limit: "2 J s"', 2.0),
+    ],
+)
+def test_bounds_of_responses_have_the_units_of_these(row: str, bound: float) -> None:
+    (found,) = read_case(CASE.format(**SI) + f"constraints: [{{{row}}}]\n").constraints
+    assert found.bound == bound
+
+
+def test_bounds_in_another_unit_are_mistakes() -> None:
+    with pytest.raises(CaseError, match="in J, or in a unit that measures the same"):
+        read_case(CASE.format(**SI) + 'constraints: [{response: energy, limit: "3 mm"}]\n')
+
+
 def test_a_number_whose_key_has_no_unit_takes_none() -> None:
-    text = CASE.format(**SI) + 'constraints: [{response: energy, limit: "3 J"}]\n'
+    text = CASE.format(**SI) + 'constraints: [{volume: all, limit: "3 m"}]\n'
     with pytest.raises(CaseError, match="units are read where a key has one"):
         read_case(text)
 
@@ -121,3 +140,17 @@ def test_neither_takes_what_has_no_number_or_no_unit(text: str) -> None:
 def test_numbers_and_powers_without_end_are_refused_at_once(text: str) -> None:
     with pytest.raises(QuantityError):
         in_si(text, "m")
+
+
+def test_what_is_written_from_a_case_has_its_numbers_in_si() -> None:
+    from mdstopo.finalize.document import content_of
+    from mdstopo.finalize.lift import lifted
+
+    text = CASE.format(**UNITS).replace('angle: "250 mrad"', "angle: 0")
+    case = read_case(text)
+    content = content_of(case)
+    assert content["bodies"]["b"]["position"] == [0.04, 0]
+    assert content["loads"][0]["force"][0]["table"][1] == [0.25, 4448.2216152605]
+    spatial = read_case(lifted(case))
+    assert spatial.bodies[0].position == (0.04, 0.0, 0.0)
+    assert spatial.load_cases[0].gravity == (0.0, -9.80665, 0.0)

@@ -85,6 +85,8 @@ def test_an_interrupt_that_trips_the_compiler_is_an_interrupt(monkeypatch, capsy
     monkeypatch.setattr("atexit._run_exitfuncs", lambda: None)
     monkeypatch.setattr("gc.set_threshold", lambda _: None)
     monkeypatch.setattr("signal.signal", lambda *_: None)
+    monkeypatch.setattr("sys.argv", ["mdstopo", "run", "my case.yaml"])
     cli.main()
     assert ended == [3]
-    assert capsys.readouterr().err == "interrupted\n"
+    told = capsys.readouterr().err
+    assert told == "interrupted, nothing is saved; to begin again: mdstopo run 'my case.yaml'\n"

@@ -10,7 +10,10 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from mdstopo.case.reader import load_case as read
+from mdstopo.cli.check_scene import odd_scales
 from mdstopo.cli.group import run_group
+from mdstopo.cli.new import templates
 from mdstopo.plots.plot_table import PLOTS, fitting
 from mdstopo.plots.scenery import edge_at, hull, sizes, start_state
 from mdstopo.plots.shapes import planar_shapes
@@ -19,6 +22,7 @@ from mdstopo.plots.style import styled
 from mdstopo.plots.thickness import FAINT, stored_peaks
 from mdstopo.plots.watch import response_history
 from mdstopo.report.report_content import content
+from mdstopo.scene.refusals import refusals
 from tests.front.support import CASE
 from tests.space.gltf_reader import Gltf
 
@@ -243,6 +247,29 @@ def test_finished_files_name_their_axes_and_units(results):
         objectives = file["iterations/objectives"]
         assert objectives.dims[1][0].asstr()[()].tolist() == ["G1", "G2"]
         assert objectives.attrs["units"] == "J"
+
+
+def test_every_template_is_a_case_without_a_doubt(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run_group(["new", "--list"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    known = templates()
+    assert [line.split()[0] for line in said] == list(known)
+    assert next(iter(known)) == "crate"
+    assert {"seat", "mooring", "mechanism", "space"} < set(known)
+    for name in known:
+        assert run_group(["new", f"my-{name}", "--template", name, "--quiet"]) == 0
+        case = read(f"my-{name}")
+        assert case.title == f"my {name}"
+        assert case.is_optimizable
+        assert case.warnings == ()
+        assert refusals(case) == []
+        assert odd_scales(case) == []
+    assert read("my-mooring").body("vessel").mass == 9.0e6
+    assert read("my-space").dimension == 3
+    assert run_group(["new", "x", "--template", "sofa"]) == 2
+    assert "there are crate" in capsys.readouterr().err
+    assert run_group(["new"]) == 2
 
 
 def test_the_starter_case_is_right_and_is_never_written_over_another(tmp_path, monkeypatch, capsys):

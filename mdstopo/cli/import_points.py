@@ -1,0 +1,186 @@
+"""Points in drawings: tables of numbers (CSV), DXF and SVG. What comes out is points by the name of their layer."""
+
+import csv
+import io
+import math
+import re
+import xml.etree.ElementTree as Xml
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+Point = tuple[float, ...]
+Layers = dict[str, list[Point]]
+
+#: metres in the units of a DXF file's header ($INSUNITS); 0: it does not say
+DXF_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 14: 0.1}
+#: SVG commands of a path and how many numbers each takes; the last two are where it ends
+SVG_COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+
+
+class ImportedError(ValueError):
+    """The file cannot be taken; a sentence that says why. `exit_status` as of a bad case."""
+
+    exit_status = 2
+
+
+def points_in(path: Path, data: str) -> tuple[Layers, float | None]:
+    """Points (x, y) or (x, y, z) by layer, as the file has them, and metres in its unit where it says so.
+
+    Raises ImportedError.
+    """
+    readers = {".csv": _csv, ".txt": _csv, ".dxf": _dxf, ".svg": _svg}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise ImportedError(f"{path}: points are read from {', '.join(readers)}")
+    layers, unit = reader(data, path)
+    found = {name: _once(points) for name, points in layers.items() if points}
+    if not found:
+        raise ImportedError(f"{path}: there are no points in it")
+    return found, unit
+
+
+def _once(points: list[Point]) -> list[Point]:
+    """Each point once, in order."""
+    return list(dict.fromkeys(points))
+
+
+def _csv(data: str, path: Path) -> tuple[Layers, None]:
+    """Columns x, y or x, y, z, with a line of names or without; a column of text before or behind names the layer."""
+    layers: Layers = {}
+    sample = data[:4096]
+    delimiter = next((each for each in (";", "\t", ",") if each in sample), " ")
+    rows = csv.reader(io.StringIO(data), delimiter=delimiter, skipinitialspace=True)
+    for number, row in enumerate(rows, start=1):
+        cells = [cell.strip() for cell in row if cell.strip()]
+        if not cells or cells[0].startswith("#"):
+            continue
+        numbers = [float(cell) for cell in cells if re.fullmatch(_NUMBER, cell)]
+        words = [cell for cell in cells if not re.fullmatch(_NUMBER, cell)]
+        if not numbers and not layers:
+            continue  # names of columns
+        if len(numbers) not in (2, 3) or len(words) > 1:
+            raise ImportedError(
+                f"{path}, line {number}: found {', '.join(cells)}, allowed are x, y or x, y, z and a name"
+            )
+        layers.setdefault(words[0] if words else path.stem, []).append(tuple(numbers))
+    return layers, None
+
+
+def _dxf(data: str, path: Path) -> tuple[Layers, float | None]:
+    """Ends of lines, vertices of polylines, points, and centres of circles and arcs, by layer; x and y alone."""
+    lines = [line.strip() for line in data.splitlines()]
+    if len(lines) < 2 or lines[0].startswith("AutoCAD Binary"):
+        raise ImportedError(f"{path}: only DXF in text is read; save it as ASCII")
+    try:
+        pairs = [(int(code), value) for code, value in zip(lines[::2], lines[1::2], strict=False)]
+    except ValueError as error:
+        raise ImportedError(f"{path}: this is no DXF: {error}") from None
+    layers: Layers = {}
+    for kind, fields in _entities(pairs):
+        xs = [float(value) for code, value in fields if code in (10, 11) and (code == 10 or kind == "LINE")]
+        ys = [float(value) for code, value in fields if code in (20, 21) and (code == 20 or kind == "LINE")]
+        layer = next((value for code, value in fields if code == 8), "0")
+        layers.setdefault(layer, []).extend(zip(xs, ys, strict=False))
+    units = [value for (code, name), (_, value) in pairwise(pairs) if (code, name) == (9, "$INSUNITS")]
+    return layers, DXF_UNITS.get(int(units[0])) if units else None
+
+
+def _entities(pairs: list[tuple[int, str]]) -> Iterator[tuple[str, list[tuple[int, str]]]]:
+    """The entities of a DXF file that have points: their kind, and their group codes with values."""
+    inside, kind = False, ""
+    fields: list[tuple[int, str]] = []
+    for place, (code, value) in enumerate(pairs):
+        if code == 0:
+            if kind in ("LINE", "LWPOLYLINE", "VERTEX", "POINT", "CIRCLE", "ARC"):
+                yield kind, fields
+            kind, fields = "", []
+            if value == "SECTION":
+                inside = pairs[place + 1 : place + 2] == [(2, "ENTITIES")]
+            elif value == "ENDSEC":
+                inside = False
+            elif inside:
+                kind = value
+        elif kind:
+            fields.append((code, value))
+
+
+def _svg(data: str, path: Path) -> tuple[Layers, float | None]:
+    """Vertices of shapes and paths, ends of their curves, and centres of circles, by the id of the shape or its group.
+
+    y points up in what comes out. A unit is known where width is given as a length and a viewBox stands beside it.
+    """
+    try:
+        root = Xml.fromstring(data)
+    except Xml.ParseError as error:
+        raise ImportedError(f"{path}: this is no SVG: {error}") from None
+    layers: Layers = {}
+    _svg_node(root, path.stem, layers, path)
+    return {name: [(x, -y) for x, y in points] for name, points in layers.items()}, _svg_unit(root)
+
+
+def _svg_node(node: Xml.Element, name: str, layers: Layers, path: Path) -> None:
+    kind = node.tag.rpartition("}")[2]
+    name = node.get("id", name)
+    if node.get("transform"):
+        raise ImportedError(f"{path}: {kind} {name!r} has a transform, which is not read; ungroup or flatten it first")
+    if kind in ("defs", "clipPath", "mask", "symbol"):
+        return
+    layers.setdefault(name, []).extend(_svg_points(kind, node))
+    for child in node:
+        _svg_node(child, name, layers, path)
+
+
+def _svg_points(kind: str, node: Xml.Element) -> list[Point]:
+    def number(key: str) -> float:
+        found = re.match(_NUMBER, node.get(key, "0"))
+        return float(found[0]) if found else 0.0
+
+    if kind in ("polygon", "polyline"):
+        values = [float(each) for each in re.findall(_NUMBER, node.get("points", ""))]
+        return list(zip(values[::2], values[1::2], strict=False))
+    if kind == "line":
+        return [(number("x1"), number("y1")), (number("x2"), number("y2"))]
+    if kind == "rect":
+        x, y, w, h = (number(key) for key in ("x", "y", "width", "height"))
+        return [(x, y), (x + w, y), (x + w, y + h), (x, y + h)]
+    if kind in ("circle", "ellipse"):
+        return [(number("cx"), number("cy"))]
+    return path_points(node.get("d", "")) if kind == "path" else []
+
+
+def path_points(text: str) -> list[Point]:
+    """Where the pieces of an SVG path begin and end."""
+    found: list[Point] = []
+    x = y = x0 = y0 = 0.0
+    for command, rest in re.findall(r"([MLHVCSQTAZmlhvcsqtaz])([^MLHVCSQTAZmlhvcsqtaz]*)", text):
+        letter, values = command.upper(), [float(each) for each in re.findall(_NUMBER, rest)]
+        count = SVG_COMMANDS[letter]
+        if letter == "Z":
+            x, y = x0, y0
+            continue
+        for at in range(0, len(values) - count + 1, count):
+            own = values[at : at + count]
+            dx, dy = (x, y) if command.islower() else (0.0, 0.0)
+            x, y = (
+                (own[0] + dx, y)
+                if letter == "H"
+                else (x, own[0] + dy)
+                if letter == "V"
+                else (own[-2] + dx, own[-1] + dy)
+            )
+            if letter == "M" and at == 0:
+                x0, y0 = x, y
+            found.append((x, y))
+    return found
+
+
+def _svg_unit(root: Xml.Element) -> float | None:
+    """Metres in a unit of the drawing, where its width is a length and a viewBox says how many units that is."""
+    width = re.fullmatch(rf"({_NUMBER})(mm|cm|in)", root.get("width", "").strip())
+    box = [float(each) for each in re.findall(_NUMBER, root.get("viewBox", ""))]
+    if width is None or len(box) != 4 or box[2] <= 0.0:
+        return None
+    unit = float(width[1]) * {"mm": 1e-3, "cm": 1e-2, "in": 0.0254}[width[2]] / box[2]
+    return float(f"{unit:.12g}") if math.isfinite(unit) else None

@@ -1,0 +1,56 @@
+"""Whether fixed steps are enough to see a motion by: ten to a period, by what the motion itself does."""
+
+import numpy as np
+
+from mdstopo.case.model import Case, FloatArray
+from mdstopo.store.contents import Motion
+
+#: steps to a period, or for the whole motion, below which it is hardly seen
+FEWEST = 10.0
+#: share of the largest speed of its kind below which a swing is of no interest
+SMALL = 0.05
+
+
+def coarse_steps(case: Case, load_case: str, motion: Motion) -> str:
+    """Why the case's fixed step is too long for a motion, naming who turns round so fast; nothing where it is not.
+
+    A velocity that swings back and forth within fewer than ten steps is not resolved: between two instants at which it
+    turns round, half a period, there are fewer than five. Swings below a twentieth of the largest speed do not count.
+    """
+    step = case.solver.step
+    if step is None or not motion.status.ok or len(motion.t) < 2:
+        return ""
+    where = f"in load case {load_case} " if len(case.load_cases) > 1 else ""
+    if motion.t[-1] - motion.t[0] < FEWEST * step * (1.0 - 1e-9):
+        return f"solver.step of {step:g} s: {where}the motion has fewer than ten steps"
+    each = motion.v.shape[1] // len(case.bodies)
+    kinds = np.arange(motion.v.shape[1]) % each < each - each // 2  # places, then turns
+    shortest, mover = np.inf, ""
+    for column in range(motion.v.shape[1]):
+        largest = float(np.abs(motion.v[:, kinds == kinds[column]]).max())
+        found = _half_period(motion.t, motion.v[:, column], motion.a[:, column], SMALL * largest)
+        if found < shortest:
+            shortest, mover = found, case.bodies[column // each].name
+    if 2.0 * shortest >= FEWEST * step:
+        return ""
+    return (
+        f"solver.step of {step:g} s: {where}the velocity of {mover} swings with a period of some {2.0 * shortest:.2g} "
+        "s, fewer than ten steps; halve the step until nothing changes, or leave it out"
+    )
+
+
+def _half_period(t: FloatArray, v: FloatArray, a: FloatArray, least: float) -> float:
+    """The shortest time between two instants at which v (T,) turns round, its swings before and after above `least`.
+
+    t (T,): times, s. a (T,): rates of v. Infinite where there are no two such instants.
+    """
+    turns = np.flatnonzero(a[:-1] * a[1:] < 0.0)
+    if len(turns) < 2:
+        return float("inf")
+    share = a[turns] / (a[turns] - a[turns + 1])
+    times = t[turns] + share * (t[turns + 1] - t[turns])
+    at = np.concatenate([v[:1], v[turns] + share * (v[turns + 1] - v[turns]), v[-1:]])
+    wide = np.abs(np.diff(at)) > least
+    good = wide[:-2] & wide[1:-1] & wide[2:]
+    gaps = np.diff(times)[good]
+    return float(gaps.min(initial=np.inf))
