@@ -262,7 +262,7 @@ OPTIMIZER = Record(
         Key(
             "starts",
             Number(minimum=1, maximum=10**6, whole=True),
-            "how many starting designs; the further ones are random and feasible",
+            "how many starting designs at most; the further ones are random and feasible",
             default=1,
         ),
         Key("seed", Number(minimum=0, maximum=2**53, whole=True), "of the random starts", default=0),

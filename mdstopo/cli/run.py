@@ -26,6 +26,8 @@ from mdstopo.cli.progress import display
 from mdstopo.cli.uncertain_numbers import document_of, lines_of
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from mdstopo.session.outcome import Outcome
 
 _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is neither there nor gone
@@ -38,7 +40,7 @@ _GREY = (0.1, 0.9)  # alpha, as a share of its range, between which a member is 
 @overwrite_option
 @set_option
 @alpha_option
-@click.option("--starts", type=click.IntRange(1), metavar="N", help="How many starts (default: the case's).")
+@click.option("--starts", type=click.IntRange(1), metavar="N", help="How many starts at most (default: the case's).")
 @click.option(
     "--workers", type=click.IntRange(1), metavar="N", help="Processes for starts, or a sample's points (default 1)."
 )
@@ -172,25 +174,46 @@ def _summarise(output: Output, outcome: "Outcome", path: Path) -> None:
 
 
 def _optima(outcome: "Outcome") -> list[list[str]]:
-    """The distinct optima that several starts have come to: U, which starts, their evaluations, how the best ended."""
+    """The distinct optima that several starts have come to: U, which starts, their evaluations, how the best ended.
+
+    Then the starts that came to none, because they were left where others were better.
+    """
     from mdstopo.optimizer.start_families import family_of
-    from mdstopo.starts.quotas import distinct
+    from mdstopo.starts.quotas import came_to, distinct, expected_optima, left_behind
 
     tolerance, count = outcome.case.optimizer.tolerance, len(outcome.states)
     begun = sum(each is not None for each in outcome.states)
-    family = family_of(outcome.best_start, count)
+    family = family_of(outcome.best_start, count, outcome.case.n_design > 0)
     rows = [["starts", f"{begun} of {count}; best is {outcome.best_start + 1}, from {family}"]]
     for found in distinct(outcome.states, tolerance):
-        starts = ", ".join(str(index + 1) for index in found.starts)
         broken = f", violation {number(found.violation, 3)}" if found.violation > tolerance else ""
         rows.append(
             [
                 f"  {number(found.objective, 7)}{broken}",
-                f"start{'s' if len(found.starts) > 1 else ''} {starts}, {found.evaluations} evaluations, "
+                f"{_numbers(found.starts)}, {found.evaluations} evaluations, "
                 f"{found.status.replace('_', ' ')}, KKT residual {number(found.kkt, 2)}",
             ]
         )
+    left = left_behind(outcome.states)
+    if left:
+        spent = sum(state.evaluations for index in left if (state := outcome.states[index]) is not None)
+        rows.append(["  left early", f"{_numbers(left)}, {spent} evaluations: others were better"])
+    if begun < count and outcome.status != "interrupted":
+        came, optima = came_to(outcome.states)
+        more = expected_optima(came, optima) - optima
+        rows.append(
+            [
+                "  not begun",
+                f"{_numbers([k for k, state in enumerate(outcome.states) if state is None])}: {came} starts came to "
+                f"{optima} optim{'um' if optima == 1 else 'a'}, so {number(more, 2)} more are to be expected",
+            ]
+        )
     return rows
+
+
+def _numbers(starts: "Sequence[int]") -> str:
+    """Starts, counted from 1."""
+    return f"start{'s' if len(starts) > 1 else ''} {', '.join(str(index + 1) for index in starts)}"
 
 
 def _material(outcome: "Outcome") -> list[tuple[str, str]]:
@@ -245,6 +268,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
                 "objective": each.best_objective,
                 "kkt": each.kkt,
                 "dropped": each.dropped,
+                "twin": each.twin if each.twin >= 0 else None,
             }
             for each in outcome.states
         ],

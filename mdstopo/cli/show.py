@@ -137,10 +137,12 @@ def _say_starts(output: Output, view: "ResultView") -> None:
         return
     output.say("starts")
     rows = [["start", *objective_names(view), "status", "KKT"]]
+    reasons = view.lines("starts/reason")
     for index, word in enumerate(view.lines("starts/status")):
         values = (number(value) for value in starts["objectives"][index])
         kkt = number(starts["kkt"][index], 2) if "kkt" in starts else ""
-        rows.append([str(index + 1), *values, word.replace("_", " "), kkt])
+        dropped = bool(reasons) and reasons[index].startswith("dropped")
+        rows.append([str(index + 1), *values, reasons[index] if dropped else word.replace("_", " "), kkt])
     output.table(rows)
 
 

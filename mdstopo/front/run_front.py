@@ -246,7 +246,8 @@ class _FrontRun:
         if not np.array_equal(stated, first):
             self.notify(replaced(stated, first))
         combine, chosen = self.case.combine, self.case.optimizer
-        starts = Starts(first, self.ask.starts, partial(design_of_family, problem, chosen.seed), chosen.tolerance)
+        draw = partial(design_of_family, problem, chosen.seed)
+        starts = Starts(first, self.ask.starts, draw, chosen.tolerance, self.case.n_design > 0)
         return Request(
             self.ask.directions, self.method, combine.exponent, combine.normalize,
             np.array([sign_of(objective) for objective in self.case.objectives]), starts, chosen.max_iterations,

@@ -119,6 +119,7 @@ def first_state(alpha: Floats, sample: Sample, failed: bool = False, **own: Any)
         "stagnation": 0,
         "violation_mark": float("inf"),
         "dropped": False,
+        "twin": -1,
         "largest_gradient": 0.0,
         "iteration": 0,
         "evaluations": 1,

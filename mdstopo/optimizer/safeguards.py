@@ -124,6 +124,12 @@ def merit(objective: float, levels: Floats, penalty: Floats) -> float:
     return objective + float(np.einsum("i,i->", penalty, np.maximum(levels, 0.0)))
 
 
+def foreseen(state: State) -> float:
+    """What the merit is at the trial if the model is right: where limits hold there, the objective."""
+    penalty = state.penalty if state.uses_bundle else state.merit_penalty
+    return merit(state.objective, state.sample.constraint_levels, penalty) - state.predicted
+
+
 def next_merit_penalty(merit_penalty: Floats, multipliers: Floats, penalty: Floats) -> Floats:
     """The penalty in the merit, (J,): twice the multipliers, at most that of the subproblem; it falls gradually."""
     return np.minimum(np.maximum(MERIT_PENALTY * multipliers, MERIT_PENALTY_FALL * merit_penalty), penalty)

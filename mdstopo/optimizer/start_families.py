@@ -41,14 +41,14 @@ FROM_BEST = ((Family.OTHER_TO, 4), (Family.OTHER_FROM, 6), (Family.NEIGHBOUR, 8)
 SOFT_STRENGTH = 0.25
 
 
-def family_of(index: int, starts: int) -> Family:
-    """The family of start `index` of so many."""
+def family_of(index: int, starts: int, softens: bool = True) -> Family:
+    """The family of start `index` of so many. softens: whether there are members whose strengths vary."""
     if index == 0:
         return Family.STATED
     for place, (family, least) in enumerate(FROM_BEST, start=1):
         if starts >= least and index == starts - place:
             return family
-    return Family.SOFTENED if index == 1 else TURNS[(index - 2) % len(TURNS)]
+    return Family.SOFTENED if index == 1 and softens else TURNS[(index - 2) % len(TURNS)]
 
 
 def begins_at_best(family: Family) -> bool:

@@ -168,7 +168,8 @@ class State:
     `changes` (m, N) of the Lagrangian's gradient over them, `restoring` whether the largest violation stands for the
     objective, `resets` how often in a row rows from elsewhere were dropped, `concavity` (J + 1,) of the groups
     (`Bundle.lowered`), `stagnation` how many iterates the largest violation has not fallen well below `violation_mark`,
-    `dropped` whether others of several starts go on instead, `largest_gradient` the largest |dU/dalpha| of any iterate;
+    `dropped` whether others of several starts go on instead, `twin` the number of the one that came to the same (-1:
+    none), `largest_gradient` the largest |dU/dalpha| of any iterate;
     or else `convex` the relative weight of the quadratic term. Of each constraint: `penalty` (J,) on violations in the
     subproblem, `merit_penalty` (J,) on them in the separable approximation's merit. Counters: `iteration`,
     `evaluations`, `small` steps in a row, `failed` evaluations in a row, `seconds`.
@@ -207,6 +208,7 @@ class State:
     stagnation: int
     violation_mark: float
     dropped: bool
+    twin: int
     largest_gradient: float
     iteration: int
     evaluations: int

@@ -53,13 +53,14 @@ SPREADING = ("nbi", "nc")
 class Starts:
     """Where solves begin. first (N,): the case's design; count: of each solve, draw: makes the designs of the others.
 
-    tolerance: of violations, where starts are compared.
+    tolerance: of violations, where starts are compared. softens: whether there are members whose strengths vary.
     """
 
     first: Floats
     count: int = 1
     draw: Draw | None = None
     tolerance: float = 0.0
+    softens: bool = True
 
     @property
     def early(self) -> int:
@@ -68,7 +69,7 @@ class Starts:
 
     def begin(self, task: Task, index: int, number: int, best: Floats | None = None) -> Task:
         """The task from start `index`, with the design of that number of its family."""
-        family = family_of(index, self.count)
+        family = family_of(index, self.count, self.softens)
         own = self.draw(number, family, best) if self.draw is not None else None
         start = self.first if own is None else own
         return replace(task, start=start, softened=family is Family.SOFTENED)

@@ -85,14 +85,16 @@ def _starts_part(case: Case, states: Sequence[State | None]) -> Datasets:
     space = case.space
     designs = np.full((len(states), space.length), np.nan)
     residuals = np.full(len(states), np.nan)
-    words = []
+    words, reasons = [], []
     for index, state in enumerate(states):
-        words.append("running" if state is None or not is_done(case, state) else str(state.status))
+        words.append("not_begun" if state is None else str(state.status) if is_done(case, state) else "running")
+        reasons.append("" if state is None else state.reason)
         if state is not None:
             objectives[index] = iteration_columns(case, state)["objectives"][best_row(state)]
             designs[index] = space.expand(state.best_alpha)
             residuals[index] = state.kkt
     part: Datasets = {"starts/objectives": objectives, "starts/status": words, "starts/kkt": residuals}
+    part["starts/reason"] = reasons
     return part | design_part(case, designs, "starts")
 
 

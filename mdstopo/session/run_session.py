@@ -156,6 +156,8 @@ class _Run:
         self.notify = notify
         self.command = command
         self.states: list[State | None] = [None] * case.optimizer.starts
+        #: whether every start has gone its way, or is not needed
+        self.has_ended = False
         self.warnings: tuple[str, ...] = tuple(mistake.message for mistake in case.warnings)
         self.finals: Datasets = {}
         self.final_objectives: Floats | None = None
@@ -329,6 +331,8 @@ class _Run:
             # who goes on is decided only where all have come as far as they were to: not in a run that is stopped
             if not all(self.is_through(task) for task in tasks):
                 break
+        else:
+            self.has_ended = True
 
     def is_through(self, task: StartTask) -> bool:
         """Whether a start has gone the part of its way that it was to go."""
@@ -339,7 +343,7 @@ class _Run:
 
     def conclude(self, best: int) -> tuple[RunStatus, str]:
         """The run's status and why it ended."""
-        if any(state is None or not is_done(self.case, state) for state in self.states):
+        if not self.has_ended:
             return RunStatus.INTERRUPTED, "stopped on request; the last iteration is saved"
         state = self.states[best]
         assert state is not None

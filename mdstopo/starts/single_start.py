@@ -144,10 +144,11 @@ def run_start(
 
 
 def soften(settings: Settings, problem: Problem, first: Floats | None, stop: Stop) -> State | None:
-    """The end of a short run with a quarter of the strengths; None where it was stopped."""
+    """The end of a short run with a quarter of the strengths, which ends, too, where so weak members cannot keep the
+    limits; None where it was stopped."""
     optimizer = make(problem.softened(SOFT_STRENGTH), settings)  # type: ignore[attr-defined]
     state = optimizer.start(first)
-    while state.running and state.iteration < SOFT_ITERATIONS:
+    while state.running and not state.restoring and state.iteration < SOFT_ITERATIONS:
         if stop():
             return None
         state = optimizer.step(state)

@@ -49,6 +49,14 @@ def tasks_of(count: int) -> list[Task]:
     return rivals([Task(0, U, np.full(3, float(k)), 100) for k in range(count)])
 
 
+def at(state: State, iteration: int, objective: float, level: float) -> State:
+    """The state after so many iterations, with a best design of its own, where it goes on, too."""
+    alpha = np.full_like(state.alpha, level)
+    return replace(
+        state, iteration=iteration, best_objective=objective, best_alpha=alpha, trial=alpha, objective=objective
+    )
+
+
 def found_of(task: Task):
     return replace(failed(task.point, "k", task.start, 2, ""), evaluations=1, status=RunStatus.CONVERGED)
 
@@ -74,9 +82,7 @@ def test_starts_of_a_solve_go_on_in_quotas_and_others_go_to_their_ends_beside_th
         if task.begun is not None and not task.begun.running:
             return task.begun
         level = float(task.start[0])
-        return replace(
-            first, iteration=task.quota, best_objective=1.0 + 0.1 * level, best_alpha=np.full_like(first.alpha, level)
-        )
+        return at(first, task.quota, 1.0 + 0.1 * level, level)
 
     lonely = Task(7, U, np.zeros(3), 100)
     rounds, solved = raced([tasks_of(4), tasks_of(1)], [lonely], answer)
@@ -94,7 +100,7 @@ def test_a_start_that_fails_does_not_stop_the_others(first: State) -> None:
         if task.quota is None:
             return found_of(task)
         value = float(task.start[0])
-        return replace(first, iteration=task.quota, best_objective=value, best_alpha=np.full_like(first.alpha, value))
+        return at(first, task.quota, value, value)
 
     rounds, solved = raced([tasks_of(4)], [], answer)
     assert [found.status.value for _, found in solved] == ["failed", *["converged"] * 3]

@@ -92,3 +92,10 @@ def test_a_neighbour_has_the_best_design_s_values_most_of_them_in_their_place():
     x = neighbour(free, 0, 1, best)
     assert np.allclose(np.sort(x), best)
     assert 0 < np.count_nonzero(x != best) < 20
+
+
+def test_where_no_member_s_strength_varies_no_start_is_softened():
+    families = [family_of(index, 8, softens=False) for index in range(8)]
+    assert Family.SOFTENED not in families
+    assert families[0] is Family.STATED
+    assert families[2:] == [family_of(index, 8) for index in range(2, 8)]

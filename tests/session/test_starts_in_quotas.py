@@ -9,6 +9,7 @@ import pytest
 from mdstopo.session.outcome import Outcome
 from mdstopo.session.run_session import run_session
 from mdstopo.starts import quotas
+from mdstopo.store.result_reader import read_result
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
 from tests.session.test_runs_and_files import assert_same_files, stop_after
 
@@ -31,7 +32,7 @@ def test_starts_that_lag_are_dropped_at_a_quota_and_a_third_goes_on(straight: tu
     assert len(states) == STARTS
     dropped = [state for state in states if state.dropped]
     assert dropped
-    decided = (quotas.TRIAL, *quotas.QUOTAS)
+    decided = (*range(quotas.TRIAL + 1), *quotas.LOOKS, *quotas.LATER_LOOKS, *quotas.QUOTAS)
     assert all(state.iteration in decided and "dropped after" in state.reason for state in dropped)
     assert 1 <= sum(state.iteration == 50 for state in states) <= STARTS // 3 + 1
     assert not states[straight[0].best_start].dropped
@@ -73,7 +74,7 @@ def test_equal_optima_are_told_once_best_first_with_all_their_evaluations(straig
 
 @pytest.mark.parametrize(
     ("before", "asked", "again"),
-    [(1, None, True), (1, 4, False), (1, 9, True), (4, None, True), (9, None, True), (9, 25, False), (9, 170, True)],
+    [(1, None, True), (1, 2, False), (1, 9, True), (4, None, True), (9, None, True), (9, 15, False), (9, 170, True)],
 )
 def test_a_run_resumed_with_another_number_of_starts_ends_as_one_that_had_so_many_from_the_beginning(
     before: int, asked: int | None, again: bool, straight: tuple[Outcome, Path], tmp_path: Path
@@ -100,7 +101,7 @@ def test_a_run_resumed_with_one_start_takes_over_the_first_wherever_it_is(tmp_pa
 
 def test_starts_that_a_run_with_more_of_them_would_have_alike_are_taken_over(tmp_path: Path) -> None:
     case = limited(hand_made_case(), 60, starts=8)
-    old = go(tmp_path / "old.h5", 60, starts=4, stop_requested=stop_after(22)).states
+    old = go(tmp_path / "old.h5", 60, starts=4, stop_requested=stop_after(17)).states
     found = quotas.carried_over(case, [*old, *[None] * 4], 4)
     for index, (before, after) in enumerate(zip(old, found, strict=False)):
         # the fourth of four begins at the best of the others
@@ -108,3 +109,22 @@ def test_starts_that_a_run_with_more_of_them_would_have_alike_are_taken_over(tmp
         assert (after is not None) == kept
         assert after is None or before is None or (after.running and after.alpha.tobytes() == before.alpha.tobytes())
     assert [each is not None for each in found] == [False, True, True, *[False] * 5]
+
+
+def test_starts_that_are_not_needed_do_not_begin_and_the_run_has_ended_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever was found is enough: the two that would begin at the best design do not. Its file is that of a run that
+    was stopped on the way and resumed, also when it had come to the end of the first quota."""
+    monkeypatch.setattr(quotas, "UNFOUND", float("inf"))
+    path, parts = tmp_path / "whole.h5", tmp_path / "parts.h5"
+    whole = go(path)
+    assert [state is None for state in whole.states] == [False] * 4 + [True] * 2
+    assert whole.status == "max_iterations"
+    assert read_result(path).lines("starts/status")[-2:] == ("not_begun",) * 2
+    go(parts, stop_requested=stop_after(40))
+    for asked in (30, 20, 5):
+        go(parts, resume=True, stop_requested=stop_after(asked))
+    go(parts, resume=True)
+    assert_same_files(path, parts)
+    assert go(path, resume=True).status == "max_iterations"

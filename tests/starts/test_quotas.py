@@ -7,7 +7,22 @@ import pytest
 
 from mdstopo.optimizer.start_families import Family
 from mdstopo.optimizer.state import State
-from mdstopo.starts.quotas import QUOTAS, TRIAL, drop, lags, rounds
+from mdstopo.starts.quotas import (
+    LOOKS,
+    QUOTAS,
+    SECOND_TRIAL,
+    TRIAL,
+    all_found,
+    came_to,
+    distinct,
+    drop,
+    drop_twins,
+    expected_optima,
+    foresees_same,
+    lags,
+    left_behind,
+    rounds,
+)
 from mdstopo.starts.single_start import LONG_FIRST_STEPS, make_optimizer
 from mdstopo.status import RunStatus
 from tests.fakes import FakeEngineWithEvaluations, hand_made_case, limited
@@ -20,9 +35,12 @@ def first() -> State:
 
 
 def at(state: State, iteration: int, objective: float, status: RunStatus = RunStatus.RUNNING) -> State:
-    """The state after so many iterations, with a best design of its own for each objective."""
+    """The state after so many iterations, with a best design of its own for each objective, where it goes on, too."""
     alpha = np.full_like(state.alpha, objective)
-    return replace(state, iteration=iteration, best_objective=objective, best_alpha=alpha, status=status)
+    return replace(
+        state, iteration=iteration, best_objective=objective, best_alpha=alpha, trial=alpha, objective=objective,
+        predicted=0.0, status=status,
+    )  # fmt: skip
 
 
 def decided(states: list[State | None]) -> list[bool]:
@@ -60,7 +78,7 @@ def test_starts_that_begin_at_the_best_do_so_one_after_the_other_also_when_resum
     for states in ([*early, None, None], [*early, None, later], [*early, at(first, 3, 0.09), later]):
         tasks = {}
         for asked in rounds(case, states, ignore):
-            tasks |= {task.index: task for task in asked if task.index >= 4 and task.quota == TRIAL}
+            tasks |= {task.index: task for task in asked if task.index >= 4 and task.quota == 0}
             if 4 in tasks and states[4] is None:
                 states[4] = at(first, TRIAL, 0.09)
             if 5 in tasks:
@@ -99,6 +117,80 @@ def test_who_is_far_behind_is_decided_once_and_never_of_a_softened_start(first: 
     going = rounds(case, states, ignore)
     next(going)
     assert [task.index for task in next(going)] == [0, 1, 2]
+
+
+def test_starts_that_are_about_to_come_to_the_same_are_twins_and_others_are_not(first: State) -> None:
+    """The same design next, of the same value by the models, whatever the best designs so far are."""
+    one = at(first, SECOND_TRIAL, 0.5)
+    far = replace(one, best_alpha=np.zeros_like(one.alpha), best_objective=9.0)
+    assert foresees_same(far, one)
+    assert foresees_same(replace(far, objective=0.7, predicted=0.2), one)  # a step that lowers 0.7 by 0.2
+    assert not foresees_same(replace(far, objective=0.7, predicted=0.1), one)
+    assert not foresees_same(replace(far, trial=one.trial + 0.03), one)
+    assert not foresees_same(replace(far, restoring=True), one)  # its model is of the violation
+    ended = replace(one, status=RunStatus.CONVERGED, trial=np.zeros_like(one.trial))
+    assert foresees_same(far, ended)
+    assert not foresees_same(replace(far, status=RunStatus.FAILED), ended)
+
+
+def test_the_better_of_two_that_come_to_the_same_goes_on_and_who_has_ended_is_never_dropped(first: State) -> None:
+    one, other = at(first, SECOND_TRIAL, 0.5), replace(at(first, SECOND_TRIAL, 0.5), best_objective=0.499)
+    ended = replace(at(first, 2, 0.5, RunStatus.CONVERGED), best_objective=0.6)
+    states: list[State | None] = [one, other, ended, at(first, SECOND_TRIAL, 0.8)]
+    drop_twins(range(4), (), 0.0, states, ignore)
+    assert [state is not None and state.dropped for state in states] == [True, False, False, False]
+    assert states[0] is not None
+    assert states[0].twin == 1
+
+
+def test_the_table_of_optima_has_twins_with_what_they_came_to_and_leaves_out_who_was_left_behind(first: State) -> None:
+    best, worse = at(first, 30, 0.1, RunStatus.CONVERGED), at(first, 30, 0.5, RunStatus.CONVERGED)
+    twin = replace(at(first, 6, 0.3), dropped=True, twin=0, status=RunStatus.MAX_ITERATIONS)
+    left = replace(twin, twin=-1)
+    states: list[State | None] = [best, twin, worse, left, replace(twin, twin=1), replace(twin, twin=3), None]
+    found = distinct(states, 0.0)
+    assert [each.starts for each in found] == [(0, 1, 4), (2,)]
+    assert found[0].evaluations == sum(state.evaluations for state in (best, twin, twin))
+    assert left_behind(states) == [3, 5]
+
+
+@pytest.mark.parametrize(
+    ("starts", "found", "expected"), [(8, 1, 1.4), (7, 1, 1.5), (17, 2, 32 / 13), (16, 2, 2.5), (4, 2, np.inf)]
+)
+def test_how_many_optima_are_expected(starts: int, found: int, expected: float) -> None:
+    assert expected_optima(starts, found) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_estimate_is_the_posterior_mean_of_the_number_of_optima() -> None:
+    """Boender and Rinnooy Kan's: all numbers of optima, and all sizes of their basins, alike likely beforehand. The sum
+    over the posterior's terms, without the closed form."""
+    from math import lgamma
+
+    n, w = 12, 3
+    numbers = np.arange(w, 200_000)
+    # so many optima K: of the ways to put n starts into K basins, those that leave all but w empty
+    terms = np.array([lgamma(k + 1) - lgamma(k - w + 1) - lgamma(k + n) + lgamma(k) for k in numbers])
+    weights = np.exp(terms - terms.max())
+    assert expected_optima(n, w) == pytest.approx(float(weights @ numbers / weights.sum()), rel=1e-6)
+
+
+def test_no_further_starts_begin_where_all_optima_are_found_and_that_is_seen_the_same_way_later(first: State) -> None:
+    """Eight of twelve starts begin away from the best: seven come to the same, one is left behind."""
+    case = limited(hand_made_case(), 60, starts=12)
+    twin = replace(at(first, LOOKS[1], 0.3), dropped=True, twin=0, status=RunStatus.MAX_ITERATIONS)
+    early: list[State | None] = [at(first, QUOTAS[0], 0.1), *[twin] * 7, replace(twin, twin=-1)]
+    assert came_to(early) == (8, 1)
+    assert all_found(early)
+    states = [*early, None, None, None]
+    asked = [task.index for tasks in rounds(case, states, ignore) for task in tasks]
+    assert max(asked) == 8
+    # later: the first has come to the end, or another one was as far and was dropped as worse or for the same optimum
+    for last in (at(first, 55, 0.1), replace(at(first, 55, 0.1), status=RunStatus.CONVERGED)):
+        assert came_to([last, *early[1:]]) == (8, 1)
+    worse = at(first, QUOTAS[0], 0.5)
+    late_twin = replace(worse, iteration=24, dropped=True, twin=0, status=RunStatus.MAX_ITERATIONS)
+    assert came_to([*early, worse]) == came_to([*early, late_twin]) == (9, 2)
+    assert not all_found([*early, late_twin])
 
 
 def test_random_designs_begin_with_long_steps_where_the_case_states_none() -> None:
