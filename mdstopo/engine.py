@@ -22,7 +22,7 @@ from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.border import border_of
 from mdstopo.scene.design import Design, checked
-from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.family import beyond_springs, collocates
 from mdstopo.scene.modes import Modes
 from mdstopo.scene.origin import extent_of, origin_of, seen_from
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
@@ -58,7 +58,7 @@ class Evaluator:
             raise CaseError(refused, str(case.path or case.name))
         self.case = case
         self.beyond = beyond_springs(case)
-        self.integrator, self.integrator_reason = choose(case.solver, self.beyond)
+        self.integrator, self.integrator_reason = choose(case.solver, self.beyond, collocates(case))
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
         self._method = method_of(self.integrator, case.solver)
         # whether `auto` has to give way to the steps that the iterative method is defined on

@@ -18,7 +18,8 @@ class IntegratorKind(NamedTuple):
     adaptive: whether it chooses steps by the tolerance where none is given. finds_step: whether it finds a fixed step
     by itself. order: of the error of fixed steps in their length.
     explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:
-    whether the iterative sensitivity method is defined on its steps.
+    whether the iterative sensitivity method is defined on its steps. free_only: whether its steps carry free bodies and
+    smooth forces alone (`scene.family.beyond_collocation`), and of general scenes those in space.
     """
 
     name: str
@@ -32,6 +33,7 @@ class IntegratorKind(NamedTuple):
     explicit: bool = False
     has_radius: bool = False
     iterative: bool = False
+    free_only: bool = False
 
 
 #: the integrators by their name
@@ -40,10 +42,13 @@ INTEGRATORS: dict[str, IntegratorKind] = {
     for kind in (
         IntegratorKind(
             "gauss",
-            "adaptive collocation at Gauss nodes; for springs between free bodies and their energy",
+            "adaptive collocation at Gauss nodes; for springs between free bodies and their energy, and in space for "
+            "free bodies between which forces are smooth",
             "mdstopo.integrators.choice:gauss",
             springs=True,
+            general="mdstopo.general.gauss_entry",
             adaptive=True,
+            free_only=True,
         ),
         IntegratorKind(
             "runge_kutta",
@@ -73,7 +78,9 @@ SMOOTH, ADAPTIVE, FIXED = "gauss", "runge_kutta", "generalized_alpha"
 
 def names(_: bool = False) -> dict[str, str]:
     """The words of `solver.integrator` with what they mean."""
-    auto = "gauss for springs between free bodies and their energy, else runge_kutta; the reason is printed"
+    auto = (
+        "gauss where it goes: free bodies, in a plane springs and their energy; else runge_kutta; the reason is printed"
+    )
     return {AUTO: auto, **{kind.name: kind.doc for kind in INTEGRATORS.values()}}
 
 

@@ -9,11 +9,10 @@ from mdstopo.case.joints.spatial import SPATIAL_JOINTS
 from mdstopo.case.joints.spatial_keys import DIRECTION, POINT, TRIPLE
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Kind, explained
 from mdstopo.case.mesh_files import MeshFile
-from mdstopo.case.not_yet import NotYetAs
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.responses import key_of
-from mdstopo.case.schema_case import CONSTRAINT, FORMAT, OBJECTIVE, SOLVER
+from mdstopo.case.schema_case import CONSTRAINT, FORMAT, OBJECTIVE
 from mdstopo.case.schema_contact import CONTACT
 from mdstopo.case.schema_frame import FRAME, FRAMES
 from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
@@ -344,13 +343,6 @@ _RESPONSE = ByShape(
 _OBJECTIVE = with_keys(OBJECTIVE, with_kind(OBJECTIVE, "response", _RESPONSE))
 _CONSTRAINT = with_keys(CONSTRAINT, with_kind(CONSTRAINT, "response", _RESPONSE))
 
-# How it is computed: what is not in space yet.
-_INTEGRATOR = next(key for key in SOLVER.keys if key.name == "integrator")
-SPATIAL_SOLVER = with_keys(
-    SOLVER,
-    replace(_INTEGRATOR, kind=NotYetAs(_INTEGRATOR.kind, ("gauss",))),
-)
-
 # Contacts.
 _ON = Key("on", SURFACE, "the surface of another body that they touch", required=True)
 _CONTACT = replace(
@@ -371,5 +363,4 @@ SPACE_FORMAT = with_keys(
     with_kind(FORMAT, "load_cases", Named(_CASE, "load case")),
     with_kind(FORMAT, "objectives", Named(_OBJECTIVE, "objective")),
     with_kind(FORMAT, "constraints", ListOf(_CONSTRAINT, what="constraints")),
-    with_kind(FORMAT, "solver", SPATIAL_SOLVER),
 )

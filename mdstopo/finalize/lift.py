@@ -92,7 +92,6 @@ class _Lift:
             "load_cases": self.each(self.load_case),
             "objectives": self.each(self.looked_at),
             "constraints": self.each(self.looked_at),
-            "solver": self.solver,
         }
 
     def refuse(self, path: str, words: str) -> None:
@@ -370,12 +369,6 @@ class _Lift:
         """Whether the list that a number stands in is the same, or a vector that has got a zero off the plane."""
         before, behind = _at(old, steps[:-1]), _at(new, steps[:-1])
         return bool(before == behind or (not self.is_tilted and behind == [*before, 0]))
-
-    def solver(self, old: Plain, path: str) -> Plain:
-        """What is not in space yet."""
-        if old.get("integrator") == "gauss":
-            self.refuse(inside(path, "integrator"), "gauss is not in space yet")
-        return old
 
 
 def read_signals(value: Any, names: tuple[str, ...]) -> tuple[Signal, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.method_interface import beside, point_of
+from mdstopo.general.method_interface import beside, is_continuous, point_of
 from mdstopo.general.model import KIND, SUBJECT, unpack_general
 from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
@@ -235,7 +235,7 @@ def go_to(tag, motion, k, c, exact, last):
     if c <= 0.0 or c >= 1.0:
         copy_vector(history.q[k if c <= 0.0 else k + 1], q)
         copy_vector(history.v[k if c <= 0.0 else k + 1], v)
-    elif exact:
+    elif exact or is_continuous(tag):
         point_of(tag, model, motion.tables, member_state, history, motion.count, k, c, no, workspace, q, v, motion.work)
     else:
         if k != last:

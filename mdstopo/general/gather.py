@@ -15,12 +15,14 @@ from mdstopo.integrators.steps import DESIGN as DESIGN_STATES
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     attitude,
     freedoms,
+    has_spring_energies,
     member_designs,
     motion_of_ends,
     pair_displacement,
     pose_size,
     relative_pose,
     spring_designs,
+    spring_energies,
     turn_bodies,
     turned_pose,
 )
@@ -115,8 +117,11 @@ def _add(model, segment, when, member_state, q, v, a, turned, z, weight, out):
             continue
         p = model.block[k, PAIR]
         lo = model.block[k, START]
-        if code == SPRING and weight == 0.0 and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0:
+        elastic = code == SPRING and model.law[k, 1] == 0.0 and model.law[k, 2] == 0.0
+        if elastic and (weight == 0.0 or has_spring_energies(model)):
             spring_designs(model, model.law[k], lo, model.block[k, COUNT], model.block[k, ROW], rel, u, p, out)
+            if weight != 0.0:
+                spring_energies(model, model.law[k], lo, model.block[k, COUNT], rel, p, weight, out)
             continue
         for j in range(count):
             if code != INERTER:

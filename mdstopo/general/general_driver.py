@@ -32,7 +32,7 @@ from mdstopo.general.ready import Ready
 from mdstopo.general.row_gradients import RowGradients
 from mdstopo.general.shapes import shape_of
 from mdstopo.general.start import FITS, SettledStart, size_of, speed_of
-from mdstopo.general.step_history import GRAZES, history_room
+from mdstopo.general.step_history import FACTORS, GRAZES, WINDOWS, history_room
 from mdstopo.general.turning_drives import global_moments
 from mdstopo.general.variables import Placing
 from mdstopo.integrators.driver import CLOSENESS, MAX_STEPS, NEWTON_TOLERANCE
@@ -144,8 +144,10 @@ class GeneralDriver:
 
     def _make_room(self, steps: int, stages: int, events: int) -> None:
         # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
-        factors = self.method.kind.explicit and not self._inertial
-        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, factors], dtype=np.int64)
+        kept = FACTORS if self.method.kind.explicit and not self._inertial else 0
+        if self.method.collocates:
+            kept = WINDOWS
+        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, kept], dtype=np.int64)
         floats, ints = history_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)

@@ -68,6 +68,12 @@ def derivatives(tag):
 
 
 @kernel
+def is_continuous(tag):
+    """The quintic through the accelerations of both ends is closer to the motion than the method's cubic."""
+    return False
+
+
+@kernel
 def weights_of(tag, model, tables, history, w, out):
     """The trapezoidal rule: half of each step next to it for an end, nothing for a stage off the motion.
 
@@ -313,5 +319,6 @@ implement(
     step_forward=step_forward,
     beside=beside,
     derivatives=derivatives,
+    is_continuous=is_continuous,
     weights_of=weights_of,
 )

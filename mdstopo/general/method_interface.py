@@ -1,11 +1,12 @@
 """What a method of integration does for those who look at its steps, chosen by its tag when a kernel is compiled.
 
-The tag is a tuple of zeros whose length says which method is meant. A method has six functions:
+The tag is a tuple of zeros whose length says which method is meant. A method has seven functions:
 
 1. `point_of`: the state inside a step;
 2. `step_back`: a step of the reverse sweep;
 3. `step_forward`: changes pushed through a step;
 4. `beside`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
+   `is_continuous`: whether states inside a step are at hand;
 5. `weights_of`: weights of a step's stages in an integral.
 """
 
@@ -21,6 +22,7 @@ IMPLEMENTED: dict[str, dict[int, Any]] = {
     "step_forward": {},
     "beside": {},
     "derivatives": {},
+    "is_continuous": {},
     "weights_of": {},
 }
 
@@ -111,6 +113,11 @@ def derivatives(tag):
     raise NotImplementedError
 
 
+def is_continuous(tag):
+    """Whether `point_of` costs no balance. Then samples are taken there; else on the quintic through a step's ends."""
+    raise NotImplementedError
+
+
 def weights_of(tag, model, tables, history, w, out):
     """Weights of the stages in the integral over a step.
 
@@ -134,5 +141,5 @@ def _of(name: str, tag: Any) -> Any:
     return IMPLEMENTED[name][len(tag)]
 
 
-for _stub in (point_of, step_back, step_forward, beside, derivatives, weights_of):
+for _stub in (point_of, step_back, step_forward, beside, derivatives, is_continuous, weights_of):
     by_type(_stub, "tag", partial(_of, _stub.__name__))

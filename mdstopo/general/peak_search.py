@@ -25,7 +25,7 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
 )
-from mdstopo.general.method_interface import derivatives
+from mdstopo.general.method_interface import derivatives, is_continuous
 from mdstopo.general.model import ORDER, unpack_general
 from mdstopo.general.responses import kinked, rate_is_by_state
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
@@ -101,7 +101,7 @@ def sample_ends(tag, motion, j, seen, accelerations):
 
 @kernel
 def sample_inside(tag, motion, j, k, seen, accelerations):
-    """Evaluate a response in step k between its ends, on the quintic through these.
+    """Evaluate a response in step k between its ends, on the quintic through these or on the method's own motion.
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j, k: the response, the step.
     seen (SAMPLES, 3): all samples but the first and the last are written.
@@ -111,6 +111,13 @@ def sample_inside(tag, motion, j, k, seen, accelerations):
     h = history.t[k + 1] - history.t[k]
     model, ends_q, ends = motion.model, motion.ends_q, motion.ends
     restore_modes(history, history.index[k, EVENTS], motion.member_state)
+    if is_continuous(tag):
+        for i in range(1, LAST):
+            value, rate, who = evaluate_exactly(tag, motion, j, k, i / LAST, -1)
+            seen[i, G] = value
+            seen[i, DG] = rate
+            seen[i, MEMBER] = who
+        return
     for e in range(2):
         copy_vector(history.q[k + e], ends_q[e])
         copy_vector(history.v[k + e], ends[e, 0])

@@ -18,6 +18,8 @@ import numpy as np
 from mdstopo.general.kinks import kinks
 from mdstopo.general.responses import LISTED, has_kinks
 from mdstopo.general.start import size_of
+from mdstopo.general.step_history import FIRST
+from mdstopo.integrators.gauss_tables import LEVELS
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.scene.model import FloatArray
 
@@ -26,8 +28,9 @@ if TYPE_CHECKING:
 
 #: reductions that are integrals over time: of g (1), of its square (2)
 INTEGRALS = {"mean": 1, "integral": 1, "rms": 2}
-#: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than any method's own weights
+#: nodes and weights of the Gauss-Legendre sums, on (-1, 1): better than a method's own weights; than collocation's, too
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+FINE_NODES, FINE_WEIGHTS = np.polynomial.legendre.leggauss(20)
 #: how often an evaluation looks for breakpoints
 ROUNDS = 3
 #: how far both sums over a step may differ, relative to the tolerance and the whole integral: derivatives bend more
@@ -62,10 +65,7 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
         return found
     ends = np.unique(np.concatenate([t, found, driver.quadrature_breakpoints]))
     ends = ends[np.concatenate([[True], np.diff(ends) > APART * (t[-1] - t[0])])]
-    method = 1 if model.size[2] != 0 else 0
-    vectors = driver.method.tables[method, 2, :, : STAGES[method]]
-    weighed = vectors[2] != 0.0
-    rule = np.stack([vectors[0][weighed], vectors[2][weighed]])
+    rule = _rule(driver, count)
     for j, name in looked:
 
         def look(places: FloatArray, j: int = j, square: bool = INTEGRALS[name] == 2) -> FloatArray:
@@ -74,8 +74,31 @@ def quadrature_breakpoints(driver: "GeneralDriver", count: int) -> list[float]:
 
         nothing = _rounding(driver, j, float(t[-1] - t[0]))
         nothing = nothing * nothing if INTEGRALS[name] == 2 else nothing
-        found += halves(t, ends, look, rule, SHARE * float(driver.settings[0]), nothing * float(t[-1] - t[0]))
+        found += halves(
+            t,
+            ends,
+            look,
+            rule,
+            SHARE * float(driver.settings[0]),
+            nothing * float(t[-1] - t[0]),
+            driver.method.collocates,
+        )
     return found
+
+
+def _rule(driver: "GeneralDriver", count: int) -> FloatArray:
+    """Nodes and weights (2, s) on (0, 1) by which stages integrate; where steps differ in that, the least of them."""
+    tables, model = driver.method.tables, driver.scene.model
+    if driver.method.collocates:
+        steps = int(driver.limits[1]) + 1
+        first = driver.room_ints[: 4 * steps].reshape(steps, 4)[: count + 1, FIRST]
+        least = int(np.diff(first).min())
+        rule: FloatArray = tables[LEVELS.index(least), 0, :2, :least]
+        return rule
+    method = 1 if model.size[2] != 0 else 0
+    vectors = tables[method, 2, :, : STAGES[method]]
+    weighed = vectors[2] != 0.0
+    return np.stack([vectors[0][weighed], vectors[2][weighed]])
 
 
 def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
@@ -89,7 +112,13 @@ def _rounding(driver: "GeneralDriver", j: int, span: float) -> float:
 
 
 def halves(
-    t: FloatArray, ends: FloatArray, look: Look, rule: FloatArray, tolerance: float, nothing: float = 0.0
+    t: FloatArray,
+    ends: FloatArray,
+    look: Look,
+    rule: FloatArray,
+    tolerance: float,
+    nothing: float = 0.0,
+    collocated: bool = False,
 ) -> list[float]:
     """Times that halve the intervals between `ends`, and their halves, until a rule of integration is good on each.
 
@@ -99,8 +128,11 @@ def halves(
     rule (2, s): nodes and weights of the rule on (0, 1).
     tolerance: how far the rule may differ from the Gauss-Legendre sum, relative to the whole integral.
     nothing: up to this the integral counts as zero, and no interval is halved.
+    collocated: whether the rule is one of Gauss's, which a finer sum has to judge.
     """
-    places = np.concatenate([rule[0], 0.5 * (NODES + 1.0)])
+    count = rule.shape[1]
+    nodes, weights = (FINE_NODES, FINE_WEIGHTS) if collocated else (NODES, WEIGHTS)
+    places = np.concatenate([rule[0], 0.5 * (nodes + 1.0)])
     low, width = ends[:-1], np.diff(ends)
     step = np.clip(np.searchsorted(t, low + 0.5 * width, side="right") - 1, 0, len(t) - 2)
     found: list[float] = []
@@ -111,8 +143,8 @@ def halves(
         fraction = np.clip((times - t[step][:, None]) / (t[step + 1] - t[step])[:, None], 0.0, 1.0)
         at = np.stack([np.broadcast_to(step[:, None], fraction.shape), fraction], axis=-1)
         value = look(at.reshape(-1, 2)).reshape(fraction.shape)
-        sums = width * np.einsum("ij,j->i", value[:, : rule.shape[1]], rule[1])
-        better = 0.5 * width * np.einsum("ij,j->i", value[:, rule.shape[1] :], WEIGHTS)
+        sums = width * np.einsum("ij,j->i", value[:, :count], rule[1])
+        better = 0.5 * width * np.einsum("ij,j->i", value[:, count:], weights)
         if np.isnan(whole):
             whole = float(np.abs(better).sum())
             if whole <= nothing:

@@ -133,6 +133,12 @@ def derivatives(tag):
 
 
 @kernel
+def is_continuous(tag):
+    """A partial step has all its stages."""
+    return False
+
+
+@kernel
 def weights_of(tag, model, tables, history, w, out):
     """Weights of the stages in an integral over one step, as of the velocity of one more coordinate.
 
@@ -155,5 +161,6 @@ implement(
     step_forward=step_forward,
     beside=beside,
     derivatives=derivatives,
+    is_continuous=is_continuous,
     weights_of=weights_of,
 )

@@ -17,6 +17,10 @@ from mdstopo.scene.model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
 STATE, MEMBER, OLD, NEW, GRAZES = range(5)
+#: what is kept of a stage beside: nothing, the factors of the joints' matrix, or rows of `window`
+FACTORS, WINDOWS = 1, 2
+#: rows of `window`: coefficients of the window's polynomial; x, y, u of its node (`kinematics_interface`)
+COEFFICIENT, X, Y, U = range(4)
 #: columns of `kept`
 SET_BEFORE, SET_AFTER, TIME_BY_SET = range(3)
 
@@ -37,7 +41,8 @@ SIZES = {
     "stages": "limits[2]",
     "events": "limits[3]",
     "inertial": "stages if limits[4] != 0 else 1",
-    "factored": "stages if limits[5] != 0 else 1",
+    "factored": "stages if limits[5] == 1 else 1",
+    "collocated": "stages if limits[5] == 2 else 1",
 }
 
 
@@ -77,6 +82,10 @@ class StepHistory:
     ]
     gram: Annotated[FloatArray, Field("factored, entries", "its entries, factorised")]
     diagonal: Annotated[FloatArray, Field("factored, 2, n_row", "its diagonal; one row where factors are not kept")]
+    window: Annotated[
+        FloatArray,
+        Field("collocated, 4, n", "of a node of a collocated window: a coefficient of its polynomial; x, y, u there"),
+    ]
     saltation: Annotated[
         FloatArray, Field("events, 3, n", "of an event: the slopes of its time by q and v, and the jump a- minus a+")
     ]
@@ -113,7 +122,7 @@ def carve_history(model, limits, floats, ints):
     """A `StepHistory` over flat arrays.
 
     model: the compiled scene. limits (6,): steps allowed, room for steps, stages, events, whether there are inerters,
-    whether the factors of the joints' matrix are kept. floats, ints: as long as `history_room` says.
+    what is kept of a stage beside (FACTORS, WINDOWS). floats, ints: as long as `history_room` says.
     """
 
 

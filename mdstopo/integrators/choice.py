@@ -10,10 +10,11 @@ from mdstopo.case.model import SolverSettings
 from mdstopo.integrators.scene_driver import Method
 
 
-def choose(solver: SolverSettings, beyond: str = "") -> tuple[str, str]:
+def choose(solver: SolverSettings, beyond: str = "", collocates: bool = False) -> tuple[str, str]:
     """Name of the integrator and the reason, as a sentence without a full stop.
 
-    beyond: what in the case goes beyond springs between free bodies, in words.
+    beyond: what in the case goes beyond springs between free bodies, in words. collocates: whether collocation carries
+    it, and is faster (`scene.family.collocates`).
     """
     if solver.integrator != AUTO:
         return solver.integrator, "as the case says"
@@ -21,7 +22,7 @@ def choose(solver: SolverSettings, beyond: str = "") -> tuple[str, str]:
         return FIXED, "the iterative sensitivity method is defined on its steps"
     if solver.spectral_radius is not None:
         return FIXED, "a spectral radius is given, which no other method has"
-    if beyond:
+    if beyond and not collocates:
         return ADAPTIVE, f"explicit steps of high order that carry {beyond}"
     return SMOOTH, "adaptive collocation needs the fewest passes over the members on smooth motion"
 

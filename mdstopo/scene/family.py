@@ -37,6 +37,27 @@ def beyond_springs(case: Case) -> str:
     return ""
 
 
+def beyond_collocation(case: Case) -> str:
+    """What in the case steps of collocation do not carry, in words; empty where nothing is: bodies have to be free, and
+    forces smooth."""
+    if case.joints:
+        return "joints"
+    if case.contacts:
+        return "contacts"
+    if any(load_case.motions for load_case in case.load_cases):
+        return "prescribed motions"
+    for group in case.members:
+        for law in group.laws:
+            if not law.is_smooth:
+                return f"the law {law.type}"
+    return ""
+
+
+def collocates(case: Case) -> bool:
+    """Whether a case that goes beyond springs is one for steps of collocation: free bodies in space, smooth forces."""
+    return case.dimension > 2 and not beyond_collocation(case)
+
+
 def _law(group: MemberGroup) -> str:
     if len(group.laws) > 1:
         return "a list of laws"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, VolumeRow
-from mdstopo.scene.family import beyond_springs
+from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.settings.optimizers import OPTIMIZERS
 
 #: methods that differentiate by parameters of laws
@@ -29,8 +29,13 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
     beyond = beyond_springs(case)
     solver = case.solver
     kind = INTEGRATORS.get(solver.integrator)
-    if kind is not None and not (kind.general if beyond else kind.springs):
-        what = beyond or "springs between free bodies"
+    if kind is not None and beyond and kind.free_only and case.dimension > 2:
+        refused = beyond_collocation(case)
+    else:
+        goes = kind is None or (kind.general and not kind.free_only if beyond else kind.springs)
+        refused = "" if goes else beyond or "springs between free bodies"
+    if kind is not None and refused:
+        what = refused
         yield "solver.integrator", f"{kind.name} does not compute {what}; runge_kutta does, and auto takes it"
     if kind is not None and not (kind.adaptive or kind.finds_step) and solver.step is None:
         yield "solver.integrator", f"{kind.name} needs a `step`, which is not given"

@@ -298,20 +298,6 @@ def test_a_spatial_key_in_the_plane_names_the_planar_one(old: str, new: str, mes
     assert message in [f"{each.path_key}: {each.message}" for each in mistakes(changed(SMALL, (old, new)))]
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        (
-            "joints: []",
-            "solver: {integrator: gauss}",
-            "solver.integrator: found the text 'gauss', which is not in space yet",
-        ),
-    ],
-)
-def test_what_is_not_in_space_yet_is_refused_by_name(old: str, new: str, message: str) -> None:
-    assert told((old, new)) == [message]
-
-
 # Joints.
 
 

@@ -157,11 +157,6 @@ def test_cases_of_the_project_are_lifted(name: str) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (
-            "points:\n",
-            "solver: {integrator: gauss}\npoints:\n",
-            "x.yaml:13:22: solver.integrator: gauss is not in space yet: it cannot be lifted",
-        ),
         ("position: [0, -1], angle: 0.5", "position: [0, -1]", "response.angle: it is not 0 at the start"),
     ],
 )

@@ -299,5 +299,5 @@ def test_the_general_family_computes_every_case_in_space() -> None:
     case = read_case(HULL)
     engine = Evaluator(case, beside=False)
     assert engine.beyond == "bodies in space"
-    assert engine.integrator == "runge_kutta"
+    assert engine.integrator == "gauss"
     assert isinstance(next(iter(engine.scenes.values())), GeneralScene)

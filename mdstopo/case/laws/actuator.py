@@ -44,6 +44,11 @@ class ActuatorLaw(Law):
         return [self.proportional, self.derivative, self.target, 0.0 if self.limit is None else self.limit]
 
     @property
+    def is_smooth(self) -> bool:
+        """A limit has a kink."""
+        return self.limit is None
+
+    @property
     def holds(self) -> bool:
         """A damper alone holds nothing."""
         return self.proportional != 0.0

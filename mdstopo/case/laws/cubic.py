@@ -21,3 +21,8 @@ class CubicLaw(Law):
     stiffness: float = stiffness_key("k1 at alpha = 1")
     cubic: float = stated(NUMBER, "k3 at alpha = 1; negative: it softens", unit="N/m^3", scales=True, varies=True)
     free_length: float | None = free_length_key()
+
+    @property
+    def is_smooth(self) -> bool:
+        """Of elongation, rate and time alone, without a kink."""
+        return True

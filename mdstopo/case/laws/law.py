@@ -54,6 +54,11 @@ class Law(Value):
         return any(getattr(self, name) != 0.0 for name in with_role(type(self), "of_rate"))
 
     @property
+    def is_smooth(self) -> bool:
+        """Whether its force has no kinks in elongation and rate, and needs neither accelerations nor a memory."""
+        return False
+
+    @property
     def holds(self) -> bool:
         """Whether it may hold something at rest."""
         return True

@@ -22,6 +22,11 @@ class PulseLaw(Law):
     rate: float = stated(NOT_NEGATIVE, "sigma; larger is shorter", unit="1/s^2", varies=True, is_time=True)
     time: float = stated(NUMBER, "t0, when the peak is", unit="s", varies=True, is_time=True)
 
+    @property
+    def is_smooth(self) -> bool:
+        """Of elongation, rate and time alone, without a kink."""
+        return True
+
     def strength(self, ranges: Ranges) -> float:
         """The peak."""
         return largest(ranges("peak"))

@@ -27,6 +27,11 @@ class SpringLaw(Law):
     )
 
     @property
+    def is_smooth(self) -> bool:
+        """Of elongation, rate and time alone, without a kink."""
+        return True
+
+    @property
     def holds(self) -> bool:
         """A damper alone holds nothing."""
         return self.stiffness != 0.0 or self.preload != 0.0

@@ -21,6 +21,11 @@ class TableLaw(Law):
 
     table: Table = stated(Rows(("t", "f")), "tension over time at alpha = 1", unit="s and N", scales=True)
 
+    @property
+    def is_smooth(self) -> bool:
+        """Of elongation, rate and time alone, without a kink."""
+        return True
+
     def strength(self, ranges: Ranges) -> float:
         """The largest value."""
         del ranges

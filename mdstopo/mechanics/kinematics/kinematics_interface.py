@@ -438,6 +438,112 @@ def quintic(model, c, h, q0, v0, a0, q1, v1, a1, q, v):
     raise NotImplementedError
 
 
+# Windows of collocation: x (n,) is what coordinates have changed by since the start of a window, y and u are its first
+# and second derivatives by time. All are of the bodies that are no ground; there may be more numbers behind them
+
+
+def window_state(model, q0, x, y, q, v):
+    """Coordinates and velocities inside a window.
+
+    In:
+      model: the compiled scene.
+      q0 (n_q,): coordinates at the start of the window.
+      x, y (n - D or more,): of the window.
+    Out:
+      q (n_q,), v (n,): of which those of ground stay.
+    """
+    raise NotImplementedError
+
+
+def window_accelerations(model, x, y, u, a):
+    """a (n,): accelerations inside a window at x, y, u (n - D or more,); those of ground stay."""
+    raise NotImplementedError
+
+
+def window_rates(model, x, y, a, u):
+    """u (n - D or more,): what accelerations a (n,) at x, y make of it."""
+    raise NotImplementedError
+
+
+def window_size(model):
+    """MAPS: numbers of a body in `window_maps`."""
+    raise NotImplementedError
+
+
+def window_maps(model, x, y, u, maps):
+    """How coordinates, velocities and accelerations change with x, y and u, for the functions below.
+
+    In:
+      model: the compiled scene.
+      x, y, u (n - D or more,): of the window.
+    Out:
+      maps (n_body, MAPS): of each body.
+    """
+    raise NotImplementedError
+
+
+def window_jvp(model, maps, dx, dy, dq, dv, da):
+    """Push changes of x and y forward, at fixed u.
+
+    In:
+      model: the compiled scene.
+      maps (n_body, MAPS): of `window_maps`.
+      dx, dy (n - D or more,): the changes.
+    Out:
+      dq, dv, da (n,): those of coordinates, velocities and accelerations; those of ground stay.
+    """
+    raise NotImplementedError
+
+
+def window_vjp(model, maps, bar_q, bar_v, bar_a, bar_x, bar_y):
+    """The transpose of `window_jvp`.
+
+    In:
+      model: the compiled scene.
+      maps (n_body, MAPS): of `window_maps`.
+      bar_q, bar_v, bar_a (n,): cotangents of coordinates, velocities and accelerations.
+    Out:
+      bar_x, bar_y (n - D or more,): those of x and y.
+    """
+    raise NotImplementedError
+
+
+def window_turn(model, maps, inverse, transposed, x):
+    """Multiply by what a change of coordinates is of one of x, and accelerations of u.
+
+    In:
+      model: the compiled scene.
+      maps (n_body, MAPS): of `window_maps`.
+      inverse: whether by the inverse. transposed: whether by the transpose.
+    In and out:
+      x (n - D or more,): what is multiplied.
+    """
+    raise NotImplementedError
+
+
+def window_start_jvp(model, x, dq0, dq):
+    """Add to changes dq (n,) of coordinates at x what a change dq0 (n,) of the start of the window does at fixed x."""
+    raise NotImplementedError
+
+
+def window_start_vjp(model, x, bar_q, bar_q0):
+    """The transpose of `window_start_jvp`: from cotangents bar_q (n,) at x to those of the start, added to."""
+    raise NotImplementedError
+
+
+def window_slopes(model, maps, coupled, by_x, by_y):
+    """Slopes of u by x and y from those of the accelerations by coordinates and velocities.
+
+    In:
+      model: the compiled scene.
+      maps (n_body, MAPS): of `window_maps`.
+      coupled: whether accelerations depend on velocities of other bodies than their own.
+    In and out:
+      by_x, by_y (n - D or more, n - D or more): rows of slopes by coordinates and velocities, then by x and y.
+    """
+    raise NotImplementedError
+
+
 # Prescribed motions
 
 
@@ -768,6 +874,21 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
     model: the compiled scene.
     p (1 or more,): stiffness (N/m) and what else the law has. lo, count, row: the springs. pair: theirs.
     u (S, n_pair, D): virtual changes of the poses. out (M_padded or more,): added to.
+    """
+    raise NotImplementedError
+
+
+def has_spring_energies(model):
+    """Whether there is `spring_energies`."""
+    raise NotImplementedError
+
+
+def spring_energies(model, p, lo, count, rel, pair, weight, out):
+    """What the energies of springs without damping and preload add to a derivative by alpha^mu, in vectors.
+
+    model: the compiled scene.
+    p (1 or more,), lo, count, pair: as of `spring_designs`. rel (S, n_pair, POSE): poses. weight: of all energies.
+    out (M_padded or more,): added to.
     """
     raise NotImplementedError
 

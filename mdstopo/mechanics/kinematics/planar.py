@@ -2,8 +2,8 @@
 
 Coordinates are x, y, psi of each body, by how much they have changed since home; velocities are their derivatives. So
 coordinates may be added as numbers. The parts stand beside: `planar_poses`, `planar_forces`, `planar_scales`,
-`planar_steps`, `planar_drives`, `planar_members`, `planar_inerters`, `planar_bushings`, `planar_contacts`,
-`planar_points`.
+`planar_steps`, `planar_windows`, `planar_drives`, `planar_members`, `planar_inerters`, `planar_bushings`,
+`planar_contacts`, `planar_points`.
 """
 
 from typing import cast
@@ -30,6 +30,7 @@ from mdstopo.mechanics.kinematics import (
     planar_members,
     planar_points,
     planar_steps,
+    planar_windows,
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.kinematics.planar_forces import add_loads as add_applied_loads
@@ -396,6 +397,12 @@ _KERNELS = (
     planar_steps.advance_coordinates, moved_most,
     planar_steps.stage_state, planar_steps.end_state, planar_steps.stage_vjp, planar_steps.start_vjp,
     planar_steps.stage_jvp, planar_steps.end_jvp, planar_steps.cubic, planar_steps.cubic_vjp, planar_steps.cubic_jvp,
+    planar_windows.window_state, planar_windows.window_accelerations,
+    planar_windows.window_rates, planar_windows.window_size,
+    planar_windows.window_maps, planar_windows.window_jvp,
+    planar_windows.window_vjp, planar_windows.window_turn,
+    planar_windows.window_start_jvp, planar_windows.window_start_vjp,
+    planar_windows.window_slopes,
     planar_steps.quintic, planar_drives.drive_state, planar_drives.drive_acceleration,
     turn_bodies, planar_members.turn_of, relative_pose, turned_pose, pose_acceleration, pair_displacement,
     add_pair_force, pair_tangent, pair_matrix_vjp, pair_stiffness, turning_rate, add_loads, load_tangent,
@@ -405,7 +412,8 @@ _KERNELS = (
     planar_members.second_rate, planar_members.stretch_between, planar_members.member_rows,
     planar_inerters.inerter_row, planar_inerters.add_inerter_tangents, planar_members.keep_apart,
     planar_members.ends_meet, planar_members.member_sums, planar_members.spring_sums, planar_members.member_designs,
-    planar_members.spring_designs, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
+    planar_members.spring_designs, planar_members.has_spring_energies,
+    planar_members.spring_energies, planar_members.spring_designs_of_rows, planar_members.member_designs_of_rows,
     place_joint, place_joint_alone, joint_rows, joint_gamma, joint_velocity_slope, joint_acceleration_slopes,
     joint_stiffness, joint_is_point, point_joint_vjp, transmitted, planar_bushings.add_bushings,
     planar_contacts.contact_directions, planar_contacts.contact_seen, planar_contacts.contact_second_rise,

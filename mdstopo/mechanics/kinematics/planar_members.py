@@ -242,6 +242,17 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
 
 
 @part
+def has_spring_energies(model):
+    """`member_designs` has them."""
+    return False
+
+
+@part
+def spring_energies(model, p, lo, count, rel, pair, weight, out):
+    """Never called; see `kinematics_interface.spring_energies`."""
+
+
+@part
 def spring_designs_of_rows(model, p, lo, count, rel, u, pair, room, out):
     """`spring_designs` for many rows; see `kinematics_interface.spring_designs_of_rows`."""
     width = model.member.shape[1]

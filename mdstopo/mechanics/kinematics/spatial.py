@@ -3,8 +3,8 @@
 Coordinates of a body are by how much its centre of mass has moved since home, and the unit quaternion of its turn
 since home; velocities are that of the centre of mass, in global axes, and the turning rate in the body's principal
 axes, so that inertia is a diagonal. The parts stand beside: `vectors` and `rotations`, `spatial_poses`,
-`spatial_forces`, `spatial_scales`, `spatial_steps`, `spatial_drives`, `spatial_members`, `spatial_lines`,
-`spatial_joints`, `spatial_contacts`, `spatial_points`.
+`spatial_forces`, `spatial_scales`, `spatial_steps`, `spatial_windows`, `spatial_drives`, `spatial_members`,
+`spatial_lines`, `spatial_joints`, `spatial_contacts`, `spatial_points`.
 """
 
 from typing import Any, cast
@@ -26,6 +26,7 @@ from mdstopo.mechanics.kinematics import (
     spatial_reactions,
     spatial_scales,
     spatial_steps,
+    spatial_windows,
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.kinematics.spatial_poses import ATTITUDE, COORDINATES, FREEDOMS, POSE, ROTATIONS, fill_attitude
@@ -100,6 +101,12 @@ _KERNELS = (
     spatial_steps.stage_state, spatial_steps.end_state, spatial_steps.stage_vjp, spatial_steps.start_vjp,
     spatial_steps.stage_jvp, spatial_steps.end_jvp, spatial_steps.cubic, spatial_steps.cubic_vjp,
     spatial_steps.cubic_jvp, spatial_steps.quintic,
+    spatial_windows.window_state, spatial_windows.window_accelerations,
+    spatial_windows.window_rates, spatial_windows.window_size,
+    spatial_windows.window_maps, spatial_windows.window_jvp,
+    spatial_windows.window_vjp, spatial_windows.window_turn,
+    spatial_windows.window_start_jvp, spatial_windows.window_start_vjp,
+    spatial_windows.window_slopes,
     spatial_drives.drive_state, spatial_drives.drive_acceleration,
     spatial_poses.turn_bodies, spatial_members.turn_of, relative_pose, spatial_poses.turned_pose,
     spatial_poses.pose_acceleration, spatial_poses.pair_displacement, spatial_poses.add_pair_force,
@@ -112,7 +119,8 @@ _KERNELS = (
     spatial_members.member_work, spatial_members.second_rate, spatial_members.stretch_between,
     spatial_members.member_rows, spatial_members.inerter_row, spatial_members.add_inerter_tangents,
     spatial_members.keep_apart, spatial_members.ends_meet, spatial_members.member_sums, spatial_members.spring_sums,
-    spatial_members.member_designs, spatial_members.spring_designs, spatial_members.spring_designs_of_rows,
+    spatial_members.member_designs, spatial_members.spring_designs, spatial_members.has_spring_energies,
+    spatial_members.spring_energies, spatial_members.spring_designs_of_rows,
     spatial_members.member_designs_of_rows,
     spatial_joints.place_joint, spatial_joints.place_joint_alone, spatial_joints.joint_rows,
     spatial_joints.joint_gamma, spatial_joints.joint_velocity_slope, spatial_joints.joint_acceleration_slopes,

@@ -24,6 +24,8 @@ from mdstopo.mechanics.kinematics.vectors import (
     cross,
     minus,
     plus,
+    put,
+    times,
     turned,
     turned_back,
     unit,
@@ -142,48 +144,91 @@ def pair_tangent(model, p, rel, sums, damped, k_out, c_out):
     """
     r = rel[p]
     o = sums[p]
-    t = np.empty((FREEDOMS, 2 * FREEDOMS))
-    _slopes_of_pose(r, t)
-    inner = np.zeros((FREEDOMS, 2 * FREEDOMS))
-    for i in range(FREEDOMS):
-        for m in range(FREEDOMS):
-            value = o[K + FREEDOMS * i + m]
-            if value != 0.0:
-                for j in range(2 * FREEDOMS):
-                    inner[i, j] += value * t[m, j]
     if damped:
-        n = np.empty((FREEDOMS, 2 * FREEDOMS))
-        _slopes_of_rates(r, t, n)
-        by_rate = np.zeros((FREEDOMS, 2 * FREEDOMS))
+        _damped_tangent(r, o, k_out[p], c_out[p])
+    else:
+        inner = np.empty((FREEDOMS, 2 * FREEDOMS))
         for i in range(FREEDOMS):
-            for m in range(FREEDOMS):
-                low = min(i, m)
-                high = max(i, m)
-                value = o[C + high * (high + 1) // 2 + low]
-                if value != 0.0:
-                    for j in range(2 * FREEDOMS):
-                        inner[i, j] += value * n[m, j]
-                        by_rate[i, j] += value * t[m, j]
-        _pull_back(t, by_rate, c_out[p])
-    k = k_out[p]
-    _pull_back(t, inner, k)
-    # the change of the force's direction and arm at fixed Q: - d(T^T Q)/dq
+            _times_slopes(r, vector_at(o, K + FREEDOMS * i), vector_at(o, K + FREEDOMS * i + 3), inner[i])
+        _pull_pose_back(r, inner, k_out[p])
+    _add_turning_of_force(r, o, k_out[p])
+
+
+@part
+def _times_slopes(r, push, moment, out):
+    """out (2 D,) = (push, moment) T, of the pose r (POSE,): one row, by 3 x 3 blocks."""
+    move = turned(r, TURN_A, push)
+    put(out, 0, times(-1.0, move))
+    put(out, 3, minus(cross(push, vector_at(r, D)), moment))
+    put(out, 6, move)
+    put(out, 9, turned_back(r, S, moment))
+
+
+@part
+def _pull_pose_back(r, inner, out):
+    """out (2 D, 2 D) = T^T inner (D, 2 D), of the pose r (POSE,), by 3 x 3 blocks."""
+    for j in range(2 * FREEDOMS):
+        push = (inner[0, j], inner[1, j], inner[2, j])
+        moment = (inner[3, j], inner[4, j], inner[5, j])
+        move = turned(r, TURN_A, push)
+        first = minus(cross(push, vector_at(r, D)), moment)
+        second = turned_back(r, S, moment)
+        for i in range(3):
+            out[i, j] = -move[i]
+            out[3 + i, j] = first[i]
+            out[6 + i, j] = move[i]
+            out[9 + i, j] = second[i]
+
+
+@part
+def _add_turning_of_force(r, o, k):
+    """k (2 D, 2 D) += the change of the force's direction and arm at fixed Q, - d(T^T Q)/dq.
+
+    r (POSE,): the pose. o (SUMS,): sums over the members of the pair.
+    """
     push = vector_at(o, 0)
     moment = vector_at(o, 3)
-    for c in range(2 * FREEDOMS):
-        dd = (t[0, c], t[1, c], t[2, c])
-        dphi = (t[3, c], t[4, c], t[5, c])
-        first = cross(push, dd)
-        second = turned_back(r, S, cross(moment, dphi))
-        force = (0.0, 0.0, 0.0)
-        if c >= 3 and c < 6:
-            e = unit(c - 3)
-            force = turned(r, TURN_A, cross(e, push))
+    arm = vector_at(r, D)
+    for c in range(3):
+        e = unit(c)
+        towards = (r[TURN_A + 3 * c], r[TURN_A + 3 * c + 1], r[TURN_A + 3 * c + 2])
+        along = cross(push, towards)
+        turning = cross(push, cross(arm, e))
+        force = turned(r, TURN_A, cross(e, push))
+        opposite = turned_back(r, S, cross(moment, e))
+        column = (r[S + c], r[S + 3 + c], r[S + 6 + c])
+        own = turned_back(r, S, cross(moment, column))
         for i in range(3):
-            k[i, c] += force[i]
-            k[3 + i, c] -= first[i]
-            k[6 + i, c] -= force[i]
-            k[9 + i, c] -= second[i]
+            k[3 + i, c] += along[i]
+            k[3 + i, 6 + c] -= along[i]
+            k[3 + i, 3 + c] -= turning[i]
+            k[i, 3 + c] += force[i]
+            k[6 + i, 3 + c] -= force[i]
+            k[9 + i, 3 + c] += opposite[i]
+            k[9 + i, 9 + c] -= own[i]
+
+
+@part
+def _damped_tangent(r, o, k, c):
+    """k, c (2 D, 2 D) = T^T (K_xi T + C_xi N), T^T C_xi T of the pose r (POSE,) and sums o (SUMS,)."""
+    t = np.empty((FREEDOMS, 2 * FREEDOMS))
+    n = np.empty((FREEDOMS, 2 * FREEDOMS))
+    inner = np.zeros((FREEDOMS, 2 * FREEDOMS))
+    by_rate = np.zeros((FREEDOMS, 2 * FREEDOMS))
+    _slopes_of_pose(r, t)
+    _slopes_of_rates(r, t, n)
+    for i in range(FREEDOMS):
+        _times_slopes(r, vector_at(o, K + FREEDOMS * i), vector_at(o, K + FREEDOMS * i + 3), inner[i])
+        for m in range(FREEDOMS):
+            low = min(i, m)
+            high = max(i, m)
+            value = o[C + high * (high + 1) // 2 + low]
+            if value != 0.0:
+                for j in range(2 * FREEDOMS):
+                    inner[i, j] += value * n[m, j]
+                    by_rate[i, j] += value * t[m, j]
+    _pull_pose_back(r, by_rate, c)
+    _pull_pose_back(r, inner, k)
 
 
 @part
@@ -217,19 +262,6 @@ def _slopes_of_rates(r, t, n):
         for i in range(3):
             n[i, c] = move[i]
             n[3 + i, c] = turn[i]
-
-
-@part
-def _pull_back(t, inner, out):
-    """out (2 D, 2 D) = T^T inner, both (D, 2 D)."""
-    for i in range(2 * FREEDOMS):
-        for j in range(2 * FREEDOMS):
-            out[i, j] = 0.0
-        for m in range(FREEDOMS):
-            value = t[m, i]
-            if value != 0.0:
-                for j in range(2 * FREEDOMS):
-                    out[i, j] += value * inner[m, j]
 
 
 @part

@@ -54,6 +54,7 @@ from mdstopo.mechanics.kinematics.spatial_springs import (
     alike_sums,
     alike_tangent,
     elastic_designs,
+    elastic_energies,
     far,
 )
 from mdstopo.mechanics.kinematics.vectors import (
@@ -250,6 +251,19 @@ def spring_designs(model, p, lo, count, row, rel, u, pair, out):
         grid_designs(rows, width, lo, count, row, p[0], rel, u, pair, out)
     else:
         elastic_designs(rows, width, lo, lo + whole_vectors(count), p[0], rel, u, pair, out)
+
+
+@part
+def has_spring_energies(model):
+    """See `kinematics_interface.has_spring_energies`."""
+    return True
+
+
+@part
+def spring_energies(model, p, lo, count, rel, pair, weight, out):
+    """Energies in vectors; see `kinematics_interface.spring_energies`."""
+    rows = model.member.reshape(model.member.size)
+    elastic_energies(rows, model.member.shape[1], lo, lo + whole_vectors(count), weight * p[0], rel, pair, out)
 
 
 @part

@@ -296,6 +296,30 @@ def elastic_designs(member, width, start, stop, k, rel, u, pair, out):
 
 
 @kernel
+def elastic_energies(member, width, start, stop, k, rel, pair, out):
+    """Add the sum of k Delta^2 / 2 over S poses of each spring, at alpha^mu = 1.
+
+    In:
+      member, width, start, stop: as above; padding becomes something that nobody reads.
+      k: stiffness (N/m), times a weight.
+      rel (S, n_pair, POSE): relative poses.
+      pair: number of the pair.
+    Out:
+      out (M or more,): added to.
+    """
+    for i in range(start, stop, lanes()):
+        p = _rows(member, width, P, i)
+        q = _rows(member, width, Q, i)
+        free = load(member, L0 * width + i)
+        excess = load(member, EXCESS * width + i)
+        energy = zero()
+        for j in range(rel.shape[0]):
+            _, _, square, _, stretch = _seen(p, q, free, excess, rel[j, pair])
+            energy = energy + where_larger(square, ZERO_LENGTH_SQUARED, stretch * stretch)
+        store(out, i, load(out, i) + 0.5 * k * energy)
+
+
+@kernel
 def far(member, width, start, stop, before, after):
     """Whether no member's ends can meet on a straight way between two relative poses: all are longer than they move.
 
