@@ -29,6 +29,9 @@ SECTIONS = {
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",
     "ring": "a closed loop of bodies beside other programs, forward runs too",
     "forward": "forward runs of the paper's bodies beside other programs",
+    "peers_space": "two bodies in space with 1,020 springs beside other programs",
+    "ring_space": "a closed loop of bodies in space beside other programs, forward runs too",
+    "forward_space": "forward runs of two bodies in space beside other programs",
     "million": "a million members beside JAX",
     "parts": "what parts of our own save: single precision, sines and powers, counting (compiles for minutes)",
     "golden": "what differs to the bit from values, gradients and iterates kept before (--check FILE, --write FILE)",
@@ -38,7 +41,7 @@ SECTIONS = {
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
-PEERS = ("peers", "ring", "forward", "million")
+PEERS = ("peers", "ring", "forward", "peers_space", "ring_space", "forward_space", "million")
 
 #: what looks for mistakes instead of measuring
 CAMPAIGNS = ("damage", "hunt", "hunt_space")

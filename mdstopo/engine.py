@@ -169,10 +169,11 @@ class Evaluator:
         return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
-        """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors."""
+        """What `evaluate` found at alpha (N,) with that sensitivity, and estimates of its errors, or why not."""
         if (sensitivity or self.sensitivity) == "iterative" and self._gives_way:
             return self.otherwise(sensitivity="iterative").with_errors(alpha, found, sensitivity)
-        return found._replace(errors=self._estimator.errors(self.design(alpha), found, sensitivity))
+        errors = self._estimator.errors(self.design(alpha), found, sensitivity)
+        return found._replace(errors=errors, message=found.message or self._estimator.why)
 
     @cached_property
     def _estimator(self) -> "Estimator":
@@ -304,6 +305,8 @@ class Evaluator:
     def _verdict(self, name: str, design: FloatArray, result: ResponseResult) -> tuple[Status, str]:
         """Why the motion of a load case cannot be trusted, and which member or joint is the cause."""
         driver = self.driver(name)
+        if result.message:
+            return result.status, result.message
         if result.status.ok and result.meeting >= 0:
             return Status.ZERO_LENGTH, driver.member(result.meeting)
         if result.status.ok:

@@ -44,6 +44,8 @@ class Estimator:
 
     def __init__(self, evaluator: "Evaluator") -> None:
         self._evaluator = evaluator
+        #: why there was no estimate the last time
+        self.why = ""
 
     def errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None) -> dict[str, ErrorEstimate]:
         """Of an evaluation of alpha (N,), by objective; empty where it failed, or the finer one."""
@@ -54,7 +56,8 @@ class Estimator:
             finer = self._halved.evaluate(alpha, bool(found.gradients), sensitivity)
         else:
             finer = self._finer(alpha, found, sensitivity)
-        if not finer.status.usable:
+        self.why = "" if finer.status.usable else f"{finer.status.value} ({finer.message})"
+        if self.why:
             return {}
         factor = 1.0 if kind.adaptive else 2.0**kind.order / (2.0**kind.order - 1.0)
         rounded = self._rounded(alpha, found, sensitivity)

@@ -22,6 +22,7 @@ class Status(enum.Enum):
     STEP_TOO_LARGE = "the fixed step is far too large for the motion"
     SINGULAR = "the joints have become singular: they contradict or repeat each other in this configuration"
     HALF_TURN = "a bushing has turned by half a turn, beyond which its couple has no direction"
+    ROTATION_JUMP = "a rotation that is looked at over time has reached half a turn, where its vector jumps"
     CHATTERING = "a member switches again and again within next to no time"
     NO_EQUILIBRIUM = "there is no static equilibrium near the stated configuration"
     NO_GRADIENT = "the objective has a value but no gradient here"

@@ -22,7 +22,7 @@ def make(problem: Problem, tolerance: float = 1e-8, method: str = "cvodes", comp
     # time runs to 1, and the end is a parameter, so that a run to another time needs no other integrator
     end, alpha = ca.SX.sym("end"), model.alpha
     start = np.concatenate([problem.start.ravel(), np.zeros(3 * problem.bodies)])
-    options = _options(tolerance, method, compiled)
+    options = options_of(tolerance, method, compiled)
     if method == "cvodes":
         equations = {"x": model.y, "p": ca.vertcat(alpha, end), "ode": end * model.rate}
     else:
@@ -51,7 +51,8 @@ def make(problem: Problem, tolerance: float = 1e-8, method: str = "cvodes", comp
     return objective
 
 
-def _options(tolerance: float, method: str, compiled: bool) -> dict[str, Any]:
+def options_of(tolerance: float, method: str, compiled: bool) -> dict[str, Any]:
+    """Options of CasADi's integrators."""
     options: dict[str, Any] = {
         "reltol": tolerance,
         "abstol": 1e-2 * tolerance,

@@ -44,7 +44,7 @@ def make(problem: Problem, steps: int = 100, solver: str = "GeneralizedAlpha") -
     for (one, two), ends in zip(problem.hinges.tolist(), problem.at, strict=True):
         system.AddObject(items.ObjectJointRevolute2D(markerNumbers=[point(one, ends[0]), point(two, ends[1])]))
     system.Assemble()
-    settings, kind = _settings(problem, steps), getattr(exudyn.DynamicSolverType, solver)
+    settings, kind = settings_of(problem, steps), getattr(exudyn.DynamicSolverType, solver)
     rest = np.zeros(3 * problem.bodies)
     last: Floats | None = None
 
@@ -76,7 +76,8 @@ def _body(system: Any, problem: Problem, k: int) -> Any:
     return body
 
 
-def _settings(problem: Problem, steps: int) -> Any:
+def settings_of(problem: Problem, steps: int) -> Any:
+    """Of a run in so many steps, without files."""
     settings = exudyn.SimulationSettings()
     time = settings.timeIntegration
     time.endTime, time.numberOfSteps, time.verboseMode = problem.end, steps, 0

@@ -71,6 +71,25 @@ def make(problem: Problem, steps: int = 4, refine: bool = True, rolled: bool = F
     return made
 
 
+def steps_of(problem: Problem, rate: Any, energy: Any, start: Array, steps: int, rolled: bool) -> Any:
+    """The energy at the last step, or the highest of them, as a function of the springs."""
+    h = problem.end / steps
+    advance = jax.checkpoint(_stepper(rate, rolled))
+
+    def function(springs: Any) -> Array:
+        def one(y: Array, _: None) -> tuple[Array, Array]:
+            following = advance(y, h, springs)
+            return following, following
+
+        last, found = jax.lax.scan(one, start, None, length=steps)
+        if not problem.peak:
+            return energy(last, springs)
+        heights = jax.lax.map(lambda y: energy(y, springs), jax.lax.stop_gradient(found))
+        return energy(found[jnp.argmax(heights)], springs)
+
+    return function
+
+
 def _stepper(rate: Any, rolled: bool) -> Any:
     a, b = order_eight()
     if rolled:

@@ -9,11 +9,16 @@ from benchmarks.peers.table import Objective
 
 def make(problem: Problem, tolerance: float = 1e-8, integrator: str = "auto", step: float | None = None) -> Objective:
     """As the table says; with a step, s, no tolerance counts. Raises RuntimeError where an evaluation fails."""
+    return objective_of(case_of(problem), tolerance, integrator, step)
+
+
+def objective_of(content: dict[str, Any], tolerance: float, integrator: str, step: float | None) -> Objective:
+    """The objective G of a case's content."""
     from mdstopo.case.reader import read_case
     from mdstopo.evaluators import evaluator_of
 
     accuracy = {"tolerance": tolerance} if step is None else {"step": step}
-    case = read_case(json.dumps(case_of(problem) | {"solver": {"integrator": integrator} | accuracy}))
+    case = read_case(json.dumps(content | {"solver": {"integrator": integrator} | accuracy}))
     evaluator = evaluator_of(case)
 
     def objective(alpha: Floats, gradient: bool) -> tuple[float, Floats | None]:

@@ -75,6 +75,10 @@ class Problem:
         """Read what `save` wrote."""
         with np.load(path) as stored:
             values: dict[str, Any] = {name: stored[name] for name in stored.files}
+        if "turn" in values:
+            from benchmarks.peers.space_problem import SpatialProblem
+
+            cls = SpatialProblem
         return cls(**values | {"end": float(values["end"]), "peak": bool(values["peak"])})
 
 

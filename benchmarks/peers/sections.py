@@ -8,8 +8,9 @@ import numpy as np
 from benchmarks.peers import scenes, settings
 from benchmarks.peers.problem import Floats
 from benchmarks.peers.race import Entry, Field, Measured, race
+from benchmarks.peers.table import PEERS_IN_SPACE
 from benchmarks.peers.tables import LEVELS, against_each, every_setting, standings
-from benchmarks.peers.translate import problem_of
+from benchmarks.peers.translate import problem_of, spatial_problem_of
 from benchmarks.scenes import DESIGNS, SCENES, design, scene
 from mdstopo.bench.reference import Reference, solution
 from mdstopo.bench.scenes import plate
@@ -17,9 +18,10 @@ from mdstopo.bench.tables import Table
 from mdstopo.bench.work_precision import TIGHTEST, with_solver
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.scene.bodies import is_spatial
 
 #: shares of the peers' times that are allowed
-BAR, BAR_LOOP, BAR_FORWARD, BAR_MILLION = 0.1, 0.1, 0.02, 0.05
+BAR, BAR_LOOSE, BAR_LOOP, BAR_FORWARD, BAR_MILLION = 0.1, 0.15, 0.1, 0.02, 0.05
 MILLION = 1_000_000
 
 #: a named scene and design, with what was measured there
@@ -97,6 +99,36 @@ def million() -> Iterator[Table]:
     yield standings(f"{title}, beside the fastest peer", [("plate, uniform", found)], LEVELS[:2], BAR_MILLION)
 
 
+def peers_space() -> Iterator[Table]:
+    """Two bodies in space with 1,020 springs, beside JAX and CasADi."""
+    course = field_of(read_case(scenes.spatial_pair()), "runge_kutta")
+    found = race(course, list(settings.two_bodies_in_space()), _tell, peers=PEERS_IN_SPACE)
+    groups = [(f"space, {own}", each) for own, each in zip(DESIGNS, found, strict=True)]
+    title = "Work and precision in space beside other programs: two bodies, 1,020 springs"
+    for name, own in groups:
+        yield every_setting(f"{title}, {name}", own)
+    yield standings("Two bodies in space beside the fastest peer", groups, LEVELS[:1], BAR_LOOSE)
+    yield standings("Two bodies in space beside the fastest peer", groups, LEVELS[1:], BAR)
+
+
+def ring_space() -> Iterator[Table]:
+    """A closed loop of ten bodies in space: with gradients beside CasADi and JAX, forward beside Exudyn and MuJoCo."""
+    course = field_of(read_case(scenes.spatial_ring()), "runge_kutta")
+    title = "A spatial ring of ten links, 1,000 members"
+    found = race(course, list(settings.ring_in_space()), _tell, peers=PEERS_IN_SPACE)
+    yield from _at_equal_error(f"{title}, objective and gradient", found, BAR_LOOP)
+    found = race(course, list(settings.forward_in_space(joints=True)), _tell, seconds=0.02, peers=PEERS_IN_SPACE)
+    yield from _at_equal_error(f"{title}, forward runs", found, BAR_FORWARD)
+
+
+def forward_space() -> Iterator[Table]:
+    """Forward runs of two bodies in space beside Exudyn and MuJoCo."""
+    course = field_of(read_case(scenes.spatial_pair(over_time="final")), "runge_kutta")
+    entries = list(settings.forward_in_space(joints=False))
+    found = race(course, entries, _tell, seconds=0.02, peers=PEERS_IN_SPACE)
+    yield from _at_equal_error("Two bodies in space, 1020 members, forward runs", found, BAR_FORWARD)
+
+
 def field_of(case: Case, integrator: str, designs: Sequence[str] = DESIGNS, one_core: bool = True) -> Field:
     """What all run on; the truth is our result by an integrator at its tightest tolerance.
 
@@ -104,4 +136,5 @@ def field_of(case: Case, integrator: str, designs: Sequence[str] = DESIGNS, one_
     """
     tight = with_solver(case, integrator, TIGHTEST)
     alphas: list[Floats] = [design(name, case.n_design) for name in designs]
-    return Field(problem_of(case), alphas, [Reference(*solution(tight, each)) for each in alphas], one_core)
+    problem = spatial_problem_of(case) if is_spatial(case) else problem_of(case)
+    return Field(problem, alphas, [Reference(*solution(tight, each)) for each in alphas], one_core)

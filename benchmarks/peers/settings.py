@@ -62,6 +62,38 @@ def forward(hinges: bool) -> Iterator[Entry]:
     yield Entry("mujoco", {"step": 2e-3, "integrator": "implicitfast"}, gradient=False)
 
 
+def two_bodies_in_space() -> Iterator[Entry]:
+    """Two bodies in space, whose peak is at the end; `auto` takes the best integrator that there is."""
+    yield from ours(("auto", "runge_kutta"), TOLERANCES[3:])
+    for steps in (2, 3, 4, 6, 8, 10, 12, 16):
+        yield Entry("jax", {"steps": steps})
+    for tolerance in (1e-6, 1e-8, 1e-10):
+        yield Entry("casadi", {"tolerance": tolerance})
+
+
+def ring_in_space() -> Iterator[Entry]:
+    """The closed loop in space, with gradients."""
+    yield from ours(("runge_kutta",), (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11))
+    for tolerance in (1e-6, 1e-8):
+        yield Entry("casadi", {"tolerance": tolerance})
+        yield Entry("casadi", {"tolerance": tolerance, "compiled": True})
+    for steps in (6, 8, 12, 16):
+        yield Entry("jax", {"steps": steps, "rolled": True})
+
+
+def forward_in_space(joints: bool) -> Iterator[Entry]:
+    """Without gradients."""
+    for tolerance in (5e-1, 3e-1, 1e-1, 3e-2, 1e-2, *TOLERANCES[:7]):
+        yield Entry(OURS, {"integrator": "runge_kutta", "tolerance": tolerance}, gradient=False)
+    for steps in (20, 100, 400):
+        yield Entry("exudyn", {"steps": steps}, gradient=False)
+    for steps in () if joints else (5, 10, 20):
+        yield Entry("exudyn", {"steps": steps, "solver": "RK44"}, gradient=False)
+    for step in (1e-2, 2e-3, 5e-4):
+        yield Entry("mujoco", {"step": step}, gradient=False)
+    yield Entry("mujoco", {"step": 2e-3, "integrator": "implicitfast"}, gradient=False)
+
+
 def million() -> Iterator[Entry]:
     """Members by the million, on all cores."""
     yield from ours(("gauss",), (1e-3, 1e-4, 1e-5, 1e-6, 1e-7))

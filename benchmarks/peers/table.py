@@ -38,3 +38,12 @@ PEERS = {
     "exudyn": Peer("benchmarks.peers.exudyn_forward", ("exudyn",), gradient=False),
     "mujoco": Peer("benchmarks.peers.mujoco_forward", ("mujoco",), gradient=False),
 }
+
+#: the same for scenes in space
+PEERS_IN_SPACE = {
+    OURS: Peer("benchmarks.peers.ours_space", ("numba",)),
+    "jax": Peer("benchmarks.peers.jax_space", ("jax", "scipy")),
+    "casadi": Peer("benchmarks.peers.casadi_space", ("casadi",)),
+    "exudyn": Peer("benchmarks.peers.exudyn_space", ("exudyn",), gradient=False),
+    "mujoco": Peer("benchmarks.peers.mujoco_space", ("mujoco",), gradient=False),
+}

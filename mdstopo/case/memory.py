@@ -28,6 +28,11 @@ def total_memory() -> int:
     return total
 
 
+def most_floats() -> int:
+    """How many numbers the steps of one simulation may be."""
+    return total_memory() // (8 * SHARE_OF_STEPS)
+
+
 def holds_steps(floats: int) -> bool:
     """Whether there is room for the steps of a simulation that are so many numbers."""
-    return 8 * floats <= total_memory() // SHARE_OF_STEPS
+    return floats <= most_floats()

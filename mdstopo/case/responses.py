@@ -35,7 +35,7 @@ class ResponseKind(Value):
     order: how many derivatives by time it has of a position; is_position: whether it is a place or an angle of a body.
     of_point: whether it is the motion of a point, seen from a body, as a component or a norm.
     depends_on_rate: whether it needs velocities or accelerations; is_energy: whether it is the stored energy.
-    of_members: whether it is the largest one of the members of a group.
+    of_members: whether it is the largest one of the members of a group. jumps: whether it jumps at half a turn.
     """
 
     word: str
@@ -50,6 +50,7 @@ class ResponseKind(Value):
     depends_on_rate: bool = True
     is_energy: bool = False
     of_members: bool = False
+    jumps: bool = False
 
 
 RELATIVE = Key("relative_to", BODY, "the body that the observer rides on", default="ground")

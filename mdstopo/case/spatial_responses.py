@@ -32,8 +32,9 @@ _AT_POINT = Record(
 _OF_TURN = Record(
     "the rotation of a body",
     (OF_BODY, RELATIVE, _COMPONENT),
-    doc="The rotation vector since the start in the axes of `relative_to`, its norm the angle from 0 to pi; the "
-    "angular velocity of the body less that of `relative_to` in these axes, or the time derivatives of its components.",
+    doc="The rotation vector since the start in the axes of `relative_to`, its norm the angle from 0 to pi (at half a "
+    "turn it jumps: then it has a value at the end alone); the angular velocity of the body less that of `relative_to` "
+    "in these axes, or the time derivatives of its components.",
 )
 _OF_TILT = Record(
     "the tilt of a body",
@@ -97,7 +98,7 @@ def _point(word: str) -> ResponseKind:
 def _turn(word: str, unit: str, order: int) -> ResponseKind:
     return ResponseKind(
         word=word, doc="of a body", unit=unit, kernels="mdstopo.general.responses:OF_TURN", keys=_OF_TURN,
-        made=_of_turn, order=order, is_position=order == 0, depends_on_rate=order > 0,
+        made=_of_turn, order=order, is_position=order == 0, depends_on_rate=order > 0, jumps=order == 0,
     )  # fmt: skip
 
 

@@ -169,6 +169,7 @@ def _all_methods(
     from mdstopo.cli.gradient_numbers import disagreement, relative, timed, whole_gradient
 
     results: dict[str, dict[str, Any]] = {}
+    failures: list[str] = []
     for method in methods:
         evaluation = engine.evaluate(alpha, sensitivity=method)
         if not evaluation.status.usable:
@@ -186,11 +187,13 @@ def _all_methods(
             "disagreement": {name: disagreement(whole[name], reference[name]) for name in gradients},
         }
         if estimating:
-            errors = engine.with_errors(alpha, evaluation, method).errors
-            if not errors:
-                return results, f"{method}: no error estimate, because the finer motion failed"
-            results[method]["errors"] = {name: relative(errors[name], evaluation, name) for name in errors}
-    return results, ""
+            judged = engine.with_errors(alpha, evaluation, method)
+            if not judged.errors:
+                failures.append(f"{method}: no error estimate, because the finer motion failed: {judged.message}")
+            else:
+                errors = judged.errors
+                results[method]["errors"] = {name: relative(errors[name], evaluation, name) for name in errors}
+    return results, "; ".join(failures)
 
 
 def _in_words(evaluation: "Evaluation") -> str:

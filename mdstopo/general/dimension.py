@@ -41,9 +41,9 @@ class Dimension:
     stated (home): (n,) where each freedom is at home, from which stated positions are measured; 0 of turns.
     places (home, body, points): global places (K, d) at home of points (K, d) of a body, in the axes of arrays.
     loads (load_case, index, times, frames): as arrays. bushings (case, index, pairs, home): as arrays.
-    half_turn (pairs, home, q): the first of the states q (T, n_q) at which a bushing, of those between bodies
-    (n_bushing, 2), has turned by half a turn and may not, and the bushing; None where none has. contacts (case, index,
-    pairs, frames): as arrays, and in words. reaches (contact): (n_contact,) how far the point of each contact is from
+    half_turn (pairs, home, q): the first of the states q (T, n_q) at which one of the pairs (K, 2) of bodies has turned
+    by half a turn, where that may not be, and which; None where none has. contacts (case, index, pairs, frames): as
+    arrays, and in words. reaches (contact): (n_contact,) how far the point of each contact is from
     its body's centre.
     joint_code, joint_kernels (class): of a joint. has_norm (class): whether its force has several components, and is
     not a number along a line. joint_row (joint, home, first, second, frames): its parameters.

@@ -1,6 +1,7 @@
 """From Python to the compiled entries of a general scene: buffers, room, results, and words for what went wrong."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -9,8 +10,9 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import IntegratorKind
-from mdstopo.case.memory import holds_steps
-from mdstopo.case.model import Case
+from mdstopo.case.memory import most_floats
+from mdstopo.case.model import GROUND, Case
+from mdstopo.case.responses import kind_of
 from mdstopo.evaluation import USUAL, Rows, Shape
 from mdstopo.general.competing_members import compete, members_peaks
 from mdstopo.general.compile import GeneralScene, compile_general
@@ -61,6 +63,8 @@ if TYPE_CHECKING:
 ROWS = 6
 #: reductions that take the peaks of g, and whether those of -g too; minima are found in `minima`
 PEAKS = {"max": False, "max_abs": True}
+#: growth of the room for steps below which a run ends instead
+WORTH = 1.05
 #: for peaks of whole steps
 NO_PIECES = np.empty((0, 4))
 
@@ -153,6 +157,21 @@ class GeneralDriver:
         self.room_ints = np.zeros(ints, dtype=np.int64)
         self.ready = Ready()  # prepared calls hold the arrays of before
 
+    def _grow(self) -> bool:
+        """Make twice the room, or as much as memory has; False where that is hardly more."""
+        factor = min(2.0, most_floats() / len(self.room))
+        if factor < WORTH:
+            return False
+        self._make_room(*(int(factor * int(size)) for size in self.limits[1:4]))
+        return True
+
+    def _full(self, count: int, time: float) -> str:
+        """That memory has no room for more steps, and what helps."""
+        return (
+            f"at t = {time:.6g} s; {count} steps fill the {8e-9 * most_floats():.2g} GB that one run may take of this "
+            "machine's memory: a looser tolerance, a shorter time.end, or a machine with more memory"
+        )
+
     def _make_rows(self, most: int) -> None:
         """Arrays for at most so many peaks of each response; that of `Peak.across` comes when it is first asked for."""
         count, length = len(self.scene.responses), len(self._integral_gradient)
@@ -210,13 +229,45 @@ class GeneralDriver:
                 break
             self.quadrature_breakpoints = self.quadrature_breakpoints + more
             code, count, time = self.run(alpha, gradient, self.quadrature_breakpoints)
-        if code == OK:
+        status, message = status_of(code), self._rotation_jump(count) if code == OK else ""
+        if message:
+            status = Status.ROTATION_JUMP
+        elif code == OK:
             for j, name in enumerate(self.scene.reductions):
                 self._look(j, name, count, gradient, window)
             if gradient:
                 self._row_gradients(count, across)
         grazing, meeting = self._grazing(), int(self.where[1])
-        return ResponseResult(status_of(code), time, self.rows, self.found, self.gradients, meeting, grazing, across)
+        return ResponseResult(
+            status, time, self.rows, self.found, self.gradients, meeting, grazing, across, message=message
+        )
+
+    @cached_property
+    def _rotations(self) -> dict[tuple[str, str], IndexArray]:
+        """Numbers of observer and body, by their names, of rotations that are looked at before the end."""
+        bodies, found = self.scene.bodies, {}
+        for response, reduction in zip(self.scene.responses, self.scene.reductions, strict=True):
+            if kind_of(response).jumps and reduction != "final":
+                pair = response.relative_to or GROUND, response.body or GROUND
+                found[pair] = np.array([bodies.index(name) for name in pair])
+        return found
+
+    def _rotation_jump(self, count: int) -> str:
+        """Which of these has turned by half a turn, where its vector jumps, in a run of so many steps, and when."""
+        if not self._rotations:
+            return ""
+        t, q, _ = self.states()
+        pairs = np.array(list(self._rotations.values()))
+        found = dimension_of(self.case).half_turn(pairs, self.scene.model.home, q[: count + 1])
+        if found is None:
+            return ""
+        state, number = found
+        observer, body = list(self._rotations)[number]
+        seen = "" if observer == GROUND else f", seen from {observer}"
+        return (
+            f"rotation of {body}{seen}, at t = {t[state]:.6g} s; its value at the end (`over_time: final`), "
+            "angular_velocity and tilt go on"
+        )
 
     def _across(self) -> FloatArray:
         """(n_resp, R, N): of `evaluation.Peak.across`, zeros."""
@@ -414,10 +465,9 @@ class GeneralDriver:
                 code, count, time = self._up_to_half_a_turn(code, count, time)
                 self._message = self._explain(code, time)
                 return code, count, time
-            if not holds_steps(2 * len(self.room)):
-                self._message = self._explain(STEP_LIMIT, time)
+            if not self._grow():
+                self._message = self._full(count, time)
                 return STEP_LIMIT, count, time
-            self._make_room(*(2 * int(size) for size in self.limits[1:4]))
 
     def _up_to_half_a_turn(self, code: int, count: int, time: float) -> tuple[int, int, float]:
         """How a run ended, or that a bushing turned too far before: code, number of steps, time reached."""

@@ -59,7 +59,8 @@ class ResponseResult(NamedTuple):
     rows (n_obj, R, 4 or more): time, value, step, fraction, and what else the family keeps of a row; found (n_obj,):
     how many rows hold; gradients (n_obj, R, N); meeting: padded index of a member whose ends meet, or -1. grazing: of
     one that leaves no derivative, or -1. across: as gradients, of `evaluation.Peak.across`, where it was asked for;
-    rows of responses without one are zero. unresolved: of a member whose stored energy has no digits, or -1.
+    rows of responses without one are zero. unresolved: of a member whose stored energy has no digits, or -1. message:
+    who is to blame where a response cannot be looked at although the motion is right.
     """
 
     status: Status
@@ -71,6 +72,7 @@ class ResponseResult(NamedTuple):
     grazing: int = -1
     across: FloatArray | None = None
     unresolved: int = -1
+    message: str = ""
 
 
 @dataclass(frozen=True)

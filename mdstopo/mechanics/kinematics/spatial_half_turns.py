@@ -1,4 +1,4 @@
-"""Bushings in space that have turned by half a turn: there the rotation vector and the couple change their sign."""
+"""Half a turn of one body in space seen from another, where the rotation vector jumps: of bushings and responses."""
 
 import numpy as np
 
@@ -10,9 +10,9 @@ _AT = 1e-3
 
 
 def half_turn(pairs: IndexArray, home: FloatArray, q: FloatArray) -> tuple[int, int] | None:
-    """The first of the states q (T, n_q) at which a bushing has turned so far, and the bushing; None where none has.
+    """The first of the states q (T, n_q) at which a pair has turned so far, and which; None where none has.
 
-    pairs (n_bushing, 2): the bodies of each. home (n_bodies, HOME): where these start.
+    pairs (K, 2): the bodies of bushings, or of rotations that are looked at. home (n_bodies, HOME): where these start.
 
     The turn S S_home^T of the second body seen from the first, with R = R_home E(e) of each, is
     E(e_a)^T M E(e_b) M^T, M = R_home,a^T R_home,b: its quaternion conj(e_a) (M e_b M^T) is continuous in its sign, as
