@@ -30,4 +30,4 @@ def start_modes(driver: "GeneralDriver", alpha: FloatArray) -> Modes:
     found = modes_of(k, np.linalg.inv(np.linalg.cholesky(m)), j, HELD)
     basis = np.zeros((n, found.basis.shape[1]))
     basis[free] = found.basis
-    return Modes(found.matrix, basis)
+    return Modes(found.matrix, basis, found.scale)

@@ -7,7 +7,8 @@ import numpy as np
 
 from mdstopo.scene.model import FloatArray
 
-#: squares of frequencies below this share of the largest are rounding: such a mode has no stiffness
+#: squares of frequencies below this share of the largest, or of a body's by itself, are rounding: such a mode has no
+#: stiffness
 ROUNDING = 1e-12
 
 
@@ -16,11 +17,13 @@ class Modes:
     """Modes about the start.
 
     matrix (K, K): stiffness of the directions that joints leave, by the mass; basis (n, K): these directions, as
-    velocities of the bodies' freedoms of kinetic energy 1/2.
+    velocities of the bodies' freedoms of kinetic energy 1/2. scale: the largest entry of the stiffness by the mass
+    without joints, rad^2/s^2: where joints leave what is balanced, all squares may be rounding of it.
     """
 
     matrix: FloatArray
     basis: FloatArray
+    scale: float
 
     @cached_property
     def squares(self) -> FloatArray:
@@ -30,7 +33,7 @@ class Modes:
     @property
     def least(self) -> float:
         """The square below which there is no stiffness, rad^2/s^2."""
-        return ROUNDING * float(np.abs(self.squares).max(initial=0.0))
+        return ROUNDING * max(float(np.abs(self.squares).max(initial=0.0)), self.scale)
 
     @property
     def frequencies(self) -> FloatArray:
@@ -56,4 +59,5 @@ def modes_of(stiffness: FloatArray, inverse_root: FloatArray, rows: FloatArray, 
     if len(rows):
         _, sizes, directions = np.linalg.svd(rows @ inverse_root.T)
         basis = directions[int(np.sum(sizes > held * sizes.max(initial=0.0))) :].T
-    return Modes(basis.T @ inverse_root @ stiffness @ inverse_root.T @ basis, inverse_root.T @ basis)
+    scale = float(np.abs(inverse_root @ stiffness @ inverse_root.T).max(initial=0.0))
+    return Modes(basis.T @ inverse_root @ stiffness @ inverse_root.T @ basis, inverse_root.T @ basis, scale)
