@@ -22,6 +22,8 @@ def _pictures(_context: click.Context, _parameter: click.Parameter, incomplete: 
 @click.option("--out", type=FILE, metavar="FILE", help="Where to: .png, .svg or .pdf (default: beside the result).")
 @click.option("--format", "ending", type=click.Choice(["png", "svg", "pdf"]), default="png", show_default=True)
 @click.option("--time", "times", type=float, multiple=True, metavar="T", help="Layout at this time; may be repeated.")
+@click.option("--overlay", is_flag=True, help="Layouts of several times in one drawing.")
+@click.option("--dark", is_flag=True, help="On a dark ground.")
 @click.option("--load-case", metavar="NAME", help="Of layout at a time, and of histories.")
 @click.option("--point", type=click.IntRange(0), metavar="K", help="Of a front: the design of this point.")
 @click.option("--members", type=click.IntRange(1), metavar="N", help="Sensitivities of the first N members.")
@@ -32,6 +34,8 @@ def command(
     out: Path | None,
     ending: str,
     times: tuple[float, ...],
+    overlay: bool,
+    dark: bool,
     load_case: str | None,
     point: int | None,
     members: int | None,
@@ -40,8 +44,8 @@ def command(
 ) -> int:
     """Draw what a result file holds.
 
-    WHAT is one of layout, convergence, design, sensitivities, histories, sensitivity-histories, front; without it,
-    everything that the file has is drawn.
+    WHAT is one of layout, designs (start and final beside each other), convergence, design, sensitivities, histories,
+    sensitivity-histories, front; without it, everything that the file has is drawn.
     \f
     Arguments, which --help leaves out:
 
@@ -50,6 +54,8 @@ def command(
     out: the file for one picture; None takes one beside the result.
     ending: png, svg or pdf, where `out` does not say.
     times: at which a layout is drawn (s).
+    overlay: whether these are in one drawing.
+    dark: whether on a dark ground.
     load_case: of a layout at a time, and of histories.
     point: of a front, whose design is drawn.
     members: how many have their sensitivities drawn.
@@ -65,13 +71,16 @@ def command(
     if out is not None and what is None:
         raise click.UsageError("--out is for one picture: say which")
     written = []
-    with styled() as module:
+    if overlay and len(times) < 2:
+        raise click.UsageError("--overlay is for layouts at two times or more: --time T1 --time T2")
+    with styled(dark) as module:
         source = Source(result_path, point)
         if load_case is not None and load_case not in source.load_cases:
             raise click.BadParameter(
                 f"no load case {load_case!r}; there are {', '.join(source.load_cases)}", param_hint="--load-case"
             )
         given = {"times": times, "load_case": load_case, "members": members, "marked": point}
+        given["overlay"] = overlay or None
         for name in [what] if what else fitting(source.view):
             plot = PLOTS[name]
             options: dict[str, Any] = {key: given[key] for key in plot.options if given[key] not in (None, ())}

@@ -70,7 +70,7 @@ def _best(case: Case, view: ResultView) -> dict[str, float | None]:
         there = ", ".join(view.lines("objectives")) or "none"
         raise StoreError(f"{view.path}: its objectives are {there}; the case has {', '.join(names) or 'none'}")
     if "iterations/objectives" in view.arrays:
-        values, good = view.array("iterations/objectives"), _kept(case, view)
+        values, good = view.array("iterations/objectives"), kept_iterates(case, view)
     elif "pareto/objectives" in view.arrays:
         front = whole_front(view)
         values = front["objectives"]
@@ -88,7 +88,7 @@ def _best(case: Case, view: ResultView) -> dict[str, float | None]:
     return result
 
 
-def _kept(case: Case, view: ResultView) -> NDArray[np.bool_]:
+def kept_iterates(case: Case, view: ResultView) -> NDArray[np.bool_]:
     """(K + 1,) which iterates keep all limits, with the powers of the last stage."""
     excess = np.asarray(view.array("iterations/constraints"), dtype=np.float64)
     good = np.ones(len(excess), dtype=np.bool_)

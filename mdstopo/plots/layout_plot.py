@@ -24,8 +24,10 @@ FAR, MARGIN = 2.0, 0.12
 COLUMNS = 3
 
 
-def draw(module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = ()) -> Any:
-    """One panel a time, the start where none is given."""
+def draw(
+    module: Any, source: Source, load_case: str | None = None, times: tuple[float, ...] = (), overlay: bool = False
+) -> Any:
+    """One panel a time, the start where none is given. overlay: all in one, the earlier the fainter."""
     case = source.case
     panels: list[tuple[float | None, Floats]] = [(None, start_state(case))]
     if times:
@@ -33,6 +35,8 @@ def draw(module: Any, source: Source, load_case: str | None = None, times: tuple
         motion = source.motion(name, np.array(times))
         panels = list(zip(times, motion.q, strict=True))
     thick = thickness(source)
+    if overlay:
+        return _overlaid(module, source, panels, thick, load_case)
     if case.dimension > 2:
         return draw_space(module, source, panels, thick, load_case)
     rows = -(-legend_entries(case) // COLUMNS)
@@ -43,6 +47,30 @@ def draw(module: Any, source: Source, load_case: str | None = None, times: tuple
         if t is not None:
             axis.set_title(f"t = {t:g} s", loc="left")
     add_legend(figure, axes[0], thick)
+    return figure
+
+
+def _overlaid(
+    module: Any, source: Source, panels: list[tuple[float | None, Floats]], thick: Thickness, load_case: str | None
+) -> Any:
+    """States in one drawing, the last in full colours with its members, the others fainter without."""
+    from mdstopo.plots.stage import Stage
+
+    case = source.case
+    stage = Stage(source, np.array([q for _, q in panels]))
+    figure = module.Figure(figsize=(WIDTH, 0.4 + 0.16 * -(-legend_entries(case) // COLUMNS) + 2.8))
+    (axis,) = figure.subplots(1, 1, squeeze=False)[0]
+    t, q = panels[-1]
+    stage.draw(axis, q, thick, (load_case, t))
+    for k, (_, earlier) in enumerate(panels[:-1]):
+        stage.draw_bodies(axis, earlier, 0.25 + 0.35 * k / max(1, len(panels) - 2))
+    for k in range(len(case.bodies)):
+        size = 3 if case.dimension == 2 else 7
+        places = np.array([state[size * k : size * k + case.dimension] for _, state in panels])
+        axis.plot(*stage.seen(places).T, ":", color=ink("middle"), linewidth=0.7, zorder=1.7)
+    told = ", ".join(f"{at:g}" for at, _ in panels if at is not None)
+    axis.set_title(f"t = {told} s", loc="left")
+    add_legend(figure, axis, thick)
     return figure
 
 
@@ -95,6 +123,8 @@ def draw_gravity(axis: Any, gravity: Floats) -> None:
     corner.set_xlim(-1.0, 1.0)
     corner.set_ylim(-1.0, 1.0)
     draw_glyph(corner, glyphs()["gravity"], np.array([0.0, 0.6]), angle)
+    for line in corner.lines:
+        line.set_clip_on(False)
     corner.annotate("g", (0.0, 0.6), xytext=(4, -9), textcoords="offset points", fontsize=7, color=ink())
 
 

@@ -23,7 +23,10 @@ class Plot:
 
 
 PLOTS: dict[str, Plot] = {
-    "layout": Plot(("layout", "draw"), "bodies and members, at the start or at --time", ("load_case", "times")),
+    "layout": Plot(
+        ("layout", "draw"), "bodies and members, at the start or at --time", ("load_case", "times", "overlay")
+    ),
+    "designs": Plot(("designs", "draw"), "start and final design beside each other"),
     "convergence": Plot(("convergence", "draw"), "objectives over the iterations"),
     "design": Plot(("design", "draw"), "alpha of every member"),
     "sensitivities": Plot(("sensitivities", "draw"), "dG/dalpha of every member", ("members",)),
@@ -45,6 +48,8 @@ def fitting(view: ResultView) -> list[str]:
     motions = view.kind in ("run", "pareto") or "design/alpha" in paths
     if motions:
         found += ["layout", "design"] if alphas else ["layout"]
+        if alphas and view.kind == "run":
+            found.append("designs")
     if "iterations/combined" in paths:
         found.insert(0, "convergence")
     if alphas and any(path.startswith("sensitivities/") and "/history/" not in path for path in paths):

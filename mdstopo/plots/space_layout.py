@@ -43,7 +43,7 @@ def draw_space(
     """The four views of each state; one below the other where there are several times, each in a row."""
     case = source.case
     solids = {name: solid(case, name) for name in [*(body.name for body in case.bodies), GROUND]}
-    cloud = _cloud(case, [q for _, q in panels], solids)
+    cloud = scene_cloud(case, [q for _, q in panels], solids)
     low, high = cloud.min(axis=0), cloud.max(axis=0)
     middle = 0.5 * (low + high)
     seen = views(case, middle, max(0.5 * float(np.linalg.norm(high - low)), 1e-12))
@@ -57,8 +57,8 @@ def draw_space(
         for name, view in seen.items():
             x, y, width, height = places[k][name]
             axis = figure.add_axes((x / inches[0], y / inches[1], width / inches[0], height / inches[1]))
-            _frame(axis, view, np.array([width, height]) / scale, cloud)
-            _scene(axis, source, view, q, solids)
+            draw_frame(axis, view, np.array([width, height]) / scale, cloud)
+            draw_scene(axis, source, view, q, solids)
             draw_members(axis, source, _ends_seen(case, view, q), thick)
             draw_symbols(axis, case, symbols(case, load_case, t), q, view.seen)
             words = name if t is None or name != "front" else f"{name}, t = {t:g} s"
@@ -115,7 +115,7 @@ def _arrange(sizes: list[float], count: int, legend: float) -> tuple[_Places, tu
     return places, (PAGE, height), scale
 
 
-def _cloud(case: Case, states: list[Floats], solids: dict[str, Solid]) -> Floats:
+def scene_cloud(case: Case, states: list[Floats], solids: dict[str, Solid]) -> Floats:
     """(n, 3) places between which everything is that is drawn, without what lies far outside of the design."""
     own = {name: np.concatenate([points_of(case, name), shape.corners]) for name, shape in solids.items()}
     for each in surfaces_of(case):
@@ -130,7 +130,7 @@ def _cloud(case: Case, states: list[Floats], solids: dict[str, Solid]) -> Floats
     return every
 
 
-def _scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[str, Solid]) -> None:
+def draw_scene(axis: Any, source: Source, view: View, q: Floats, solids: dict[str, Solid]) -> None:
     """Surfaces, bodies, members between their nearer and their farther edges, joints."""
     case, state = source.case, q[None]
     for number, surface in enumerate(surfaces_of(case)):
@@ -203,7 +203,7 @@ def _sign(direction: Floats) -> float:
     return -1.0 if direction.min() == -1.0 else 1.0
 
 
-def _frame(axis: Any, view: View, size: Floats, cloud: Floats) -> None:
+def draw_frame(axis: Any, view: View, size: Floats, cloud: Floats) -> None:
     """The window and the axes. size: of the window in m; cloud (n, 3): what is to be seen."""
     axis.set_aspect("equal", adjustable="box")
     if np.isfinite(view.eye):

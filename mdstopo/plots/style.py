@@ -1,5 +1,6 @@
 """How pictures look: one column wide, colours that colour-blind readers can tell apart, units on the axes."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -55,9 +56,8 @@ _DARK: dict[str, Any] = {
 
 def is_dark() -> bool:
     """Whether the style that is on draws on a dark ground."""
-    import matplotlib
-
-    return bool(matplotlib.rcParams["figure.facecolor"] == _PAPER)
+    matplotlib = sys.modules.get("matplotlib")  # what draws without it draws on a light ground
+    return matplotlib is not None and bool(matplotlib.rcParams["figure.facecolor"] == _PAPER)
 
 
 def colour(number: int) -> str:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Case
@@ -70,7 +71,7 @@ def _of_final(source: Source, design: Floats) -> Thickness:
 def stored_peaks(source: Source, design: Floats) -> list[Floats] | None:
     """(M,) of each group: the largest |f*| of all load cases in the motions of the file; None where it cannot be told.
 
-    At the steps that the file has, so a little below the peaks between them.
+    At the steps that the file has, in the plane also between them, by the cubic polynomials of states and rates.
     """
     case = source.case
     every = [(group, np.arange(len(group))) for group in case.members]
@@ -80,7 +81,12 @@ def stored_peaks(source: Source, design: Floats) -> list[Floats] | None:
         if "q" not in stored or "v" not in stored or not len(stored["q"]):
             return None
         chosen = np.unique(np.linspace(0, len(stored["q"]) - 1, STATES).astype(int))
-        forces = forces_of(case, design, every, stored["q"][chosen], stored["v"][chosen])
+        q, v = stored["q"][chosen], stored["v"][chosen]
+        if case.dimension == 2 and len(stored["t"]) > 1:
+            between = CubicHermiteSpline(stored["t"], stored["q"], stored["v"])
+            times = np.linspace(stored["t"][0], stored["t"][-1], STATES)
+            q, v = np.concatenate([q, between(times)]), np.concatenate([v, between(times, 1)])
+        forces = forces_of(case, design, every, q, v)
         if forces is None:
             return None
         found = np.maximum(found, np.abs(forces).max(axis=0, initial=0.0))

@@ -91,6 +91,14 @@
     fill: "none", stroke: colour, "stroke-width": 1.6,
   });
 
+  // a peak with its value, where there is room for it
+  const mark = (c, [t, value], colour) => {
+    const x = c.px(t), y = c.py(value);
+    element(c.svg, "circle", { cx: x, cy: y, r: 3.5, fill: "none", stroke: colour, "stroke-width": 1.6, class: "peak" });
+    const left = x > 330, low = y < c.top + 22;
+    element(c.svg, "text", { x: x + (left ? -8 : 8), y: y + (low ? 16 : -7), "text-anchor": left ? "end" : "start", class: "peak" }, `${number(value, 5)} at ${number(t, 4)} s`);
+  };
+
   const responses = () => {
     const parent = at("responses");
     parent.replaceChildren();
@@ -101,10 +109,13 @@
       const place = data.objectives.findIndex((o) => o.name === each.name), objective = data.objectives[place];
       const c = chart(parent, `${each.name}: ${objective.what}`, "time, s", `${each.name}, ${each.unit}`, m.times, each.values);
       line(c, m.times, each.values, COLOURS[place % COLOURS.length]);
+      if (each.peak) mark(c, each.peak, COLOURS[place % COLOURS.length]);
       const cursor = element(c.svg, "line", { y1: c.top, y2: c.bottom, stroke: "#000", "stroke-dasharray": "3 3", class: "cursor" });
       cursors.push(() => { const x = c.px(m.t[state.frame]); cursor.setAttribute("x1", x); cursor.setAttribute("x2", x); });
     });
   };
+
+  const mark2 = (c, x, y, colour) => element(c.svg, "circle", { cx: c.px(x), cy: c.py(y), r: 3.5, fill: colour });
 
   const convergence = () => {
     if (!data.iterations) return;
@@ -112,8 +123,16 @@
       const ys = data.iterations.objectives[i], xs = ys.map((_, k) => k);
       const known = ys.filter((y) => y !== null), log = Math.min(...known) > 0 && Math.max(...known) > 20 * Math.min(...known);
       const bound = objective.bound ? [objective.bound.value] : [], drawn = log && bound.some((y) => y <= 0) ? [] : bound;
-      const c = chart(at("convergence"), `convergence of ${objective.name}${drawn.length ? "; dashed: its bound" : ""}`, "iteration", `${objective.name}, ${objective.unit}`, xs, ys.concat(drawn), log);
-      line(c, xs, ys, COLOURS[i % COLOURS.length]);
+      const c = chart(at("convergence"), `convergence of ${objective.name}${data.iterations.kept ? ", best so far; grey: each iterate" : ""}${drawn.length ? "; dashed: its bound" : ""}`, "iteration", `${objective.name}, ${objective.unit}`, xs, ys.concat(drawn), log);
+      const kept = data.iterations.kept, most = data.summary[i] && data.summary[i].sense === "maximize";
+      line(c, xs, ys, kept ? "#b5b5b5" : COLOURS[i % COLOURS.length]);
+      if (kept) { // the best that keeps all limits, so far; of several objectives that of the best combination
+        let best = null;
+        const order = data.objectives.length > 1 ? data.iterations.combined : ys.map((y) => (most ? -y : y));
+        const far = ys.map((y, k) => { if (kept[k] && order[k] !== null && (best === null || order[k] < order[best])) best = k; return best === null ? null : ys[best]; });
+        line(c, xs, far, COLOURS[i % COLOURS.length]);
+        if (data.iterations.best !== null) mark2(c, data.iterations.best, ys[data.iterations.best], COLOURS[i % COLOURS.length]);
+      }
       for (const y of drawn) line(c, [xs[0], xs[xs.length - 1]], [y, y], "#000").setAttribute("stroke-dasharray", "4 3");
     });
   };
@@ -121,48 +140,81 @@
   let marks = [];
   const front = () => {
     if (!data.front || data.objectives.length < 2) return;
-    const points = data.front.objectives, [a, b] = data.objectives;
-    const c = chart(at("front"), "the front: click a point to see its design", `${a.name}, ${a.unit}`, `${b.name}, ${b.unit}`, points.map((p) => p[0]), points.map((p) => p[1]));
-    marks = points.map((p, j) => {
-      if (p[0] === null) return null;
-      const usable = Boolean(data.designs[j].members);
-      const mark = element(c.svg, "circle", { cx: c.px(p[0]), cy: c.py(p[1]), r: 5, class: "point", tabindex: 0, role: "button", "data-point": j,
-        fill: data.front.dominated[j] ? "#fff" : "#0072B2", stroke: data.front.dominated[j] ? "#D55E00" : "#0072B2" });
-      element(mark, "title", {}, `point ${j}: ${a.name} ${number(p[0])}, ${b.name} ${number(p[1])}; ${data.front.status[j] === "visited" ? `visited, ${data.front.reason[j]}` : `weights ${data.front.weights[j].map((w) => number(w, 3)).join(", ")}; ${data.front.status[j]}`}`);
-      const choose = () => { if (usable) { state.design = j; state.frame = 0; refresh(); } };
+    for (let i = 0; i < data.objectives.length; i++) for (let j = i + 1; j < data.objectives.length; j++) pair(i, j);
+  };
+  // two objectives; marks of one design are kept together
+  const pair = (i, j) => {
+    const points = data.front.objectives, a = data.objectives[i], b = data.objectives[j];
+    const xs = points.map((p) => p[i]), ys = points.map((p) => p[j]);
+    const c = chart(at("front"), "the front: click a point to see its design", `${a.name}, ${a.unit}`, `${b.name}, ${b.unit}`, xs, ys);
+    const good = points.map((_, k) => k).filter((k) => xs[k] !== null && ys[k] !== null && !data.front.dominated[k]).sort((k, n) => xs[k] - xs[n]);
+    if (data.objectives.length === 2) line(c, good.map((k) => xs[k]), good.map((k) => ys[k]), "#9cc3de");
+    const written = [];
+    points.forEach((p, k) => {
+      if (xs[k] === null || ys[k] === null) return;
+      const usable = Boolean(data.designs[k].members), x = c.px(xs[k]), y = c.py(ys[k]);
+      const mark = element(c.svg, "circle", { cx: x, cy: y, r: 5, class: "point", tabindex: 0, role: "button", "data-point": k,
+        fill: data.front.dominated[k] ? "#fff" : "#0072B2", stroke: data.front.dominated[k] ? "#D55E00" : "#0072B2" });
+      element(mark, "title", {}, `point ${k}: ${a.name} ${number(xs[k])}, ${b.name} ${number(ys[k])}; ${data.front.status[k] === "visited" ? `visited, ${data.front.reason[k]}` : `weights ${data.front.weights[k].map((w) => number(w, 3)).join(", ")}; ${data.front.status[k]}`}`);
+      if (!data.front.dominated[k] && !written.some(([u, v]) => Math.abs(u - x) < 16 && Math.abs(v - y) < 12)) {
+        written.push([x, y]);
+        const left = x > 430;
+        element(c.svg, "text", { x: x + (left ? -7 : 7), y: Math.max(y - 6, c.top + 9), "text-anchor": left ? "end" : "start", class: "number" }, String(k));
+      }
+      const choose = () => { if (usable) { state.design = k; state.frame = 0; refresh(); } };
       mark.addEventListener("click", choose);
       mark.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); choose(); } });
-      return mark;
+      marks.push([k, mark]);
     });
   };
 
   const ended = (status, kkt) => status.replace("_", " ") + (kkt === null || kkt === undefined ? "" : `, KKT residual ${kkt.toExponential(1)}`);
-  const numbers = () => {
-    const rows = data.front ? data.front.objectives.map((p, j) => [`point ${j}`, ...p.map((x) => number(x, 7)), ended(data.front.status[j], data.front.kkt[j])])
-      : data.iterations ? [["final", ...data.iterations.objectives.map((ys) => number(ys[ys.length - 1], 9)), ended(data.status, data.kkt)]] : [];
-    const table = document.createElement("table");
-    for (const row of [["", ...data.objectives.map((o) => `${o.name}, ${o.unit}`), ""], ...rows]) {
-      const tr = table.insertRow();
-      for (const cell of row) tr.insertCell().textContent = cell;
-    }
-    at("numbers").replaceChildren(table);
+  const table = (parent, head, rows) => {
+    const made = document.createElement("table"), top = made.insertRow();
+    for (const cell of head) { const th = document.createElement("th"); th.textContent = cell; top.appendChild(th); }
+    for (const row of rows) { const tr = made.insertRow(); for (const cell of row) tr.insertCell().textContent = cell; }
+    parent.appendChild(made);
+    return made;
+  };
+  const SENSE = { limit: "at most", at_least: "at least", equals: "equal to" };
+  const results = () => {
+    const parent = at("results");
+    if (data.front) table(parent, ["point", ...data.objectives.map((o) => `${o.name}, ${o.unit}`), ""],
+      data.front.objectives.map((p, j) => [String(j), ...p.map((x) => number(x, 7)), ended(data.front.status[j], data.front.kkt[j])]));
+    else if (data.summary && data.summary.length) table(parent, ["objective", "start", "design", "change"],
+      data.summary.map((o) => [`${o.name}, ${o.unit}`, number(o.start, 7), number(o.best, 7), o.start ? `${o.best < o.start ? "" : "+"}${number(100 * (o.best - o.start) / Math.abs(o.start), 3)} %` : ""]));
+    if (data.limits && data.limits.length) table(parent, ["constraint", "start", "design", "bound", "margin"],
+      data.limits.map((c) => [`${c.what}${c.unit ? `, ${c.unit}` : ""}`, number(c.start, 6), number(c.best, 6), `${SENSE[c.sense]} ${number(c.bound, 6)}`,
+        c.sense === "equals" ? number(c.margin, 2) : `${number(c.margin, 4)}${c.bound ? ` (${number(100 * c.margin / Math.abs(c.bound), 3)} %)` : ""}`])).className = "limits";
     for (const o of data.objectives) {
       if (!o.bound) continue;
       const p = document.createElement("p"), gap = o.bound.gap;
       const reached = o.bound.best === null ? "" : `; best ${number(o.bound.best, 7)}${gap === null ? "" : `, a gap of ${number(100 * gap, 3)} %`}`;
       p.textContent = `${o.name}: ${o.bound.above ? "at most" : "at least"} ${number(o.bound.value, 7)} ${o.unit} with any members${reached}. ${o.bound.why}.`;
       p.className = "bound";
-      at("numbers").appendChild(p);
+      parent.appendChild(p);
     }
+  };
+  const parts = () => {
+    const own = data.designs[state.design].parts || [], forces = own.some((part) => part.force !== undefined);
+    const where = (body, p) => `${body} (${p.map((x) => number(x, 4)).join(", ")})`;
+    at("parts").replaceChildren();
+    table(at("parts"), ["member", "from, m", "to, m", "length, m", "alpha", ...(forces ? ["largest force, N", "at, s", "load case"] : [])],
+      own.map((part) => [`${part.group} ${part.member}`, where(part.from, part.p), where(part.to, part.q), number(part.length, 4), number(part.size, 4),
+        ...(forces ? [number(part.force, 4), number(part.time, 4), part.load_case] : [])]));
+    const all = data.designs[state.design].members.all, note = document.createElement("p");
+    note.className = "small";
+    note.textContent = `${own.length} of ${all} members${forces ? "; pull is positive" : ""}.`;
+    at("parts").appendChild(note);
   };
 
   const refresh = () => {
     const m = motion(), slider = at("time");
     slider.max = m ? m.t.length - 1 : 0;
     slider.value = state.frame;
-    marks.forEach((mark, j) => mark && mark.setAttribute("stroke-width", j === state.design ? 4 : 1.5));
+    for (const [k, mark] of marks) mark.setAttribute("stroke-width", k === state.design ? 5 : 1.5);
     document.body.dataset.design = state.design;
-    scene.fit(data.designs[state.design].members.rows); responses(); draw();
+    scene.fit(data.designs[state.design].members.rows); responses(); parts(); draw();
   };
   const show = (frame) => { state.frame = frame; at("time").value = frame; document.body.dataset.frame = frame; draw(); };
 
@@ -188,6 +240,7 @@
     step();
   });
   state.design = Math.max(0, data.front ? data.designs.findIndex((d, j) => d.members && j >= Math.floor(data.designs.length / 2)) : 0);
-  front(); convergence(); numbers(); refresh();
+  front(); convergence(); results(); refresh();
+  if (globalThis.addEventListener) globalThis.addEventListener("beforeprint", () => { for (const each of document.querySelectorAll("details")) each.open = true; });
   document.body.dataset.ready = "yes";
 })();

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import GROUND, Case
 from mdstopo.case.units import unit_of, unit_of_value, words
 from mdstopo.engine import Evaluator
-from mdstopo.limiting.compare import compared
+from mdstopo.limiting.compare import compared, kept_iterates
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_forces import Chosen, forces_of
 from mdstopo.plots.scenery import points_of, start_state
@@ -21,12 +21,15 @@ from mdstopo.plots.symbols import LOADS, Symbol, symbols
 from mdstopo.plots.thickness import families, strongest, thickness
 from mdstopo.plots.views import upright
 from mdstopo.plots.watch import response_history
+from mdstopo.report.report_tables import best_iterate, constraint_rows, member_peaks, objective_rows, parts, peak_of
 from mdstopo.store.whole_front import whole_front
 
 Floats = NDArray[np.float64]
 
 #: frames of a motion, samples of a response; designs of a front that are simulated; members that are drawn, at most
 FRAMES, SAMPLES, SIMULATED, DRAWN = 81, 161, 60, 10_000
+#: moments beside the steps at which the largest forces are looked for
+PEAKS = 401
 
 
 def content(source: Source) -> dict[str, Any]:
@@ -75,7 +78,11 @@ def content(source: Source) -> dict[str, Any]:
         page["iterations"] = {
             "objectives": _rounded(iterations["objectives"].T),
             "combined": _rounded(iterations["combined"]),
+            "kept": kept_iterates(case, view).tolist() if view.kind == "run" else None,
+            "best": best_iterate(source),
         }
+        page["summary"] = _plain(objective_rows(source))
+        page["limits"] = _plain(constraint_rows(source))
     if "pareto/objectives" in view.arrays:
         front = whole_front(view)
         page["front"] = {
@@ -199,6 +206,7 @@ def _design(source: Source, engine: Evaluator, alpha: Floats, moves: bool = True
     case = source.case
     members, kept = _members(source, alpha)
     design: dict[str, Any] = {"members": members, "motions": {}}
+    moved: dict[str, Any] = {}
     for load_case in case.load_cases if moves else ():
         motion = engine.trajectory(alpha, load_case.name)
         last = float(motion.t[-1])
@@ -209,6 +217,8 @@ def _design(source: Source, engine: Evaluator, alpha: Floats, moves: bool = True
         forces = forces_of(case, alpha, kept, states.q, states.v)
         times = np.linspace(motion.t[0], last, SAMPLES)
         histories = response_history(engine, alpha, load_case.name, times)
+        fine = np.unique(np.concatenate([motion.t, np.linspace(motion.t[0], last, PEAKS)]))
+        moved[load_case.name] = (fine, motion.at(fine))
         design["motions"][load_case.name] = {
             "t": _rounded(frames),
             "q": _rounded(states.q),
@@ -216,11 +226,32 @@ def _design(source: Source, engine: Evaluator, alpha: Floats, moves: bool = True
             "whole": motion.status.ok,
             "times": _rounded(times),
             "responses": [
-                {"name": name, "unit": unit_of(_objective(case, name).response), "values": _rounded(values)}
+                {"name": name, "unit": unit_of(_objective(case, name).response), "values": _rounded(values),
+                 "peak": _peak(source, (alpha, load_case.name, name), times, values)}
                 for name, values in histories.items()
             ],
-        }
+        }  # fmt: skip
+    peaks = member_peaks(source, alpha, kept, moved) if moved else None
+    design["parts"] = [
+        {key: _rounded(value, 5) if key in _NUMBERS and value is not None else value for key, value in part.items()}
+        for part in parts(source, alpha, kept, peaks)
+    ]
     return design
+
+
+#: of a part: what is rounded
+_NUMBERS = ("p", "q", "length", "size", "force", "time")
+
+
+def _peak(source: Source, chosen: tuple[Floats, str, str], times: Floats, values: Floats) -> Any:
+    """Time and value of the peak of an objective's response. chosen: the design, the load case, the objective."""
+    design, load_case, name = chosen
+
+    def at(other: Floats) -> Floats:
+        return response_history(source.engine, design, load_case, other)[name]
+
+    found = peak_of(_objective(source.case, name).over_time, times, values, at)
+    return None if found is None else _rounded(found)
 
 
 def _objective(case: Case, name: str) -> Any:
@@ -261,4 +292,6 @@ def _rounded(array: Any, digits: int = 6) -> Any:
 def _plain(value: Any) -> Any:
     if isinstance(value, list):
         return [_plain(each) for each in value]
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
     return None if value != value else value

@@ -2,8 +2,6 @@
 
 import json
 import re
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -11,13 +9,12 @@ import pytest
 from mdstopo.cli.group import run_group
 from mdstopo.plots.source import Source
 from mdstopo.report.report_content import content
+from mdstopo.report.report_tables import peak_of
+from tests.browser import BROWSER, look
 from tests.front.support import CASE
 
-BROWSER = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 #: what is done to the page: slider, colour, a point of the front; what came of it is written down
 PROBE = """
-<script>
-const seen = { errors };
 const pixels = () => { const c = document.getElementById("layout");
   const image = c.getContext("2d").getImageData(0, 0, c.width, c.height).data;
   return image.reduce((a, x, i) => (a * 31 + x * (i % 97)) % 1000003, 7); };
@@ -37,8 +34,10 @@ if (point) {
   seen.design = document.body.dataset.design; seen.clicked = pixels(); }
 seen.charts = document.querySelectorAll("svg").length;
 seen.ticks = [...document.querySelectorAll("svg text")].map((t) => t.textContent);
-document.title = "seen" + JSON.stringify(seen);
-</script>
+seen.peaks = document.querySelectorAll("circle.peak").length;
+seen.tables = [...document.querySelectorAll("#results table")].map((t) => t.rows.length);
+seen.parts = document.querySelectorAll("#parts tr").length - 1;
+seen.numbers = [...document.querySelectorAll("text.number")].map((t) => t.textContent);
 """
 
 
@@ -96,16 +95,11 @@ def _place(q, body, x, y):
 def test_the_slider_moves_and_points_can_be_clicked(results, kind, tmp_path):
     out = tmp_path / "page.html"
     assert run_group(["report", str(results[kind]), "--out", str(out), "--quiet"]) == 0
-    watch = "<script>const errors = []; window.onerror = (m) => errors.push(String(m));</script>"
-    out.write_text(out.read_text().replace("<head>", f"<head>{watch}").replace("</body>", f"{PROBE}</body>"))
-    command = [
-        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
-        "--disable-component-update", "--disable-sync", f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom",
-        out.as_uri(),
-    ]  # fmt: skip
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    seen = json.loads(re.search(r"<title>seen(.*?)</title>", done.stdout, re.DOTALL)[1])
+    seen = look(out, PROBE, tmp_path)
     assert seen["errors"] == []
+    assert seen["overlaps"] == []
+    assert seen["peaks"] == 1
+    assert 0 < seen["parts"] <= 300
     assert seen["ready"] == "yes"
     assert seen["clock"] == "t = 0.1 s"
     assert len({seen["before"], seen["moved"], seen["coloured"]}) == 3
@@ -114,5 +108,36 @@ def test_the_slider_moves_and_points_can_be_clicked(results, kind, tmp_path):
         assert seen["design"] == "0"
         assert seen["clicked"] != seen["coloured"]
         assert seen["charts"] == 2
+        assert len(seen["numbers"]) >= 3
     else:
         assert seen["charts"] == 3
+        assert seen["tables"] == [3, 2]  # heads, two objectives, one constraint
+
+
+def test_tables_are_those_of_the_file(results):
+    """The best iterate, its constraints, and forces of members against their law at the ends of the motion."""
+    source = Source(results["run"])
+    page = content(source)
+    values = source.view.arrays["iterations/objectives"]
+    assert [row["start"] for row in page["summary"]] == pytest.approx(values[0])
+    assert [row["best"] for row in page["summary"]] == pytest.approx(values[page["iterations"]["best"]])
+    (volume,) = page["limits"]
+    assert volume["best"] == pytest.approx(source.alpha.sum())
+    assert volume["margin"] == pytest.approx(-abs(volume["best"] - volume["bound"]), abs=1e-12)
+    (design,) = page["designs"]
+    peak = design["motions"]["translation"]["responses"][0]["peak"]
+    assert peak[1] == pytest.approx(values[page["iterations"]["best"]][1], rel=1e-5)
+    forces = {(part["group"], part["member"]): part["force"] for part in design["parts"]}
+    seen = [np.array(each["force"]) for each in design["motions"].values()]
+    for k, row in enumerate(design["members"]["rows"]):
+        largest = max(np.abs(force[:, k]).max() for force in seen)
+        assert abs(forces["belts", row[8]]) >= (1.0 - 1e-3) * largest
+
+
+def test_a_peak_between_samples_is_found():
+    times = np.linspace(0.0, 1.0, 11)
+    wave = lambda t: np.sin(9.0 * t)  # noqa: E731
+    assert peak_of("max", times, wave(times), wave) == pytest.approx((np.pi / 18, 1.0), abs=2e-3)
+    assert peak_of("min", times, wave(times), wave)[1] == pytest.approx(-1.0, abs=1e-4)
+    assert peak_of("final", times, wave(times), wave) == (1.0, np.sin(9.0))
+    assert peak_of("mean", times, wave(times), wave) is None

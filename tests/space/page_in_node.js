@@ -17,7 +17,7 @@ const node = () => {
     addEventListener(kind, act) { (own.listeners[kind] = own.listeners[kind] || []).push(act); },
     appendChild(child) { own.children.push(child); return child; },
     replaceChildren(...children) { own.children = children; },
-    setAttribute() {}, insertRow: () => ({ insertCell: node }), getContext: () => context,
+    setAttribute() {}, insertCell: node, insertRow: () => node(), getContext: () => context,
     getBoundingClientRect: () => ({ left: 0, top: 0, width: 760, height: 560 }),
     fire(kind, event) { for (const act of own.listeners[kind] || []) act({ target: own, preventDefault() {}, ...event }); },
   });

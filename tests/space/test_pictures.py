@@ -22,6 +22,7 @@ from mdstopo.report.gltf_motion import motion_file
 from mdstopo.report.report_page import page
 from mdstopo.scene.points import point_rates, points_at
 from mdstopo.scene.quaternions import quaternions_of
+from tests.browser import BROWSER, look
 from tests.front.support import CASE as PLANAR
 from tests.space.gltf_reader import Gltf
 
@@ -274,9 +275,8 @@ def test_a_long_title_of_a_history_is_whole(named, monkeypatch):
 @pytest.fixture(scope="module")
 def written(source, tmp_path_factory):
     """The page as a file, and its data."""
-    times = np.linspace(0.0, 2.0, report_content.SAMPLES)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report_content, "response_history", lambda *_: {"sway": 0.3 * times})
+        patch.setattr(report_content, "response_history", lambda *given: {"sway": 0.3 * given[-1]})
         data = report_content.content(source)
     place = tmp_path_factory.mktemp("page") / "hull.html"
     place.write_text(page(data))
@@ -369,3 +369,17 @@ def test_the_exported_motion_is_gltf_and_is_the_motion(source):
         assert tip == pytest.approx(ends[:, 1], abs=2e-4)
     slow = Gltf(motion_file(source, slower=10.0)[0])
     assert slow.track(0, hull, "translation")[0][-1] == pytest.approx(20.0)
+
+
+IN_BROWSER = Path(__file__).with_name("page_in_browser.js")
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser on this machine")
+@pytest.mark.parametrize("size", [(1300, 1000), (500, 900)])
+def test_a_browser_shows_the_page_and_turns_the_scene(written, tmp_path, size):
+    found = look(written[0], IN_BROWSER.read_text(), tmp_path, size)
+    assert found["errors"] == []
+    assert found["overlaps"] == []
+    assert found["back"] == found["pictures"][0]
+    assert len(set(found["pictures"])) == len(found["pictures"]) == 10
+    assert found["sharp"] >= 1

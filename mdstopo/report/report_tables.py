@@ -1,0 +1,154 @@
+"""Tables of the page: objectives and constraints, members as parts, peaks of responses."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.model import Case, ResponseRow
+from mdstopo.case.units import unit_of, unit_of_value, words
+from mdstopo.limiting.compare import kept_iterates
+from mdstopo.plots.member_forces import Chosen, forces_of
+from mdstopo.plots.scenery import Floats
+from mdstopo.plots.source import Source
+
+#: samples between the neighbours of the largest sample, to find a peak; members that are listed
+FINE, LISTED = 41, 300
+#: of a bound: what is nearer to it is on it
+NOTHING = 1e-12
+#: `over_time` whose value is that of a moment: what is largest of the values there
+_PEAKS: dict[str, Callable[[Floats], Floats]] = {
+    "max": lambda values: values,
+    "min": lambda values: -values,
+    "max_abs": np.abs,
+}
+
+
+def best_iterate(source: Source) -> int | None:
+    """Which iterate of a run is the design of the file: the best that keeps the limits, else the last."""
+    view, case = source.view, source.case
+    if view.kind != "run" or "iterations/combined" not in view.arrays:
+        return None
+    combined = np.asarray(view.array("iterations/combined"), dtype=np.float64)
+    kept = kept_iterates(case, view)
+    usable = kept & np.isfinite(combined)
+    if usable.any():
+        return int(np.where(usable, combined, np.inf).argmin())
+    return len(combined) - 1 if len(combined) else None
+
+
+def objective_rows(source: Source) -> list[dict[str, Any]]:
+    """Start and best value of every objective of a run; empty for other files."""
+    best = best_iterate(source)
+    if best is None:
+        return []
+    values = np.asarray(source.view.array("iterations/objectives"), dtype=np.float64)
+    objectives = {each.name: each for each in source.case.objectives}
+    return [
+        {"name": name, "unit": unit_of_value(objectives[name]), "start": float(values[0, i]),
+         "best": float(values[best, i]), "sense": objectives[name].sense}
+        for i, name in enumerate(source.names)
+    ]  # fmt: skip
+
+
+def constraint_rows(source: Source) -> list[dict[str, Any]]:
+    """Every constraint of a run: what, its bound, the values at the start and of the design, and the margin.
+
+    margin: how far the value may still go, positive where the constraint is kept with room, in its own unit.
+    """
+    best = best_iterate(source)
+    if best is None or not source.case.constraints:
+        return []
+    excess = np.asarray(source.view.array("iterations/constraints"), dtype=np.float64)
+    found = []
+    for i, row in enumerate(source.case.constraints):
+        start, end = float(excess[0, i]), float(excess[best, i])
+        if abs(end) <= NOTHING * abs(row.bound):
+            end = 0.0
+        margin = {"limit": -end, "at_least": end, "equals": -abs(end)}[row.sense]
+        found.append(
+            {"what": constraint_words(source.case, row), "sense": row.sense, "bound": float(row.bound),
+             "unit": _unit(row), "start": start + row.bound, "best": end + row.bound, "margin": margin}
+        )  # fmt: skip
+    return found
+
+
+def constraint_words(case: Case, row: Any) -> str:
+    """What a constraint bounds."""
+    if not isinstance(row, ResponseRow):
+        return f"volume of {', '.join(row.groups)}"
+    where = f", {row.load_case}" if len(case.load_cases) > 1 else ""
+    return f"{row.over_time} {words(row.response)}{where}"
+
+
+def _unit(row: Any) -> str:
+    if not isinstance(row, ResponseRow):
+        return ""
+    unit = unit_of(row.response)
+    return f"{unit} s" if row.over_time == "integral" else unit
+
+
+def peak_of(
+    over_time: str, times: Floats, values: Floats, at: Callable[[Floats], Floats]
+) -> tuple[float, float] | None:
+    """(time, value) of the peak of a response; None of what is not that of a moment.
+
+    over_time: how it becomes a number.
+    times, values (T,): samples.
+    at (t,): the response at other times.
+    """
+    if over_time == "final":
+        return float(times[-1]), float(values[-1])
+    if over_time not in _PEAKS or not np.isfinite(values).all():
+        return None
+    size = _PEAKS[over_time]
+    k = int(size(values).argmax())
+    fine = np.linspace(times[max(k - 1, 0)], times[min(k + 1, len(times) - 1)], FINE)
+    there = at(fine)
+    j = int(size(there).argmax())
+    return float(fine[j]), float(there[j])
+
+
+def member_peaks(source: Source, design: Floats, kept: Chosen, motions: dict[str, Any]) -> list[dict[str, Any]] | None:
+    """Of the chosen members (K,): the largest |f*|, with its sign, time and load case.
+
+    motions: of each load case times (T,) and the states there.
+
+    None where forces cannot be told from states.
+    """
+    count = sum(len(chosen) for _, chosen in kept)
+    force, time, case_of = np.zeros(count), np.zeros(count), np.zeros(count, dtype=int)
+    names = list(motions)
+    for number, name in enumerate(names):
+        times, states = motions[name]
+        found = forces_of(source.case, design, kept, states.q, states.v)
+        if found is None or not len(found):
+            return None
+        k = np.abs(found).argmax(axis=0)
+        own = found[k, np.arange(count)]
+        larger = np.abs(own) > np.abs(force)
+        force, time = np.where(larger, own, force), np.where(larger, times[k], time)
+        case_of = np.where(larger, number, case_of)
+    return [
+        {"force": float(f), "time": float(t), "load_case": names[n]}
+        for f, t, n in zip(force, time, case_of.tolist(), strict=True)
+    ]
+
+
+def parts(source: Source, design: Floats, kept: Chosen, peaks: list[dict[str, Any]] | None) -> list[dict[str, Any]]:
+    """Members as a list of parts, the largest force first, or the largest design value; at most LISTED."""
+    case, found = source.case, []
+    slices = case.group_slices
+    k = 0
+    for group, chosen in kept:
+        alpha = design[slices[group.name]][chosen] if group.design else np.ones(len(chosen))
+        for i, size in zip(chosen.tolist(), alpha.tolist(), strict=True):
+            p, q = group.from_index[i], group.to_index[i]
+            found.append(
+                {"group": group.name, "member": i, "from": group.body_from, "p": group.from_world[p].tolist(),
+                 "to": group.body_to, "q": group.to_world[q].tolist(), "length": float(group.length[i]),
+                 "size": size if group.design else None, **(peaks[k] if peaks is not None else {})}
+            )  # fmt: skip
+            k += 1
+    found.sort(key=lambda part: -abs(part.get("force", part["size"] or 0.0)))
+    return found[:LISTED]
