@@ -1,0 +1,155 @@
+"""Laws of formulas in scenes: the same as the built-in laws, and gradients through their kinks against differences."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.reader import read_case
+from tests.variables.support import differences, whole
+
+PLANE = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.5}
+bodies:
+  load: {mass: 20, inertia: 0.5, position: [0, 0], velocity: [1, 0.4], angular_velocity: 1.5}
+points:
+  corners: {body: load, grid: {rectangle: {center: [0, 0], size: [0.4, 0.4], count: 4}}}
+  hooks: {body: ground, grid: {list: [[-1, 1], [1, 1]]}}
+members:
+  belts: {from: corners, to: hooks, law: LAW}
+  straps: {from: corners, to: hooks, law: {type: spring, stiffness: 2000}}
+design: {initial: 0.5, variables: {VARIABLES}}
+solver: {integrator: runge_kutta, tolerance: 1e-8}
+objectives:
+  G: {response: energy}
+  H: {response: {acceleration: {body: load}}, over_time: mean}
+  F: {response: {member_force: {group: belts}}, over_time: mean}
+combine: {weights: {G: 1, H: 1, F: 1}, normalize: false}
+"""
+_BODY = "inertia: [0.5, 0.4, 0.6], position: [0, 0, 0], velocity: [1, 0.4, 0.2], angular_velocity: [0.4, 1, 1.5]}"
+_CORNERS = "{list: [[0.2, 0.2, 0], [-0.2, 0.2, 0.1], [0.2, -0.2, 0], [-0.2, -0.1, 0.2]]}"
+_PLANAR_BODY = "inertia: 0.5, position: [0, 0], velocity: [1, 0.4], angular_velocity: 1.5}"
+_PLANAR_CORNERS = "{rectangle: {center: [0, 0], size: [0.4, 0.4], count: 4}}"
+SPACE = (
+    PLANE.replace("format: 1", "format: 1\ndimension: 3")
+    .replace("gravity: [0, -9.81]", "gravity: [0, -9.81, 0]")
+    .replace(_PLANAR_BODY, _BODY)
+    .replace(_PLANAR_CORNERS, _CORNERS)
+    .replace("[[-1, 1], [1, 1]]", "[[-1, 1, 0.3], [1, 1, -0.4], [0.1, 1.2, 1]]")
+)
+PAIRS = {
+    "gap": (
+        "{type: gap, stiffness: 8000, damping: 60, gap: 0.02}",
+        '{type: expression, force: "if(x >= g, k*(x - g) + c*xd, 0)", energy: "if(x >= g, k*(x - g)^2/2, 0)",'
+        " parameters: {k: 8000, c: 60, g: 0.02}}",
+        {"stiffness": "k", "damping": "c", "gap": "g", "free_length": "free_length"},
+    ),
+    "clipped": (
+        "{type: gap, stiffness: 8000, damping: 60, gap: 0.02, clip: true}",
+        '{type: expression, force: "if(x >= g, max(k*(x - g) + c*xd, 0), 0)", energy: "k*max(x - g, 0)^2/2",'
+        " parameters: {k: 8000, c: 60, g: 0.02}}",
+        {"stiffness": "k", "damping": "c", "gap": "g"},
+    ),
+    "cubic": (
+        "{type: cubic, stiffness: 800, cubic: 20000}",
+        '{type: expression, energy: "k*x^2/2 + b*x^4/4", parameters: {k: 800, b: 2e4}}',
+        {"stiffness": "k", "cubic": "b"},
+    ),
+    "actuator": (
+        "{type: actuator, proportional: 800, derivative: 20, target: 0.05, limit: 60}",
+        '{type: expression, force: "clip(p*(x - a) + d*xd, -f, f)", parameters: {p: 800, d: 20, a: 0.05, f: 60}}',
+        {"proportional": "p", "derivative": "d", "target": "a", "limit": "f"},
+    ),
+    "spring": (
+        "{type: spring, stiffness: 800, damping: 20, preload: 3}",
+        '{type: expression, force: "k*x + c*xd + p", energy: "k*x^2/2", parameters: {k: 800, c: 20, p: 3}}',
+        {"stiffness": "k", "damping": "c", "preload": "p"},
+    ),
+}
+BOUNDS = {"free_length": "initial: 1.2, lower: 0.5, upper: 2"}
+
+
+def scene(text: str, law: str, parameters: Any, **solver: object) -> Any:
+    """The case with a law, and with some of its parameters as variables."""
+    variables = ", ".join(
+        f"v{i}: {{group: belts, parameter: {word}, {BOUNDS.get(word, 'lower: 0.001, upper: 30000')}}}"
+        for i, word in enumerate(parameters)
+    )
+    case = text.replace("LAW", law).replace("VARIABLES", variables)
+    return read_case(case, overrides={f"solver.{key}": value for key, value in solver.items()})
+
+
+@pytest.mark.parametrize("integrator", ["runge_kutta", "generalized_alpha"])
+@pytest.mark.parametrize("kind", PAIRS)
+def test_built_in_laws_written_as_formulas_give_the_same_scene(kind: str, integrator: str) -> None:
+    built_in, formulas, words = PAIRS[kind]
+    one = mdstopo.evaluate(scene(PLANE, built_in, words, integrator=integrator))
+    other = mdstopo.evaluate(scene(PLANE, formulas, words.values(), integrator=integrator))
+    assert one.status.ok
+    assert other.status.ok
+    for name in one.objectives:
+        assert other.objectives[name] == pytest.approx(one.objectives[name], rel=1e-12)
+        of_one, of_other = whole(one, name), whole(other, name)
+        # steps are found by differences of rounded numbers, and generalized_alpha iterates
+        assert np.abs(of_other - of_one).max() <= 1e-11 * np.abs(of_one).max()
+
+
+#: what each is: see `test_expression_kernels`
+FORMULAS = {
+    "hunt_crossley": ("if(x > 0, k*x^n*(1 + d*xd), 0)", {"k": 4e3, "n": 1.5, "d": 0.4}),
+    "brown_mcphee": (
+        "N*(mu*tanh(4*xd/v) + (ms - mu)*(xd/v)/((xd/v)^2/4 + 3/4)^2)",
+        {"N": 50.0, "mu": 0.2, "ms": 0.4, "v": 0.5},
+    ),
+    "two_slopes": ("sign(x)*min(k*abs(x), k*y + h*(abs(x) - y)) + c*xd", {"k": 900.0, "h": 90.0, "y": 0.03, "c": 4.0}),
+    "switched": ("a*step(t - when)*x + b*max(0, sin(w*t))", {"a": 400.0, "when": 0.17, "b": 30.0, "w": 20.0}),
+    "length": ("k*log(l/l0)*l0 + c*xd/l", {"k": 900.0, "c": 2.0}),
+}
+
+
+def check_gradients(text: str, kind: str, bound: float, **solver: object) -> None:
+    """Gradients by all values against differences of a tight run, and by both methods."""
+    force, parameters = FORMULAS[kind]
+    stated = ", ".join(f"{word}: {value}" for word, value in parameters.items())
+    law = f'{{type: expression, force: "{force}", parameters: {{{stated}}}}}'
+    words = [*parameters, *(["free_length"] if kind == "length" else [])]
+    case = scene(text, law, words, tolerance=1e-11, **solver)
+    found = mdstopo.evaluate(case)
+    assert found.status.ok, found.message
+    direct = mdstopo.evaluate(case, method="direct")
+    start = np.concatenate([case.initial, *(np.full(each.count, each.initial) for each in case.variables)])
+    values = start[case.n_design :]
+    shares = np.concatenate([np.ones(case.n_design), np.abs(values)])
+    rng = np.random.default_rng(4)
+    direction = 0.3 * rng.normal(size=len(start)) * shares
+    slopes = differences(case, start, direction, 1e-3)
+    for name in found.objectives:
+        gradient = whole(found, name)
+        assert abs(slopes[name] - gradient @ direction) <= bound * np.abs(gradient * direction).max(), name
+        assert whole(direct, name) == pytest.approx(gradient, abs=1e-9 * np.abs(gradient).max())
+
+
+@pytest.mark.parametrize("kind", FORMULAS)
+def test_gradients_through_kinks_are_slopes(kind: str) -> None:
+    check_gradients(PLANE, kind, 1e-7)
+
+
+@pytest.mark.parametrize("kind", ["hunt_crossley", "switched"])
+def test_gradients_in_space_are_slopes(kind: str) -> None:
+    check_gradients(SPACE, kind, 1e-7)
+
+
+def test_a_formula_compiles_nothing_of_the_kernels_and_its_numbers_nothing_at_all() -> None:
+    from mdstopo.compiler import formulas
+
+    formulas.address_of.cache_clear()
+    engines = len(formulas._ENGINES)
+    law = '{{type: expression, force: "k*x + {0}*xd + k*x^3", parameters: {{k: {1}}}}}'
+    for k in (500.0, 600.0, 700.0):
+        assert mdstopo.evaluate(scene(PLANE, law.format("c0", k).replace("c0", "3"), [])).status.ok
+    assert len(formulas._ENGINES) == engines + 1
