@@ -139,8 +139,9 @@ def _say_starts(output: Output, view: "ResultView") -> None:
     rows = [["start", *objective_names(view), "status", "KKT"]]
     reasons = view.lines("starts/reason")
     for index, word in enumerate(view.lines("starts/status")):
-        values = (number(value) for value in starts["objectives"][index])
-        kkt = number(starts["kkt"][index], 2) if "kkt" in starts else ""
+        known = word != "not_begun"
+        values = (number(value) if known else "" for value in starts["objectives"][index])
+        kkt = number(starts["kkt"][index], 2) if known and "kkt" in starts else ""
         dropped = bool(reasons) and reasons[index].startswith("dropped")
         rows.append([str(index + 1), *values, reasons[index] if dropped else word.replace("_", " "), kkt])
     output.table(rows)

@@ -409,6 +409,8 @@ class _Run:
             f"no design was found that keeps the constraints: constraints[{i}] is {abs(self.constraints[i]):.6g} "
             f"{word} {row.bound:.6g}"
         )
+        if row.bound == 0.0:  # the optimiser takes it as it is
+            reason = reason.replace(" of its bound", "")
         return (RunStatus.FAILED if status is RunStatus.CONVERGED else status), f"{sentence} ({reason})"
 
     def checkpoint(self, path: Path) -> None:

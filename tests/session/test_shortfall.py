@@ -96,3 +96,12 @@ def test_a_run_that_stalls_ends_with_the_warning_in_its_outcome() -> None:
     found = run_session(case, engine=FakeEngineWithEvaluations)
     assert found.status == "stalled"
     assert any(each.startswith("stalled at a KKT residual of ") for each in found.warnings)
+
+
+def test_a_violation_of_a_limit_that_is_zero_is_no_share_of_it() -> None:
+    """The mass rises at first whatever holds it."""
+    case = read_case(CASE.replace("limit: 0.15", "limit: 0"), overrides={"optimizer.max_iterations": 60})
+    found = optimize(case)
+    assert "constraints[1] is " in found.reason
+    assert "above its limit 0 " in found.reason
+    assert "of its bound" not in found.reason
