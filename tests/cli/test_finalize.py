@@ -17,9 +17,11 @@ from mdstopo.case.yaml_text import text_of
 from mdstopo.cli.group import run_group
 from mdstopo.engine import Evaluator
 from mdstopo.finalize.document import content_of, final_content
+from mdstopo.finalize.equilibria import _Distance
 from mdstopo.finalize.finalize_design import finalize, ready
 from mdstopo.finalize.keep import chosen, places, restricted
 from mdstopo.finalize.scaled_laws import sized
+from mdstopo.mechanics.kinematics.spatial import SPATIAL
 
 SPRINGS = """\
 format: 1
@@ -489,3 +491,17 @@ def test_a_machine_that_rests_where_the_full_one_does_is_accepted_and_a_long_way
     assert (status, document["not_written"]) == (0, None)
     (warning,) = [each for each in document["warnings"] if "rests" in each]
     assert re.search(r"rests 0\.\d+ m \(body 'mast'\) and 0\.\d+ rad", warning)
+
+
+def test_distances_of_places_of_rest_are_known_in_space() -> None:
+    text = "format: 1\ndimension: 3\ntime: {end: 1}\nbodies:\n"
+    text += "".join(
+        f"  {name}: {{mass: 1, inertia: [1, 1, 1], position: [{x}, 0, 0]}}\n" for name, x in (("a", 0), ("b", 1))
+    )
+    still = np.array([0.0, 0, 0, 1, 0, 0, 0] * 2)
+    moved, half = still.copy(), 0.5 * 0.3
+    moved[:3] = 0.03, 0.0, 0.04
+    moved[10:14] = np.cos(half), 0.0, np.sin(half), 0.0  # b has turned by 0.3 about y
+    far = _Distance(read_case(text), SPATIAL, still, moved)
+    assert (far.distance, far.body) == (pytest.approx(0.05, rel=1e-14), "a")
+    assert (far.angle, far.turned) == (pytest.approx(0.3, rel=1e-12), "b")

@@ -115,3 +115,33 @@ def test_a_softer_spring_lets_the_arm_fall_as_fast_as_check_says() -> None:
     assert growing["rate"] == pytest.approx(rate, rel=1e-9)
     assert found["loose"] == 0
     assert abs(simulate(case).q[-1, 2]) > 0.1
+
+
+@pytest.mark.parametrize("push", [True, False])
+def test_a_slide_settles_where_the_ends_of_its_spring_meet(push: bool) -> None:
+    loads = "[0.2, 0]" if push else "[{table: [[0, 0], [1, 1]]}, 0]"
+    text = f"""
+format: 1
+time: {{end: 1}}
+bodies: {{slide: {{mass: 2, inertia: 1, position: [1, 0]}}}}
+joints: [{{type: prismatic, bodies: [ground, slide], at: [1, 0], axis: [1, 0]}}]
+members:
+  spring:
+    from: {{body: ground, at: [0, 0]}}
+    to: {{body: slide, at: [1, 0]}}
+    law: {{type: spring, stiffness: 8, free_length: 0}}
+loads: [{{body: slide, force: {loads}}}]
+objectives: {{G: {{response: {{displacement: {{body: slide, component: x}}}}, over_time: final}}}}
+solver: {{settle: true, tolerance: 1e-9}}
+design: {{initial: 0.5, lower: 0.1, upper: 1}}
+"""
+    found = evaluate(read_case(text))
+    k = 0.5 * 8.0
+    w = np.sqrt(k / 2.0)
+    # pushed it rests at F / k; else it rests at no length, and a force that grows with time moves it from there
+    value, slope = 0.2 / k, -0.2 / k**2
+    if not push:
+        value = (1.0 - np.sin(w) / w) / k
+        slope = -(1.0 - np.sin(w) / w) / k**2 - (w * np.cos(w) - np.sin(w)) / w**2 / (4.0 * w) / k
+    assert found.objectives["G"] == pytest.approx(value - 1.0, abs=1e-10)
+    assert found.gradients["G"] == pytest.approx([8.0 * slope], abs=1e-9)
