@@ -7,6 +7,7 @@
 #   make lint, make types         ruff, and who may import whom; mypy
 #   make docs                     the documentation, into site/index.html
 #   make reproduce                every figure and table of the paper, into results/index.html
+#   make gallery                  compute the cases of gallery/, draw them, write docs/gallery.md
 #   make bench                    measure what the pages quote (SECTIONS="speed bars" for some of it)
 #   make bench PEERS=DIR          compare with the programs in DIR, run by PEERS_PYTHON
 #   make peers                    compare with other programs, which it installs (SECTIONS=ring for some of it)
@@ -37,10 +38,10 @@ PEERS_PYTHON ?= $(BIN)/python
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DELETE_ON_ERROR:
-.PHONY: help run test test-lowest test-numba lint types docs reproduce bench peers readme wheel clean
+.PHONY: help run test test-lowest test-numba lint types docs reproduce gallery bench peers readme wheel clean
 
 help:
-	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,15p
+	@sed -n 's/^# \{0,1\}//p' Makefile | sed -n 3,16p
 
 # Installed in place, so that the sources are current; anew only when the project's requirements change.
 $(VENV)/.ready: pyproject.toml
@@ -126,6 +127,9 @@ $(VENV)/.ready-docs: $(VENV)/.ready
 docs: $(VENV)/.ready-docs
 	$(BIN)/python -m mkdocs build --strict
 	@echo open site/index.html
+
+gallery: $(VENV)/.ready-plot
+	$(BIN)/python -m benchmarks.gallery
 
 # what benchmarks compare with beside the peers
 $(VENV)/.ready-bench: $(VENV)/.ready

@@ -8,7 +8,7 @@ import numpy as np
 from mdstopo.case.model import GROUND, Case
 from mdstopo.plots.glyphs import glyphs
 from mdstopo.plots.member_lines import draw_members
-from mdstopo.plots.scenery import edge_at, ends_at, start_state
+from mdstopo.plots.scenery import edge_at, ends_at, own_points, start_state
 from mdstopo.plots.shapes import Shape, followed, planar_shapes
 from mdstopo.plots.source import Floats, Source
 from mdstopo.plots.space_layout import draw_space
@@ -22,6 +22,8 @@ from mdstopo.scene.points import points_at
 FAR, MARGIN = 2.0, 0.12
 #: columns of a legend
 COLUMNS = 3
+#: points of ground that have its symbol, at most
+MOST_GROUND = 60
 
 
 def draw(
@@ -68,7 +70,7 @@ def _overlaid(
         size = 3 if case.dimension == 2 else 7
         places = np.array([state[size * k : size * k + case.dimension] for _, state in panels])
         axis.plot(*stage.seen(places).T, ":", color=ink("middle"), linewidth=0.7, zorder=1.7)
-    told = ", ".join(f"{at:g}" for at, _ in panels if at is not None)
+    told = ", ".join(f"{at:.3g}" for at, _ in panels if at is not None)
     axis.set_title(f"t = {told} s", loc="left")
     add_legend(figure, axis, thick)
     return figure
@@ -138,12 +140,20 @@ def draw_bodies(axis: Any, case: Case, q: Floats, faint: float = 1.0) -> None:
         if points:
             places = points_at(case, name, np.concatenate(points), q[None])[0]
             axis.plot(*places.T, ".", color=own, markersize=2, alpha=faint, zorder=2.6)
-            if name == GROUND and not any(len(followed(grid)) for grid in points):
-                for place in places:
-                    draw_glyph(axis, glyphs()["ground"], place)
+        if name == GROUND and faint == 1.0:
+            _ground(axis, case)
         if name != GROUND:
             label = name if faint == 1.0 else None
             axis.plot(q[3 * k], q[3 * k + 1], "+", color=own, markersize=6, label=label, alpha=faint, zorder=2.6)
+
+
+def _ground(axis: Any, case: Case) -> None:
+    """The symbol of ground at its points that are on no line, where they are few."""
+    lines = [line for grid in case.points.values() if grid.body == GROUND for line in followed(grid.local)]
+    drawn = {tuple(point) for line in lines for point in line.tolist()}
+    loose = [point for point in np.unique(own_points(case, GROUND), axis=0) if tuple(point.tolist()) not in drawn]
+    for place in loose if len(loose) <= MOST_GROUND else ():
+        draw_glyph(axis, glyphs()["ground"], place)
 
 
 def _shape(axis: Any, case: Case, name: str, shape: Shape, q: Floats, own: str, faint: float) -> None:

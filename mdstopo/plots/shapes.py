@@ -16,6 +16,8 @@ from mdstopo.scene.points import points_at
 #: points that a line has at least; how far apart they may be, in distances of the two before; how far its ends may be
 #: apart where it is closed
 LINE, UNEVEN, CLOSED = 4, 1.6, 1.6
+#: points up to which a line is one only where it is straight: four posts around a scene are no fence
+FEW = 5
 #: arms that a body has at most: more would look like members
 MOST_ARMS = 4
 #: of the size of a body: what is nearer to its border than that is not within it; what is nearer to a line is on it
@@ -83,13 +85,18 @@ def followed(points: Floats) -> list[Floats]:
         if k < len(gaps) and gaps[k] <= UNEVEN * gaps[k - 1] and gaps[k - 1] <= UNEVEN * gaps[k]:
             continue
         line = points[first : k + 1]
-        if len(line) >= LINE:
+        if len(line) > FEW or (len(line) >= LINE and _is_straight(line)):
             is_closed = 0.0 < np.linalg.norm(line[-1] - line[0]) <= CLOSED * gaps[first:k].max()
             found.append(np.concatenate([line, line[:1]]) if is_closed else line)
             first = k + 1 if k < len(gaps) and gaps[k] > gaps[k - 1] else k
         else:
             first = k
     return found
+
+
+def _is_straight(line: Floats) -> bool:
+    spread = np.linalg.svd(line - line.mean(axis=0), compute_uv=False)
+    return bool(spread[1] <= BORDER * spread[0])
 
 
 def others_within(case: Case, body: str, corners: Floats) -> bool:

@@ -147,3 +147,9 @@ objectives:
         )
     )
     assert len(solid(drawn, "frame").faces) == 6 + 12 * 24
+
+
+def test_few_points_are_a_line_only_where_they_are_straight() -> None:
+    posts = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+    assert followed(posts) == []
+    assert len(followed(np.linspace([0.0, 0.0], [3.0, 1.0], 4))) == 1
