@@ -1,9 +1,9 @@
 """What must not change by a change of structure: values, gradients and iterates, kept to the last bit.
 
 `python -m benchmarks golden --check FILE` computes everything that is kept in the file and tells what differs;
-`--write FILE` keeps what is computed now. Kept are, for every case in `cases/`, each integrator and each sensitivity
-method that the case can use, objectives, constraints and gradients at one design; and the iterates of the paper's
-scenes.
+`--write FILE` keeps what is computed now. Kept are, for every planar case in `cases/`, each integrator and each
+sensitivity method that the case can use, objectives, constraints and gradients at one design; and the iterates of the
+paper's scenes.
 
 Bits are the same only with the same processor and the same versions of the compiler (docs/accuracy.md). On others, what
 is computed has to agree to the case's tolerance.
@@ -65,7 +65,7 @@ class Finding:
 
 def names() -> list[str]:
     """All items: CASE/INTEGRATOR/METHOD and CASE/iterates."""
-    cases = sorted(path.stem for path in CASES.glob("*.yaml"))
+    cases = sorted(path.stem for path in CASES.glob("*.yaml") if load_case(path).dimension == 2)
     methods = [name for name in SENSITIVITIES if name != "auto"]
     single = [f"{case}/{integrator}/{method}" for case in cases for integrator in INTEGRATORS for method in methods]
     return single + [f"{case}/iterates" for case in ITERATED]

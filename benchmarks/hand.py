@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mdstopo import Case
+from mdstopo.case.parts import MemberGroup
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
 from mdstopo.optimizer.gsao import Gsao
@@ -23,9 +24,9 @@ from mdstopo.optimizer.scalarisation import Scalarisation
 from mdstopo.settings.optimizer_presets import settings
 
 Floats = NDArray[np.float64]
-#: ends P and Q of one member, in m, global axes, at the start
-Ends = tuple[tuple[float, float], tuple[float, float]]
-#: by part, whose first word is a group: the members that share one size
+#: ends P and Q of one member, in m, global axes, at the start; two or three coordinates each
+Ends = tuple[tuple[float, ...], tuple[float, ...]]
+#: by part, whose first word is a group, or how the names of its groups begin: the members that share one size
 Hand = Mapping[str, Sequence[Ends]]
 
 #: iterations that its sizes are given, and shares of the upper bounds that they begin with
@@ -34,7 +35,13 @@ ITERATIONS, STARTS = 40, (0.5, 1.0)
 
 def mirrored(*members: Ends) -> list[Ends]:
     """Members and their mirror images, x against -x."""
-    return [((side * p[0], p[1]), (side * q[0], q[1])) for side in (1, -1) for p, q in members]
+    return [((side * p[0], *p[1:]), (side * q[0], *q[1:])) for side in (1, -1) for p, q in members]
+
+
+def in_quarters(*members: Ends) -> list[Ends]:
+    """Members and their mirror images, x against -x and y against -y."""
+    both = mirrored(*members)
+    return [((p[0], side * p[1], *p[2:]), (q[0], side * q[1], *q[2:])) for side in (1, -1) for p, q in both]
 
 
 HANDS: dict[str, Hand] = {
@@ -74,6 +81,12 @@ HANDS: dict[str, Hand] = {
         "left_struts lower": [((-1.9, 0), (-1, 0.9)), ((-1.9, 0), (-0.6, 0.9))],
         "right_struts lower": [((1.9, 0), (1, 0.9)), ((1.9, 0), (0.6, 0.9))],
     },
+    "cargo": {
+        # as in the Code's own example four chains athwart on either side at 40 degrees, and at either end a pair at 40
+        # and one at 12 degrees
+        "side chains": in_quarters(((0.6, 2, 2.4), (0.6, 4.8, 0)), ((2.4, 2, 2.4), (2.4, 4.8, 0))),
+        "end chains": in_quarters(((3, 0.8, 2.4), (5.8, 0.8, 0)), ((3, 0.8, 0.6), (5.8, 0.8, 0))),
+    },
 }  # fmt: skip
 
 
@@ -84,23 +97,32 @@ def places(case: Case, hand: Hand) -> list[tuple[str, list[int]]]:
     """
     found = []
     for part, members in hand.items():
-        group = next(each for each in case.design_groups if each.name == part.split()[0])
-        first = case.group_slices[group.name].start
-        p, q = group.from_world[group.from_index], group.to_world[group.to_index]
+        name = part.split()[0]
+        groups = [each for each in case.design_groups if each.name == name or each.name.startswith(f"{name}_")]
+        places_of = [np.arange(own.start, own.stop) for own in (case.group_slices[each.name] for each in groups)]
+        p, q = (np.concatenate(ends) for ends in zip(*map(_ends, groups), strict=True))
         chosen = []
         for ends in members:
-            off = np.hypot(*(p - ends[0]).T) + np.hypot(*(q - ends[1]).T)
+            off = np.linalg.norm(p - ends[0], axis=1) + np.linalg.norm(q - ends[1], axis=1)
             if off.min() > 0.02:
-                raise ValueError(f"{case.name}: no member of {group.name} joins {ends[0]} with {ends[1]}")
-            chosen.append(first + int(off.argmin()))
+                raise ValueError(f"{case.name}: no member of {name} joins {ends[0]} with {ends[1]}")
+            chosen.append(int(np.concatenate(places_of)[off.argmin()]))
         found.append((part, chosen))
     return found
 
 
+def _ends(group: MemberGroup) -> tuple[Floats, Floats]:
+    return group.from_world[group.from_index], group.to_world[group.to_index]
+
+
 def even(case: Case) -> list[tuple[str, list[int]]]:
-    """The simplest rule, as parts of a design: all candidates of a group have one size."""
-    ranges = ((group.name, case.group_slices[group.name]) for group in case.design_groups)
-    return [(name, list(range(own.start, own.stop))) for name, own in ranges]
+    """The simplest rule, as parts of a design: all candidates of a group, and of its mirror images, have one size."""
+    parts: dict[str, list[int]] = {}
+    images = {name: names[0] for names in case.mirrored for name in names}
+    for group in case.design_groups:
+        own = case.group_slices[group.name]
+        parts.setdefault(images.get(group.name, group.name), []).extend(range(own.start, own.stop))
+    return list(parts.items())
 
 
 class Sizes:
@@ -108,24 +130,29 @@ class Sizes:
 
     def __init__(self, problem: DesignProblem, parts: list[tuple[str, list[int]]]) -> None:
         self.problem = problem
-        self.spread = np.zeros((len(problem.initial), len(parts)))
-        for k, (_, chosen) in enumerate(parts):
-            self.spread[chosen, k] = 1.0
+        n = problem.space.n_alpha
+        columns = [np.isin(np.arange(n), chosen).astype(np.float64) for _, chosen in parts]
+        # of members that share one alpha all are in a part, or none
+        self.spread = np.column_stack([problem.space.reduce(column) for column in columns])
         rest = problem.lower * (1.0 - self.spread.sum(axis=1))
         self.rest = rest
-        self.lower = np.array([problem.lower[chosen].max() for _, chosen in parts])
-        self.upper = np.array([problem.upper[chosen].min() for _, chosen in parts])
+        self.lower = np.array([problem.lower[column > 0.0].max() for column in self.spread.T])
+        self.upper = np.array([problem.upper[column > 0.0].min() for column in self.spread.T])
         self.initial = 0.5 * self.upper
         rows = problem.linear
         self.linear = LinearRows(rows.A @ self.spread, rows.b - rows.A @ rest, rows.equal)
 
     def design(self, sizes: Floats) -> Floats:
         """alpha (N,)."""
+        return np.asarray(self.problem.space.expand(self._shared(sizes)))
+
+    def _shared(self, sizes: Floats) -> Floats:
+        """The optimiser's variables of the case."""
         return np.asarray(self.rest + self.spread @ sizes)
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """A sample of the case, seen from the sizes."""
-        sample = self.problem.evaluate(self.design(x), gradient)
+        sample = self.problem.evaluate(self._shared(x), gradient)
         if not len(sample.gradients):
             return sample
         slopes = {

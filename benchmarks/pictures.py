@@ -22,7 +22,11 @@ from mdstopo.plots.style import COLOURS, new_figure, save, styled
 IMAGES = Path(__file__).resolve().parent.parent / "docs" / "images"
 
 #: pictures of the motion: application, load case, time in s, end of the name
-MOMENTS = {"restraint": ("forward", 0.13, "far"), "lander": ("level", 0.206, "deep")}
+MOMENTS = {
+    "restraint": ("forward", 0.13, "far"),
+    "lander": ("level", 0.206, "deep"),
+    "cargo": ("rolling", 4.2, "leaning"),
+}
 #: the problem whose run is drawn, and what is drawn of an excess at least
 LIMITS, LEAST = "four-bar very tight", 1e-9
 #: points of a front and iterations of each of its solves
@@ -41,7 +45,7 @@ def commands(name: str, folder: Path, fronts: bool) -> Iterator[list[str]]:
         load_case, time, end = MOMENTS[name]
         where = ["--load-case", load_case, "--time", f"{time:g}"]
         yield ["plot", str(folder / "design.h5"), "layout", *where, "--out", str(IMAGES / f"{name}-{end}.svg")]
-    if fronts:
+    if fronts and name in FRONTS:
         points, iterations = FRONTS[name]
         result, limit = str(folder / "front.h5"), f"optimizer.max_iterations={iterations}"
         yield ["pareto", case, "--points", str(points), "--method", "nbi", "--set", limit, "--out", result]
