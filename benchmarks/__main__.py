@@ -23,6 +23,7 @@ SECTIONS = {
     "lifts": "every planar case of the project beside itself in space: values and gradients",
     "rows": "cost of many competing peaks and members, whose gradients are pulled back in one sweep",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
+    "securing": "cargo on a ship's deck: the hand calculation of the Code beside the motion",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "optimum": "does the optimiser find the optimum, is its last word true; beside other optimisers",
@@ -59,6 +60,8 @@ PAGES = {
     "space": "docs/performance.md",
     "fronts": "docs/performance.md",
 }
+#: the same of sections that `--pages` writes
+TOLD = {"bound": "docs/theory/bound.md", "securing": "docs/applications/cargo.md"}
 
 
 def main() -> int:
@@ -112,8 +115,8 @@ def main() -> int:
             replace_block(Path(PAGES[name]), name, "\n".join([*printed, machine]))
         if chosen.pages and name == "applications":
             write_pages(printed, machine, chosen.only)
-        if chosen.pages and name == "bound":
-            replace_block(Path("docs/theory/bound.md"), name, "\n".join([*printed, machine]))
+        if chosen.pages and name in TOLD:
+            replace_block(Path(TOLD[name]), name, "\n".join([*printed, machine]))
         if chosen.pages and name in PEERS:
             replace_block(Path("docs/comparison.md"), name, "\n".join([*summary, machine]))
     if chosen.readme:

@@ -20,7 +20,7 @@ from mdstopo.optimizer.scalarisation import Scalarisation
 
 Floats = NDArray[np.float64]
 
-APPLICATIONS = ("restraint", "tiedown", "mooring", "lander", "touchdown")
+APPLICATIONS = ("restraint", "tiedown", "mooring", "lander", "touchdown", "cargo")
 #: what the constraints are held to, relative to their bounds, how much finer they are computed, seconds allowed in the
 #: plane and in space
 HELD, FINER, SECONDS = 1e-6, 100.0, {2: 120.0, 3: 180.0}
@@ -111,10 +111,16 @@ def values(case: Case, designs: dict[str, Evaluation]) -> Table:
         rows.append([label, "", *(significant(found.objectives[objective.name], 4) for found in designs.values())])
     for i, row in enumerate(case.constraints):
         sense = {"limit": "at most", "at_least": "at least", "equals": "exactly"}[row.sense]
-        label = f"volume of {', '.join(row.groups)}" if isinstance(row, VolumeRow) else described(row)
+        label = volume_of(case, row) if isinstance(row, VolumeRow) else described(row)
         cells = [significant(found.constraints[i] + row.bound, 4) for found in designs.values()]
         rows.append([label, f"{sense} {row.bound:g}", *cells])
     return Table(f"{case.title}: what is reached", ("", "bound", *designs), rows)
+
+
+def volume_of(case: Case, row: VolumeRow) -> str:
+    """Which groups a volume row adds up."""
+    whole = len(row.groups) > 1 and len(row.groups) == len(case.design_groups)
+    return "volume of all" if whole else f"volume of {', '.join(row.groups)}"
 
 
 def described(looked: Objective | ResponseRow) -> str:

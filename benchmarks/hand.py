@@ -37,7 +37,13 @@ ITERATIONS, STARTS = 40, (0.5, 1.0)
 
 def mirrored(*members: Ends) -> list[Ends]:
     """Members and their mirror images, x against -x."""
-    return [((side * p[0], p[1]), (side * q[0], q[1])) for side in (1, -1) for p, q in members]
+    return [((side * p[0], *p[1:]), (side * q[0], *q[1:])) for side in (1, -1) for p, q in members]
+
+
+def in_quarters(*members: Ends) -> list[Ends]:
+    """Members and their mirror images, x against -x and y against -y."""
+    both = mirrored(*members)
+    return [((p[0], side * p[1], *p[2:]), (q[0], side * q[1], *q[2:])) for side in (1, -1) for p, q in both]
 
 
 def of_four_legs(*members: Ends) -> list[Ends]:
@@ -96,6 +102,12 @@ HANDS: dict[str, Hand] = {
         "crush lower": of_four_legs(((2.2, 0, 0), (1, 1, 0.9))),
         "struts upper": of_four_legs(((2.2, 0, 0), (1, 0.2, 2.1))),
         "struts lower": of_four_legs(((2.2, 0, 0), (1, 1, 0.9))),
+    },
+    "cargo": {
+        # as in the Code's own example four chains athwart on either side at 40 degrees, and at either end a pair at 40
+        # and one at 12 degrees
+        "side chains": in_quarters(((0.6, 2, 2.4), (0.6, 4.8, 0)), ((2.4, 2, 2.4), (2.4, 4.8, 0))),
+        "end chains": in_quarters(((3, 0.8, 2.4), (5.8, 0.8, 0)), ((3, 0.8, 0.6), (5.8, 0.8, 0))),
     },
 }  # fmt: skip
 
