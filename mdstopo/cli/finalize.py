@@ -146,7 +146,7 @@ def _say(output: Output, done: "Finalized", place: Path) -> None:
     if done.text:
         count = len(done.kept)
         left_out = f"; {count - done.written} of {count} have no size and are left out" if count > done.written else ""
-        rows.append(["case", f"{place}, {counted(done.written, 'member')}{left_out}"])
+        rows += [["written", f"{counted(done.written, 'member')}{left_out}"], ["case", str(place)]]
     output.table(rows)
 
 
