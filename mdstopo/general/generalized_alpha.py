@@ -237,7 +237,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             happens = False
             who = nowhere
             if switching:
-                margin, who = smallest_margin(model, segment, t + h, member_state, rel)
+                margin, who = smallest_margin(model, segment, member_state, rel)
                 low = 0.0
                 high = h
                 top = 0
@@ -251,8 +251,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(model, left_q, left_v, before)
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
                     dip, near = first_sign(
-                        model, segment, t + low, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY],
-                        before, rel, cut[top] - low, rounding,
+                        model, segment, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before, rel,
+                        cut[top] - low, rounding,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
                     if middle < 0.0 or cuts == CUTS:
@@ -275,18 +275,18 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         where[0] = singular
                         return code, count, events, t
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
-                    value, near_who = smallest_margin(model, segment, t + middle, member_state, rel)
+                    value, near_who = smallest_margin(model, segment, member_state, rel)
                     if value < -rounding:
                         high = middle
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, t + middle, member_state, rel, near_who):
+                    if value < graze and matters(model, member_state, rel, near_who):
                         where[2] = near_who
                 relative_pose(model, left_q, left_v, before)
                 happens = margin < -rounding
                 if happens:
-                    at_low, _ = smallest_margin(model, segment, t + low, member_state, before)
+                    at_low, _ = smallest_margin(model, segment, member_state, before)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
@@ -315,7 +315,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             where[0] = singular
                             return code, count, events, t
                         relative_pose(model, trial_q, trial[VELOCITY], rel)
-                        value, who = smallest_margin(model, segment, t + middle, member_state, rel)
+                        value, who = smallest_margin(model, segment, member_state, rel)
                         note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side

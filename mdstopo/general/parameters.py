@@ -32,7 +32,6 @@ from mdstopo.general.model import (
     DESIGN,
     GROUP,
     INERTER,
-    MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
     START,
@@ -49,7 +48,6 @@ from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
     FREE_LENGTH,
-    law_margin_by_time,
     law_margin_slope,
     law_margin_slopes,
     law_slopes,
@@ -88,9 +86,8 @@ def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row,
     x -= member_state[SET, i]
     level = level_of(model, segment, k, t)
     return law_slopes(
-        model.block[k, CODE], model.law[k], place, x, rate, int(member_state[MODE, i]), t, level, model.curves,
-        model.member[MEMBER_FREE_LENGTH, i],
-    )  # fmt: skip
+        model.block[k, CODE], model.law[k], place, x, rate, int(member_state[MODE, i]), t, level, model.curves
+    )
 
 
 @kernel
@@ -174,6 +171,8 @@ def event_slope(model, history, member_state, event, e):
     for part in range(2):
         for d in range(model.mass.shape[0]):
             given = given and history.saltation[event, part, d] == 0.0
+    if given:
+        return 0.0
     segment = history.index[state - 1, SEGMENT]
     q = history.q[state]
     v = history.v[state]
@@ -183,14 +182,11 @@ def event_slope(model, history, member_state, event, e):
     x -= history.kept[event, SET_BEFORE]
     code = model.block[k, CODE]
     mode = int(history.event[event, OLD])
-    t = history.t[state]
-    rest = model.member[MEMBER_FREE_LENGTH, who]
-    by_time = law_margin_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
-    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, t, model.curves, rest)
-    if by_p == 0.0 or (given and by_time == 0.0):
+    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, model.curves)
+    if by_p == 0.0:
         return 0.0
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
-    speed = by_x * rate + by_time
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
+    speed = by_x * rate
     if by_rate != 0.0:
         a = np.empty(model.mass.shape[0])
         lam = np.empty(model.size[0])
