@@ -199,15 +199,16 @@ class FakeEngineWithEvaluations(FakeEngine):
 
 
 class DyingEngine(FakeEngineWithEvaluations):
-    """Kills a worker that uses it, after a second."""
+    """Kills a worker that uses it, a second after the first evaluation: before it is decided which starts go on."""
 
     def problem(self) -> FakeEngine:
-        return _Dying(self.case, 0.1, 10)
+        return _Dying(self.case, 0.2, 2)
 
 
 class _Dying(FakeEngine):
     def evaluate(self, x: Floats, gradient: bool = True) -> Any:
         if self.count + 1 >= self.fail_from:
+            time.sleep(1.0)
             os.kill(os.getpid(), signal.SIGKILL)
         return super().evaluate(x, gradient)
 
@@ -216,7 +217,7 @@ class DyingOnceEngine(FakeEngineWithEvaluations):
     """Kills the first worker that has used it for a while; `mark` is a file that says that one is dead."""
 
     def __init__(self, case: Case, mark: str) -> None:
-        super().__init__(case, 0.1)
+        super().__init__(case, 0.4)
         self.mark = mark
 
     def problem(self) -> FakeEngine:
@@ -225,11 +226,11 @@ class DyingOnceEngine(FakeEngineWithEvaluations):
 
 class _DyingOnce(FakeEngine):
     def __init__(self, case: Case, mark: str) -> None:
-        super().__init__(case, 0.1)
+        super().__init__(case, 0.4)
         self.mark = mark
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Any:
-        if self.count == 8:
+        if self.count == 2:
             with suppress(FileExistsError):
                 os.close(os.open(self.mark, os.O_CREAT | os.O_EXCL))
                 os.kill(os.getpid(), signal.SIGKILL)
