@@ -65,7 +65,7 @@ def forward(hinges: bool) -> Iterator[Entry]:
 def two_bodies_in_space() -> Iterator[Entry]:
     """Two bodies in space; `auto` takes the best integrator that there is."""
     yield from ours(("auto",), TOLERANCES[3:])
-    for steps in (4, 6, 8, 12):
+    for steps in (2, 3, 4, 6, 8, 12, 16):
         yield Entry("jax", {"steps": steps})
     for tolerance in (1e-6, 1e-8, 1e-10):
         yield Entry("casadi", {"tolerance": tolerance})
