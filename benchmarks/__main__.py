@@ -42,13 +42,16 @@ SECTIONS = {
 }
 
 #: what compares with other programs is no part of a run without names: they compile for minutes
-PEERS = ("peers", "ring", "forward", "peers_space", "ring_space", "forward_space", "million")
+PEERS = ("peers", "ring", "forward", "million")
+
+#: the same with scenes in space, which no page has yet
+PEERS_IN_SPACE = ("peers_space", "ring_space", "forward_space")
 
 #: what looks for mistakes instead of measuring
 CAMPAIGNS = ("damage", "hunt", "hunt_space")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *CAMPAIGNS, "optimum", "parts", "golden", "lifts")
+NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {
@@ -125,7 +128,7 @@ def main() -> int:
 
 
 def _tables(name: str, chosen: argparse.Namespace) -> Iterator[Table]:
-    module = "benchmarks.peers.sections" if name in PEERS else f"benchmarks.{name}"
+    module = "benchmarks.peers.sections" if name in (*PEERS, *PEERS_IN_SPACE) else f"benchmarks.{name}"
     section: Callable[..., Iterator[Table]] = getattr(import_module(module), name)
     if name in ("hunt", "hunt_space"):
         return section(chosen.minutes, chosen.seed)

@@ -20,7 +20,18 @@ def make(problem: Problem, steps: int = 4, refine: bool = True, rolled: bool = F
     rolled: whether the stages of a step are a loop, which compiles faster.
     """
     rate, energy = model_of(problem)
-    start, h = start_of(problem), problem.end / steps
+    made: Objective = objective_of(problem, steps_of(problem, (rate, energy), start_of(problem), steps, refine, rolled))
+    return made
+
+
+def steps_of(problem: Problem, model: Any, start: Array, steps: int, refine: bool, rolled: bool) -> Any:
+    """The energy at the end, or its highest peak, as a function of the springs.
+
+    problem: what is computed, of which only the end and whether a peak is wanted are looked at. model: rate and energy,
+    functions of a state and the springs. start: the state at the start. steps, refine, rolled: as of `make`.
+    """
+    rate, energy = model
+    h = problem.end / steps
     advance = jax.checkpoint(_stepper(rate, rolled))
     power = power_of(rate, energy)
 
@@ -67,27 +78,7 @@ def make(problem: Problem, steps: int = 4, refine: bool = True, rolled: bool = F
         )
         return inside, k, part
 
-    made: Objective = objective_of(problem, objective)
-    return made
-
-
-def steps_of(problem: Problem, rate: Any, energy: Any, start: Array, steps: int, rolled: bool) -> Any:
-    """The energy at the last step, or the highest of them, as a function of the springs."""
-    h = problem.end / steps
-    advance = jax.checkpoint(_stepper(rate, rolled))
-
-    def function(springs: Any) -> Array:
-        def one(y: Array, _: None) -> tuple[Array, Array]:
-            following = advance(y, h, springs)
-            return following, following
-
-        last, found = jax.lax.scan(one, start, None, length=steps)
-        if not problem.peak:
-            return energy(last, springs)
-        heights = jax.lax.map(lambda y: energy(y, springs), jax.lax.stop_gradient(found))
-        return energy(found[jnp.argmax(heights)], springs)
-
-    return function
+    return objective
 
 
 def _stepper(rate: Any, rolled: bool) -> Any:

@@ -63,9 +63,9 @@ def forward(hinges: bool) -> Iterator[Entry]:
 
 
 def two_bodies_in_space() -> Iterator[Entry]:
-    """Two bodies in space, whose peak is at the end; `auto` takes the best integrator that there is."""
-    yield from ours(("auto", "runge_kutta"), TOLERANCES[3:])
-    for steps in (2, 3, 4, 6, 8, 10, 12, 16):
+    """Two bodies in space; `auto` takes the best integrator that there is."""
+    yield from ours(("auto",), TOLERANCES[3:])
+    for steps in (2, 3, 4, 6, 8, 12, 16):
         yield Entry("jax", {"steps": steps})
     for tolerance in (1e-6, 1e-8, 1e-10):
         yield Entry("casadi", {"tolerance": tolerance})

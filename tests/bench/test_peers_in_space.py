@@ -1,0 +1,79 @@
+"""What other programs are given of scenes in space is what the case says, and the way back gives the same case."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mdstopo.case.reader import read_case
+
+
+@pytest.fixture(autouse=True)
+def _benchmarks(monkeypatch):
+    from tests.test_project import ROOT
+
+    monkeypatch.syspath_prepend(str(ROOT))
+
+
+def content(name):
+    from benchmarks.peers import scenes
+
+    return scenes.spatial_pair() if name == "pair" else scenes.spatial_ring()
+
+
+@pytest.mark.parametrize("name", ["pair", "ring"])
+def test_a_scene_in_space_survives_the_way_through_arrays(name, tmp_path):
+    from benchmarks.peers.ours_space import case_of
+    from benchmarks.peers.problem import Problem
+    from benchmarks.peers.space_problem import SpatialProblem
+    from benchmarks.peers.translate import spatial_problem_of
+
+    problem = spatial_problem_of(read_case(content(name)))
+    problem.save(tmp_path / "problem.npz")
+    stored = Problem.load(tmp_path / "problem.npz")
+    assert isinstance(stored, SpatialProblem)
+    again = spatial_problem_of(read_case(json.dumps(case_of(stored))))
+    for field in ("mass", "inertia", "start", "turn", "force", "groups", "first", "hinges"):
+        assert np.array_equal(getattr(again, field), getattr(problem, field)) or np.allclose(
+            getattr(again, field), getattr(problem, field), rtol=0.0, atol=1e-12
+        ), field
+    for field in ("p", "q", "at", "length", "stiffness"):
+        assert np.abs(getattr(again, field) - getattr(problem, field)).max(initial=0.0) <= 1e-12, field
+    assert (again.end, again.peak) == (problem.end, problem.peak)
+
+
+@pytest.mark.parametrize(("name", "bodies", "members", "joints"), [("pair", 2, 1020, 0), ("ring", 10, 1000, 11)])
+def test_scenes_in_space_are_as_large_as_they_say_and_store_nothing_at_the_start(name, bodies, members, joints):
+    from benchmarks.peers.translate import spatial_problem_of
+
+    problem = spatial_problem_of(read_case(content(name)))
+    assert (problem.bodies, problem.members, len(problem.hinges)) == (bodies, members, joints)
+    ones = np.ones(members)
+    assert problem.energy(ones, problem.pose) == pytest.approx(0.0, abs=1e-20)
+    moved = problem.pose
+    moved[0, :3] += [0.01, -0.02, 0.03]
+    assert problem.energy(ones, moved) > 0.01
+    assert problem.energy(2.0 * ones, moved) == pytest.approx(2.0 * problem.energy(ones, moved))
+
+
+def test_the_joints_of_the_ring_fit():
+    from benchmarks.peers.space_problem import spatial_world
+    from benchmarks.peers.translate import spatial_problem_of
+
+    problem = spatial_problem_of(read_case(content("ring")))
+    for bodies, ends in zip(problem.hinges.tolist(), problem.at, strict=True):
+        one, two = (spatial_world(problem.pose, body, at[None])[0] for body, at in zip(bodies, ends, strict=True))
+        assert one == pytest.approx(two, abs=1e-13)
+
+
+def test_what_is_not_at_rest_or_has_other_joints_is_not_for_peers():
+    from benchmarks.peers.translate import NotForPeersError, spatial_problem_of
+
+    document = json.loads(content("ring"))
+    document["bodies"]["b0"]["angular_velocity"] = [0, 0, 1]
+    with pytest.raises(NotForPeersError, match="at rest"):
+        spatial_problem_of(read_case(json.dumps(document)))
+    document = json.loads(content("ring"))
+    document["joints"][0] |= {"type": "universal", "axes": [[1, 0, 0], [0, 1, 0]]}
+    with pytest.raises(NotForPeersError, match="only spherical joints"):
+        spatial_problem_of(read_case(json.dumps(document)))
