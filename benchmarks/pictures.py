@@ -26,6 +26,7 @@ MOMENTS = {
     "restraint": ("forward", 0.13, "far"),
     "lander": ("level", 0.206, "deep"),
     "touchdown": ("corner", 0.377, "deep"),
+    "occupant": ("left", 0.097, "far"),
 }
 #: the problem whose run is drawn, and what is drawn of an excess at least
 LIMITS, LEAST = "four-bar very tight", 1e-9
