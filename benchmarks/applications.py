@@ -20,7 +20,7 @@ from mdstopo.optimizer.scalarisation import Scalarisation
 
 Floats = NDArray[np.float64]
 
-APPLICATIONS = ("restraint", "tiedown", "mooring", "lander", "touchdown", "cargo")
+APPLICATIONS = ("restraint", "tiedown", "mooring", "lander", "touchdown", "cargo", "occupant")
 #: what the constraints are held to, relative to their bounds, how much finer they are computed, seconds allowed in the
 #: plane and in space
 HELD, FINER, SECONDS = 1e-6, 100.0, {2: 120.0, 3: 180.0}

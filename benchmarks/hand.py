@@ -109,6 +109,17 @@ HANDS: dict[str, Hand] = {
         "side chains": in_quarters(((0.6, 2, 2.4), (0.6, 4.8, 0)), ((2.4, 2, 2.4), (2.4, 4.8, 0))),
         "end chains": in_quarters(((3, 0.8, 2.4), (5.8, 0.8, 0)), ((3, 0.8, 0.6), (5.8, 0.8, 0))),
     },
+    "occupant": {
+        # a three-point belt as in a car: from the middle of the pillar over clavicle and breastbone to the buckle, and
+        # from the buckle over the lap to the sill; beside the lap, because behind it the pelvis goes too far in `right`
+        "shoulder clavicle": [((-0.05, 0.13, 1.0), (-0.35, 0.35, 1.05))],
+        "shoulder breastbone": [((-0.01, 0.03, 0.88), (-0.35, 0.35, 1.05))],
+        "diagonal ribs": [((-0.03, -0.12, 0.72), (-0.25, -0.25, 0.4))],
+        "diagonal breastbone": [((-0.01, -0.02, 0.8), (0.05, -0.25, 0.4))],
+        "lap_outside": [((0.08, 0.0, 0.55), (0.05, 0.3, 0.35))],
+        "lap_inside upper": [((0.06, -0.15, 0.54), (-0.25, -0.25, 0.4)), ((0.08, 0.0, 0.55), (-0.25, -0.25, 0.4))],
+        "lap_inside lower": [((0.06, -0.15, 0.54), (-0.25, -0.25, 0.25)), ((0.08, 0.0, 0.55), (-0.25, -0.25, 0.25))],
+    },
 }  # fmt: skip
 
 

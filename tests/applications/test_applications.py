@@ -9,6 +9,7 @@ from benchmarks.hand import HANDS, Sizes, alike, even, of_four_legs, places
 from benchmarks.motions import DATA, texts
 from benchmarks.scenes import CASES
 from mdstopo import Case, evaluate, load_case, optimize
+from mdstopo.case.arrays import Table
 from mdstopo.case.model import CrushLaw, VolumeRow
 from mdstopo.design_problem import DesignProblem
 from mdstopo.engine import Evaluator
@@ -183,6 +184,40 @@ def test_the_lander_on_a_slope_stops_no_softer_than_anything_can_and_all_its_leg
             assert isinstance(law, CrushLaw)
             far = max(strokes(case, design, group, each.name)[there].max() for each in case.load_cases)
             assert 5 * law.force / law.stiffness < far < 0.7 * group.length[there].min()
+
+
+def test_the_pulse_of_the_occupant_has_the_occupant_load_criterion_that_is_published() -> None:
+    """Euro NCAP TB027: v is kept for 65 mm seen from the car; then z stops it, within 235 mm more. The car has stopped
+    by then, after v^2 / 2a: v t1 + v^2 / 2z - v^2 / 2a = 0.3 m with t1 from a t1^2 / 2 = 65 mm."""
+    (motion,) = case_of("occupant").load_case("straight").motions
+    assert motion.x is not None
+    assert isinstance(motion.x.signal, Table)
+    pulse = -motion.x.signal.values[:, 0]
+    speed = float(np.trapezoid(pulse, motion.x.signal.times))
+    assert olc(56 / 3.6, 20 * 9.81) / 9.81 == pytest.approx(23.8901345, abs=1e-7)
+    assert speed == pytest.approx(56 / 3.6, rel=1e-3)
+    assert olc(speed, pulse.max()) == pytest.approx(234.36, rel=2e-3)
+
+
+def olc(speed: float, deceleration: float) -> float:
+    """The occupant load criterion of a rectangular pulse that ends before the occupant stops, in m/s2."""
+    flight = np.sqrt(2.0 * 0.065 / deceleration)
+    return float(speed**2 / 2.0 / (0.3 + speed**2 / (2.0 * deceleration) - speed * flight))
+
+
+@pytest.mark.slow
+def test_the_belt_stops_the_chest_no_softer_than_anything_can_and_its_torsion_bars_give_way() -> None:
+    """Of a rectangular pulse a with speed v somebody who moves by D in the car feels at least a / (1 + 2 D a / v^2)."""
+    case = case_of("occupant")
+    design = read_design(CASES / "designs" / "occupant.txt", case.n_design)
+    a, v, far = 20 * 9.81, 56 / 3.6, 0.3
+    assert evaluate(case, design, gradient=False).objectives["straight"] > a / (1.0 + 2.0 * far * a / v**2)
+    for name in ("shoulder", "diagonal"):
+        group = next(each for each in case.design_groups if each.name == name)
+        there = design[case.group_slices[name]] >= 0.5
+        law = group.laws[0]
+        assert isinstance(law, CrushLaw)
+        assert strokes(case, design, group, "straight")[there].max() > law.gap + 2.0 * law.force / law.stiffness
 
 
 @pytest.mark.slow
