@@ -55,7 +55,7 @@ def load_case(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None 
         text, digest = text_in(place)
     except FileTextError as error:
         mistake = error.mistake
-        if not place.exists() and Path(path).name == str(path):
+        if Path(path).name == str(path) and not os.path.exists(place):
             mistake = Mistake("", f"{mistake.message}; cases that come with mdstopo: {', '.join(names())}", 1, 1)
         raise CaseError([mistake], str(path)) from None
     return read_case(text, path=place, overrides=overrides, sha256=digest)

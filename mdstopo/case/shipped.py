@@ -1,5 +1,6 @@
 """The cases that come with the package, found by name: in an installation beside its modules, in a checkout above."""
 
+import os
 from pathlib import Path
 
 
@@ -17,10 +18,10 @@ def names() -> list[str]:
 
 def case_file(path: Path) -> Path:
     """The file that is meant: `path`, or `path`.yaml, where there is one, else the case of that name, else `path`."""
-    if path.exists() or path.name != str(path):
+    if path.name != str(path) or os.path.exists(path):
         return path
     wanted = path if path.suffix in (".yaml", ".yml") else path.with_name(f"{path.name}.yaml")
+    if os.path.exists(wanted):  # false, too, for what can be no name of a file
+        return wanted
     shipped = folder() / wanted.name
-    if wanted.exists() or not shipped.is_file():
-        return wanted if wanted.exists() else path
-    return shipped
+    return shipped if os.path.isfile(shipped) else path
