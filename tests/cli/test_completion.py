@@ -72,7 +72,7 @@ def test_bash_completes_commands_options_values_and_files():
     assert completed("run", "--o") == ["--out", "--overwrite"]
     assert completed("gradient", "--method", "") == ["adjoint", "direct", "iterative", "constant_load"]
     assert completed("completion", "f") == ["fish"]
-    assert completed("check", "ca") == ["cases/a.yaml", "cases/b.yml"]
+    assert completed("check", "ca") == ["cases/a.yaml", "cases/b.yml", "cargo", "catch"]  # the last two come with it
 
 
 def test_cases_results_and_designs_are_offered_by_their_endings():
@@ -90,7 +90,7 @@ def test_cases_results_and_designs_are_offered_by_their_endings():
 
 def test_names_that_a_shell_must_quote_are_left_to_the_shell():
     Path("two words.yaml").touch()
-    assert offered("mdstopo run t", 2) == ["file,t"]
+    assert offered("mdstopo run t", 2) == ["file,t", "plain,tiedown", "plain,touchdown"]
     assert offered("mdstopo run ~/", 2) == ["file,~/"]
 
 

@@ -245,7 +245,7 @@ def test_long_names_are_whole_and_hide_nothing(named):
 
     with styled() as module:
         start = start_state(named.case)
-        layout = draw_space(module, named, [(None, start)])
+        layout = draw_space(module, named, [(None, start)], thickness(named))
         (legend,) = layout.legends
         assert inside(layout, legend)
         assert len(legend.get_texts()) == 12

@@ -137,7 +137,7 @@ def test_starts_go_through_the_stages_alike_on_any_number_of_processes_and_resum
     run_session(case, path=tmp_path / "two.h5", workers=2)
     run_session(case, path=tmp_path / "parts.h5", **stop_after(13))
     with h5py.File(tmp_path / "parts.h5") as file:
-        assert file["starts/status"][()].astype(str).tolist() == ["max_iterations", "running", "running"]
+        assert file["starts/status"][()].astype(str).tolist() == ["max_iterations", "running", "not_begun"]
     run_session(case, path=tmp_path / "parts.h5", resume=True, workers=2)
     assert_same_files(tmp_path / "one.h5", tmp_path / "two.h5")
     assert_same_files(tmp_path / "one.h5", tmp_path / "parts.h5")
