@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from mdstopo.case.definitions import Definitions
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
 from mdstopo.case.mesh_files import MeshFaces, MeshFile
-from mdstopo.case.not_yet import NotYet, NotYetAs
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.schema_case import FORMAT
@@ -177,8 +176,6 @@ def _value(kind: Kind, anchors: dict[int, str], path: str) -> str:
         return f"mapping from {_plural(kind.kind)} to {_value(kind.item, anchors, path)}"
     if isinstance(kind, ByKey):
         return f"mapping from {kind.what}: {_value(kind.item, anchors, path)}"
-    if isinstance(kind, NotYetAs):
-        return _value(kind.kind, anchors, path)
     if isinstance(kind, ByDepth):
         return ", or ".join(_value(part, anchors, path) for part in _parts(kind))
     if isinstance(kind, ByShape):
@@ -219,8 +216,6 @@ def _simple(kind: Kind) -> str:
         return f"`{kind.number}`"
     if isinstance(kind, OneOf):
         return ", ".join(f"`{number}`" for number in kind.numbers)
-    if isinstance(kind, NotYet):
-        return "nothing yet"
     texts: dict[type, str] = {
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
         MeshFile: "path of an STL or OBJ file", MeshFaces: "path of an STL or OBJ file", Anything: "any value",
