@@ -156,11 +156,7 @@ class Entry(Kernel):
         return self._callable(*arguments)
 
     def _wrapped(self) -> Any:
-        way()
-        from mdstopo.compiler import numba_plain
-        from mdstopo.compiler.tried import private
-
-        return numba_plain.outer(self.py_func, self.fastmath, kept=private() is None)
+        return way().wrapped(self.py_func, self.fastmath)
 
     def _inside(self) -> Any:
         return way().outer(self.py_func, self.fastmath)

@@ -20,18 +20,22 @@ def inner(function: Callable[..., Any], fastmath: frozenset[str], part: bool) ->
     return numba.njit(error_model="numpy", fastmath=set(fastmath) or False, forceinline=part)(function)
 
 
-def outer(function: Callable[..., Any], fastmath: frozenset[str], kept: bool = True) -> Any:
-    """Numba's object for a function that Python calls; kept: on the disk, in Numba's own cache."""
+def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
+    """Numba's object for a function that Python calls, kept on the disk in Numba's own cache."""
     config: Any = numba.config
     options: dict[str, Any] = {"error_model": "numpy", "fastmath": set(fastmath) or False}
     stated = config.CACHE_DIR
     try:
         config.CACHE_DIR = str(cache_folder() / "numba")  # Numba reads it when it makes the object
-        return numba.njit(cache=kept, **options)(function)
+        return numba.njit(cache=True, **options)(function)
     except RuntimeError:  # nothing can be written there
         return numba.njit(**options)(function)
     finally:
         config.CACHE_DIR = stated
+
+
+#: one that Python calls through Numba's own wrapper: any
+wrapped = outer
 
 
 def compile_for(dispatcher: Any, letters: str) -> None:

@@ -31,15 +31,18 @@ from numba import types
 from numba.core import analysis, cgutils, ir
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler, CompileResult
+from numba.core.compiler import Compiler, CompileResult, Flags
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.compiler_machinery import register_pass
+from numba.core.cpu import CPUContext
 from numba.core.imputils import impl_ret_borrowed
 from numba.core.lowering import Lower as NumbaLower
-from numba.core.registry import cpu_target
+from numba.core.registry import CPUDispatcher, CPUTarget
 from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 from numba.core.runtime.nrt import MemInfo
 from numba.core.serialize import dumps
-from numba.core.target_extension import get_local_target, jit_registry
+from numba.core.target_extension import CPU, dispatcher_registry, jit_registry, target_override, target_registry
+from numba.core.targetconfig import ConfigStack
 from numba.core.typed_passes import AnnotateTypes, BaseNativeLowering, NativeLowering, NopythonRewrites
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.core.untyped_passes import InlineClosureLikes
@@ -492,7 +495,7 @@ class Rolled(Optimised):
         full.run(self._final_module, builder)
 
 
-#: functions by the numbers in their symbols
+#: functions that nothing tells from others but their place in memory, by the numbers in their symbols
 _NUMBERED: dict[int, Callable[..., Any]] = {}
 
 
@@ -500,15 +503,32 @@ def number_of(function: Callable[..., Any]) -> int:
     """The number in a function's symbol, the same in every process; Numba's own counts what was compiled before.
 
     Two processes that compile side by side hand each other functions by the disk, and what several of these hold is
-    one function only where its symbol is the same.
+    one function only where its symbol is the same. Numba makes some of its functions anew for each use, equal but for
+    the types that they are compiled for, which are in the symbol as well.
     """
-    code = function.__code__
-    constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
-    told = f"{function.__module__} {function.__qualname__} {code.co_firstlineno} {code.co_names} {constants!r}"
-    number = int.from_bytes(hashlib.sha256(told.encode() + code.co_code).digest()[:4], "little")
-    while _NUMBERED.setdefault(number, function) is not function:
-        number += 1
+    told = told_of(function)
+    number = int.from_bytes(hashlib.sha256(told.encode()).digest()[:6], "little")
+    if _ADDRESS in told:
+        while _NUMBERED.setdefault(number, function) is not function:
+            number += 1
     return number
+
+
+#: how Python shows what it knows by its place in memory only
+_ADDRESS = " at 0x"
+
+
+def told_of(given: Any) -> str:
+    """What an object is, in words that are the same in every process where that is possible."""
+    written = getattr(given, "py_func", given)  # of a compiled function
+    code = getattr(written, "__code__", None)
+    if code is None:
+        return f"{type(given).__qualname__} {given!s}"
+    constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
+    names = f"{written.__module__} {written.__qualname__} {code.co_firstlineno} {code.co_names} {constants!r}"
+    held = [cell.cell_contents for cell in written.__closure__ or ()]
+    around = [told_of(each) for each in (*held, *(written.__defaults__ or ()))]
+    return f"{names} {code.co_code.hex()} {around}"
 
 
 def _compiler(library: type[Optimised]) -> type[Compiler]:
@@ -543,10 +563,16 @@ def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
     return _made(function, _OPTIMISED if fastmath else _ROLLED, fastmath, False)
 
 
+def wrapped(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
+    """Numba's object for a function that Python calls through Numba's own wrapper; it is not kept on the disk."""
+    options: dict[str, Any] = {"error_model": "numpy", "fastmath": _Sorted(fastmath) or False, "_target": _TARGET}
+    return numba.njit(**options)(function)
+
+
 def _made(function: Callable[..., Any], pipeline: type[Compiler], fastmath: frozenset[str], part: bool) -> Any:
     # Wrappers for calls from Python cost a large part of the compilation, so nothing has one.
     options: dict[str, Any] = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "pipeline_class": pipeline}
-    options |= {"error_model": "numpy", "fastmath": _Sorted(fastmath) or False, "forceinline": part}
+    options |= {"error_model": "numpy", "fastmath": _Sorted(fastmath) or False, "forceinline": part, "_target": _TARGET}
     return numba.njit(**options)(function)
 
 
@@ -778,23 +804,66 @@ class _Crew:
 # What Numba is spared
 # It asks again and again what the sum of two floats is, trying dozens of candidates each time; and it makes machine
 # code of every little function of its own that a kernel calls, though a kernel holds a copy of what it calls.
+#
+# Both is changed for our kernels only. They are compiled for a target of their own, which is Numba's processor by
+# another name: it has its own tables of what has been compiled. So a kernel's code is the same whoever else uses Numba
+# in this process, and nobody else's is changed by us.
 
 
-#: what `spare` has changed, as functions that change it back
-_UNSPARE: list[Callable[[], None]] = []
+class _Target(CPU):
+    """The processor, for our kernels."""
 
 
-def spare() -> None:
-    """Change Numba for the rest of this process, or until `unspare`."""
-    if not _UNSPARE:
-        _remember_signatures()
-        _leave_overloads()
+_TARGET = "mdstopo"
 
 
-def unspare() -> None:
-    """Put Numba back as it was."""
-    while _UNSPARE:
-        _UNSPARE.pop()()
+class _Context(CPUContext):
+    """What is compiled for our target; functions of Numba's own inside ours like those that `_left` makes."""
+
+    def _compile_subroutine_no_cache(
+        self, builder: Any, impl: Any, sig: Any, locals: Any = None, flags: Any = None
+    ) -> Any:
+        if not _LEAN:
+            return super()._compile_subroutine_no_cache(builder, impl, sig, locals, flags)
+        if flags is None:
+            flags, above = Flags(), ConfigStack()
+            flags.nrt = bool(above) and above.top().is_set("nrt") and above.top().nrt
+        flags.no_compile = flags.no_cpython_wrapper = flags.no_cfunc_wrapper = True
+        compiler = _LEFT(self.typing_context, self, None, sig.args, sig.return_type, flags, locals or {})
+        with global_compiler_lock:
+            made = compiler.compile_extra(impl)
+        self.active_code_library.add_linking_library(made.library)
+        return made
+
+
+class _Ours(CPUTarget):
+    """Our target as a whole."""
+
+    @functools.cached_property
+    def _toplevel_target_context(self) -> CPUContext:
+        return _Context(self.typing_context, self._target_name)
+
+
+class _Dispatcher(CPUDispatcher):
+    """Numba's object for a function that is compiled for our target."""
+
+    targetdescr = _Ours(_TARGET)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile for these types. What calls in it are of is found out for our target, too, where Numba asks late."""
+        with target_override(_TARGET):
+            return super().compile(sig)
+
+
+def _left(*given: Any, **options: Any) -> Any:
+    """How a function of Numba's own is compiled where our kernels call it: without machine code."""
+    return numba.jit(*given, **{"no_cfunc_wrapper": True, "pipeline_class": _LEFT, "_target": _TARGET, **options})
+
+
+def _enter_target() -> None:
+    target_registry[_TARGET] = _Target
+    dispatcher_registry[_Target] = _Dispatcher
+    jit_registry[_Target] = _left if _LEAN else functools.partial(numba.jit, _target=_TARGET)
 
 
 _LASTING = (types.Number, types.Boolean, types.Literal, types.Array, types.BaseTuple)
@@ -808,28 +877,21 @@ def _remember_signatures() -> None:
 
     def get_call_type(self: Any, context: Any, asked: Any, named: Any) -> Any:
         lasting = getattr(self.typing_key, "__module__", None) == "_operator"
-        if not lasting or named or not all(isinstance(each, _LASTING) for each in asked):
+        ours = context is _Dispatcher.targetdescr.typing_context
+        if not (lasting and ours) or named or not all(isinstance(each, _LASTING) for each in asked):
             return ask(self, context, asked, named)
-        key = self, context, asked if isinstance(asked, tuple) else tuple(asked)
+        key = self, asked if isinstance(asked, tuple) else tuple(asked)
         found = known.get(key)
         if found is None:
             found = known[key] = ask(self, context, asked, named)
         return found
 
     function.get_call_type = get_call_type
-    _UNSPARE.append(lambda: setattr(function, "get_call_type", ask))
 
 
-def _leave_overloads() -> None:
-    """Functions of Numba's own get no machine code where kernels call them."""
-    target = get_local_target(cpu_target.typing_context)
-    jit = jit_registry[target]
-
-    def left(*given: Any, **options: Any) -> Any:
-        return jit(*given, **{"no_cfunc_wrapper": True, "pipeline_class": _LEFT, **options})
-
-    dict.__setitem__(jit_registry, target, left)
-    _UNSPARE.append(lambda: dict.__setitem__(jit_registry, target, jit))
+_enter_target()
+if _LEAN:
+    _remember_signatures()
 
 
 # Run time
@@ -1136,23 +1198,16 @@ def _tell(build: Any, slots: list[Any]) -> None:
 # The check
 
 
-def check(alone: bool) -> None:
+def check() -> None:
     """Compile a function that uses what is private, and call it. Raises UnexpectedError where something is wrong.
 
-    Once for these sources and versions on this machine. alone: nobody else uses Numba in this process, which from here
-    on is spared work.
+    Once for these sources and versions on this machine.
     """
-    if _LEAN and alone:
-        spare()
     passed = cache_folder() / "numba.checked"
     if passed.exists():
         return
-    try:
-        _check_header()
-        _check_code(_probe())
-    except BaseException:
-        unspare()
-        raise
+    _check_header()
+    _check_code(_probe())
     write_checked(passed, b"")
 
 

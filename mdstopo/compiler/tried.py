@@ -35,8 +35,6 @@ class _Way:
 
     known = False
     module: ModuleType | None = None
-    #: whether nobody else uses Numba in this process, so that it may be changed
-    alone = False
     #: what interrupts have come out of, see `interruptible`
     broken_off: ClassVar[list[BaseException]] = []
 
@@ -66,7 +64,6 @@ def is_decided() -> bool:
 def load() -> None:
     """Import what this process is going to compile by, and with it Numba."""
     if "numba" not in sys.modules:
-        _Way.alone = is_our_process()
         importlib.import_module("numba")
     if _Way.known or versions() not in TRIED:
         return
@@ -97,7 +94,7 @@ def _decide() -> None:
         return
     try:
         found = importlib.import_module("mdstopo.compiler.numba_private")
-        found.check(_Way.alone)
+        found.check()
     except Exception as error:
         give_up(error)
     else:
@@ -123,12 +120,11 @@ def without_private(error: Exception) -> Iterator[None]:
     found = _Way.module
     assert found is not None
     _Way.module = None
-    found.unspare()
     try:
         yield
     except Exception:
         _Way.module = found
-        found.check(_Way.alone)
+        found.check()
         raise error from None
     give_up(error)
 

@@ -339,7 +339,10 @@ def twice(x):
 
 @kernel
 def spread(x, middle):
-    s = 0.0
+    # functions of Numba's own: of more than one kind, some of which it compiles late
+    room = np.zeros((2, x.shape[0]))
+    room[1] = x.reshape((x.shape[0], 1))[:, 0]
+    s = min(max(room[1].sum() - x.sum(), 0.0), np.empty(min(2, x.shape[0])).size - 2.0)
     for i in range(x.shape[0]):
         s += abs(x[i] - middle)
     return s / total(x)
@@ -349,6 +352,12 @@ def mean_and_spread(x):
     return mean(x), spread(x, mean(x))
 
 if __name__ == "__main__":
+    if "command line" in sys.argv:
+        import mdstopo.cli
+    if "others use Numba" in sys.argv:
+        import numba
+        others = numba.njit(lambda x: min(x[0], 2.0) + max(x[0], 1.0) + x.sum() + np.zeros((2, 3)).sum())
+        assert others(np.ones(2)) == 4.0
     if "spread first" in sys.argv:
         mean_and_spread(np.arange(100.0))
     found = twice(np.arange(100.0))
@@ -394,3 +403,5 @@ def test_machine_code_does_not_depend_on_what_was_compiled_before(tmp_path):
     assert len(first) == 2
     assert codes(2, "spread first") == first
     assert codes(3, "spread first", before=tmp_path / "cache-1") == first
+    assert codes(4, "command line") == first
+    assert codes(5, "others use Numba", "spread first") == first

@@ -4,7 +4,6 @@ import os
 import subprocess
 import sys
 
-import numba
 import numpy as np
 import pytest
 
@@ -29,35 +28,36 @@ from mdstopo.compiler.vector import (
     zero_of,
 )
 from mdstopo.integrators.rows import largest_difference, row_width
+from tests.compiled import compiled
 
 FLOOR = 1e-30
 with_vectors()
 
 
-@numba.njit
+@compiled
 def _width():
     return lanes()
 
 
-@numba.njit
+@compiled
 def _roots(x, out):
     for i in range(0, len(x), lanes()):
         store(out, i, inverse_root(load(x, i), FLOOR))
 
 
-@numba.njit
+@compiled
 def _chosen(x, value, out):
     for i in range(0, len(x), lanes()):
         store(out, i, where_larger(load(x, i), FLOOR, load(value, i)))
 
 
-@numba.njit
+@compiled
 def _shortened(x, out):
     for i in range(0, len(x), lanes()):
         store(out, i, load(x, i))
 
 
-@numba.njit
+@compiled
 def _mixed(x, y, out):
     sums = zero()
     most = zero()
@@ -74,19 +74,19 @@ def _mixed(x, y, out):
     return total(sums), largest(most)
 
 
-@numba.njit
+@compiled
 def _signs(x):
     return negative(load(x, 0))
 
 
-@numba.njit
+@compiled
 def _spared(x, bits, out):
     fetch(x, 0)
     fetch(out, len(out))  # behind the end, where there may be nothing
     store(out, 0, unmarked(load(x, 0), bits))
 
 
-@numba.njit
+@compiled
 def _in_kind(x, y, out):
     sums = zero_of(x)
     most = zero_of(x)
@@ -99,7 +99,7 @@ def _in_kind(x, y, out):
     return lanes_of(x), total(sums), largest(most)
 
 
-@numba.njit
+@compiled
 def _difference(x, y, weight, s):
     return largest_difference(x, y, weight, s)
 

@@ -1,6 +1,5 @@
 """Scenes with so many members that threads share them: the same bits for any number of threads, and right ones."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -11,6 +10,7 @@ from mdstopo.mechanics import passes
 from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.scene.model import CHUNK, MANY
 from mdstopo.scene.packing import FIELDS, pack, unpack
+from tests.compiled import compiled
 from tests.engine.scenes import read
 
 with_kernels()
@@ -76,7 +76,7 @@ def test_results_are_the_same_to_the_bit_for_any_number_of_threads(integrator, a
             assert np.array_equal(other.gradients[name], gradient)
 
 
-@numba.njit
+@compiled
 def _summed(ints, floats, alpha, strength, rel, tangent, sums):
     model = unpack(ints, floats)
     passes.scale_members(model, alpha, strength)

@@ -1,6 +1,5 @@
 """Points against edges: closed forms of sliding, momentum, energy, ends of edges, exact gradients, refusals."""
 
-import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -14,6 +13,7 @@ from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.mechanics.contact import CLOSED
 from mdstopo.mechanics.kinematics.kinematics_interface import pose_size, relative_pose
 from mdstopo.status import Status
+from tests.compiled import compiled
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text
 
 G, ANGLE, K = 9.8, 0.4, 2.0e5
@@ -261,7 +261,7 @@ def test_with_settling_a_block_begins_at_its_depth():
 # --- gradients
 
 
-@numba.njit
+@compiled
 def _add(ints, floats, member_state, q, v, tangent, f, k, c):
     model = unpack_general(ints, floats)
     rel = np.empty((model.pair.shape[0], pose_size(model)))

@@ -2,7 +2,6 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from mdstopo.case.model import CrushLaw
 from mdstopo.case.reader import read_case
 from mdstopo.mechanics.laws import crush, table
 from mdstopo.status import Status
+from tests.compiled import compiled
 from tests.general.support import check_adjoint, check_direct, design_of, load, simulate_text, slopes
 
 OPEN, ELASTIC, CRUSHING = crush.OPEN, crush.ELASTIC, crush.CRUSHING
@@ -47,33 +47,33 @@ def one(end=1.5, v=-3.0, g=-10.0, foot=-1.0, more="gap: 0.1"):
 # --- the law by itself
 
 
-@numba.njit
+@compiled
 def _law(p, x, mode):
     return table.law(CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0))
 
 
-@numba.njit
+@compiled
 def _margin(p, x, xd, mode):
     return table.law_margin(CRUSH, p, x, xd, mode, np.empty(0))
 
 
-@numba.njit
+@compiled
 def _slopes(p, x, xd, mode):
     return table.law_margin_slopes(CRUSH, p, x, xd, mode, np.empty(0))
 
 
-@numba.njit
+@compiled
 def _next(p, x, mode):
     return table.law_next(CRUSH, p, x, 0.0, 0.0, mode, np.empty(0))
 
 
-@numba.njit
+@compiled
 def _start(p, x, xd, xdd):
     mode = table.law_start(CRUSH, p, x, xd, xdd, np.empty(0))
     return mode, table.law_first_set(CRUSH, p, x, mode)
 
 
-@numba.njit
+@compiled
 def _set(p, x, old, new):
     return table.law_set(CRUSH, p, x, old, new)
 

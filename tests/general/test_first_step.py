@@ -1,6 +1,5 @@
 """The first adaptive step of a general scene, which single balances measure."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -12,6 +11,7 @@ from mdstopo.general.first_step import FIRST, PROBES, first_step
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.integrators.steps import FORCES, TURN, WORK
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
+from tests.compiled import compiled
 
 #: a mass on a spring, kicked or pushed
 SWING = """
@@ -39,7 +39,7 @@ def found(tolerance, **values):
     ]
 
 
-@numba.njit
+@compiled
 def _first(ints, floats, member_state, tolerance, order, noise, work):
     model = unpack_general(ints, floats)
     workspace = make_workspace(model)

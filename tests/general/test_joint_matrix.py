@@ -1,6 +1,5 @@
 """The joints' own matrix: what it gives is the solution of the whole balance; where it is singular, it says so."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -11,6 +10,7 @@ from mdstopo.general.joint_matrix import decompose, substitute, weakest
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.switches import OF_JOINTS
 from mdstopo.mechanics.kinematics.planar import turn_bodies
+from tests.compiled import compiled
 
 #: every kind of joint; two of them share both bodies, one body is driven in part and one in all
 MECHANISM = """
@@ -52,7 +52,7 @@ joints:
 """
 
 
-@numba.njit
+@compiled
 def _solve(ints, floats, q, transposed, a, lam, jac, factors):
     model = unpack_general(ints, floats)
     workspace = make_workspace(model)
@@ -68,7 +68,7 @@ def _solve(ints, floats, q, transposed, a, lam, jac, factors):
     return singular
 
 
-@numba.njit
+@compiled
 def _singular(envelope, gram, diagonal):
     found = decompose(envelope, gram, diagonal)
     return found if found >= 0 else weakest(envelope, gram, diagonal, np.zeros(len(gram)))
@@ -149,7 +149,7 @@ def test_a_small_eigenvalue_is_found_whatever_row_it_belongs_to(seed, least, reg
     assert (found < 0) == regular
 
 
-@numba.njit
+@compiled
 def _factored(envelope, gram, diagonal, x):
     at = decompose(envelope, gram, diagonal)
     substitute(envelope, gram, diagonal, x)

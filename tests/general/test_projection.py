@@ -1,6 +1,5 @@
 """The reverse of the way back onto the joints: sweeps with the factors at hand give what the whole matrix gives."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -8,10 +7,11 @@ from mdstopo.general.accelerations import NO_SHIFT, factor_matrix, joint_state, 
 from mdstopo.general.model import pack_general, unpack_general
 from mdstopo.general.projection import swept
 from mdstopo.mechanics.kinematics.planar import turn_bodies
+from tests.compiled import compiled
 from tests.general.test_joint_matrix import MECHANISM, model_of
 
 
-@numba.njit
+@compiled
 def _swept(ints, floats, h, x, y, jac):
     model = unpack_general(ints, floats)
     workspace = make_workspace(model)

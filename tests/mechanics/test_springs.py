@@ -3,29 +3,29 @@
 import math
 from decimal import Decimal, localcontext
 
-import numba
 import numpy as np
 import pytest
 
 from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.laws import spring
+from tests.compiled import compiled
 
 with_vectors()
 COUNT = 48
 
 
-@numba.njit
+@compiled
 def _force(member, pose, close=True):
     return spring.elastic_force(member.reshape(member.size), member.shape[1], member[6], 0, COUNT, pose, close)
 
 
-@numba.njit
+@compiled
 def _tangent(member, pose, close=True):
     return spring.elastic_tangent(member.reshape(member.size), member.shape[1], member[6], 0, COUNT, pose, close)
 
 
-@numba.njit
+@compiled
 def _design(member, poses, changes, out):
     spring.elastic_design(
         member[0], member[1], member[2], member[3], member[4], member[5], member[6], poses, changes, out
