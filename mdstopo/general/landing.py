@@ -23,7 +23,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, end_s
 #: room: a table, multipliers of a projection, a state, states at cuts with their fractions, poses
 FIELDS = (
     "model", "table", "size", "member_state", "q0", "v0", "q", "v", "a", "workspace", "watched", "scaled", "push",
-    "at_q", "at_v", "cut", "cut_q", "cut_v", "left_q", "left_v", "rel", "before",
+    "at_q", "at_v", "cut", "cut_q", "cut_v", "left_q", "left_v", "rel", "before", "few", "one",
 )  # fmt: skip
 #: corrections of the moment after it has been found beside the joints
 CORRECTIONS = 12
@@ -57,16 +57,18 @@ def landing_of(model, table, size, member_state, q0, v0, q, v, a, workspace, wat
         model, table, size, member_state, q0, v0, q, v, a, workspace, watched, np.zeros(table.shape),
         np.zeros((2, model.size[0])), np.empty(n_q), np.empty(n), np.empty(CUTS + 1), np.empty((CUTS + 1, n_q)),
         np.empty((CUTS + 1, n)), np.empty(n_q), np.empty(n), np.empty(pose), np.empty(pose),
+        np.zeros_like(watched), np.zeros(2, np.int64),
     )  # fmt: skip
 
 
 @kernel
-def margin_inside(step, segment, t, h, c, on_joints, q, v):
+def margin_inside(step, segment, t, h, c, watched, on_joints, q, v):
     """The smallest margin at fraction c of a step, and whose it is.
 
     step: the step (`Landing`); its `rel` and `push` are overwritten.
     segment: number of the stretch of time between two breakpoints.
     t, h, c: time at the start of the step, its length (s), and the fraction of it.
+    watched: the members and contacts that are looked at.
     on_joints: whether the state is put onto the joints.
     q (n_q,), v (n,): the state, out.
     """
@@ -83,7 +85,7 @@ def margin_inside(step, segment, t, h, c, on_joints, q, v):
         )
         drive_state(model, segment, t + c * h, q, v)
     relative_pose(model, q, v, step.rel)
-    return smallest_margin(model, step.member_state, step.rel, step.watched)
+    return smallest_margin(model, step.member_state, step.rel, watched)
 
 
 @kernel
@@ -98,8 +100,8 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     end_q (n_q,), end_v (n,), margin: the end of the step, and the smallest margin there.
     where (3,): where[2] becomes a member that grazes so that the motion has no derivative.
 
-    Returns the fractions of the step at both ends of the piece, and the margins there; where there is no such piece,
-    the first is 2.
+    Returns the fractions of the step at both ends of the piece, and the margin at its end; where there is no such
+    piece, the first is 2. `step.before` and `step.rel` have the poses at its ends.
     """
     model, member_state, watched = step.model, step.member_state, step.watched
     low = 0.0
@@ -130,17 +132,32 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         cuts += 1
         top += 1
         step.cut[top] = middle
-        value, who = margin_inside(step, segment, t, h, middle, np.bool_(False), step.cut_q[top], step.cut_v[top])
+        value, who = margin_inside(
+            step, segment, t, h, middle, watched, np.bool_(False), step.cut_q[top], step.cut_v[top]
+        )
         if value < -rounding:
             at_high = value
             break
         if value < graze and matters(model, member_state, step.rel, who):
             where[2] = who
     if top < 0:
-        return 2.0, 2.0, 0.0, 0.0
+        return 2.0, 2.0, 0.0
     relative_pose(model, step.left_q, step.left_v, step.before)
-    at_low, _ = smallest_margin(model, member_state, step.before, watched)
-    return low, step.cut[top], max(at_low, rounding), at_high
+    return low, step.cut[top], at_high
+
+
+@kernel
+def keep_used(step, rounding):
+    """Leave on the list of the members that are watched those alone whose margin is used up at the pose `step.rel`."""
+    step.one[0] = 1
+    found = 0
+    for m in range(1, step.watched[0] + 1):
+        step.one[1] = step.watched[m]
+        margin, _ = smallest_margin(step.model, step.member_state, step.rel, step.one)
+        if margin < -rounding:
+            found += 1
+            step.few[found] = step.watched[m]
+    step.few[0] = found
 
 
 @kernel
@@ -158,10 +175,14 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     Returns the fraction of the step, 2 where no member leaves its mode; then `step.at_q`, `step.at_v` and `step.push`
     have the state, on the joints; the member; and the rate of its margin (per s).
     """
-    low, high, at_low, at_high = first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, where)
+    low, high, at_high = first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, where)
     if low > 1.0:
         return 2.0, -1, 0.0
     begin = low
+    keep_used(step, rounding)
+    few = step.few
+    at_low, _ = smallest_margin(step.model, step.member_state, step.before, few)
+    at_low = max(at_low, rounding)
     resolution = 4e-16 * (abs(t) + h) / h
     jointed = step.model.size[0] > 0
     no = np.bool_(False)
@@ -177,7 +198,7 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         middle = next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
         if middle < 0.0:
             break
-        value, _ = margin_inside(step, segment, t, h, middle, no, step.at_q, step.at_v)
+        value, _ = margin_inside(step, segment, t, h, middle, few, no, step.at_q, step.at_v)
         before = last
         at_before = at_last
         last = middle
@@ -185,10 +206,10 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         low, high, at_low, at_high, side = narrowed(low, high, at_low, at_high, middle, value, rounding, side)
     c = high
     beside = c - BESIDE * (c - begin)
-    at_high, _ = margin_inside(step, segment, t, h, c, no, step.at_q, step.at_v)
-    value, _ = margin_inside(step, segment, t, h, beside, no, step.at_q, step.at_v)
+    at_high, _ = margin_inside(step, segment, t, h, c, few, no, step.at_q, step.at_v)
+    value, _ = margin_inside(step, segment, t, h, beside, few, no, step.at_q, step.at_v)
     rate = (at_high - value) / ((c - beside) * h) if c > beside else 0.0
-    value, who = margin_inside(step, segment, t, h, c, np.bool_(True), step.at_q, step.at_v)
+    value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
     if not jointed:
         return c, who, rate
     shift = 0.0
@@ -198,12 +219,12 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         shift = -(value + AIM * rounding) / (rate * h) if rate < 0.0 else resolution
         shift = shift if abs(shift) > resolution else (resolution if value >= -rounding else -resolution)
         c = min(max(c + shift, begin), 1.0)
-        value, who = margin_inside(step, segment, t, h, c, np.bool_(True), step.at_q, step.at_v)
+        value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
     for tries in range(CORRECTIONS):  # flat, or noisy: any moment on the far side
         if value < -rounding or c >= 1.0:
             break
         c = min(c + max(abs(shift), resolution) * 4.0**tries, 1.0)
-        value, who = margin_inside(step, segment, t, h, c, np.bool_(True), step.at_q, step.at_v)
+        value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
     if value < -rounding:
         return c, who, rate
     return 2.0, -1, 0.0

@@ -6,9 +6,11 @@ is refined on the method's own motion. Where no step is as long as a vibration, 
 without error control are, what lies between the ends of one is sampled only where a peak may be.
 """
 
+import math
+
 import numpy as np
 
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.dense_output import evaluate_here, finished, go_to, time_at
 from mdstopo.general.extremes import (
@@ -47,6 +49,8 @@ RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 JUMP = 1e-9
 #: how often a bracket of a peak is narrowed at most
 TRIALS = 60
+#: a change of the fraction at which a peak has settled: secants square it, or nearly
+SETTLED = 1e-8
 #: a step has no peak inside if its ends stay below the limit by so many times what it may rise by; or if it rises (or
 #: falls) at both ends, with rates that differ by at most one share, and a mean rate that is theirs to another
 MARGIN, ALIKE, EVEN = 4.0, 0.5, 0.1
@@ -247,27 +251,39 @@ def evaluate_piece(tag, motion, j, who, pieces, w, c, sample):
 
 
 @kernel
-def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, sample):
-    """The fraction of piece w at which the rate vanishes, by Illinois' rule on the method's own motion.
+def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, first, bend, sample):
+    """The fraction of piece w at which the rate vanishes, on the method's own motion.
+
+    By secants, from a first guess and its slope; where these lead out of the bracket by Illinois' rule.
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j, who: response and member.
     pieces (P, 4), w: of `evaluate_piece`.
     low, high: fractions between which the rate falls through zero. rise, fall: sign times the rate at them.
     sign: 1, or -1 for peaks of -g. sample (3,): out, what is there.
+    first, bend: the guess, and how the rate changes there with the fraction; NaN: none.
     """
     size = max(rise, -fall)
     side = 0
     c = np.nan
     last = np.nan
+    at_last = np.nan
+    foreseen = first
     for _ in range(TRIALS):
-        c = (low * fall - high * rise) / (fall - rise)
+        c = foreseen
+        if not low < c < high:
+            c = (low * fall - high * rise) / (fall - rise)
         if not low < c < high:
             c = 0.5 * (low + high)
         evaluate_piece(tag, motion, j, who, pieces, w, c, sample)
         rate = sign * sample[DG]
-        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= 1e-13:
+        # the next secant would lead no farther than the square of this one
+        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= SETTLED:
             break
+        if c != last and not np.isnan(last):
+            bend = (rate - at_last) / (c - last)
+        foreseen = c - rate / bend if bend < 0.0 else np.nan
         last = c
+        at_last = rate
         if rate > 0.0:
             low = c
             rise = rate
@@ -281,6 +297,16 @@ def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, sample):
                 rise *= 0.5
             side = 1
     return c
+
+
+@part
+def highest_between(one, two, rise, fall):
+    """Where the cubic with these values and slopes (above 0, and below) at 0 and 1 is highest, and its bend there."""
+    cube = rise + fall - 2.0 * (two - one)
+    square = two - one - rise - cube
+    root = math.sqrt(max(square * square - 3.0 * cube * rise, 0.0))
+    c = rise / (root - square) if root > square else 0.5
+    return c, 2.0 * square + 6.0 * cube * c
 
 
 @kernel
@@ -311,6 +337,7 @@ def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows,
             if not max(ga + max(da, 0.0) * width, gb + max(-db, 0.0) * width) >= limit:
                 continue
             low, high = i / LAST, (i + 1) / LAST
+            first = bend = np.nan
             if da * db > 0.0:  # both rates of one sign: the cubic through them may yet turn twice
                 slope = (gb - ga) / width
                 half = 3.0 * slope - 2.0 * da - db
@@ -336,7 +363,11 @@ def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows,
                 db = sign * seen[w, i + 2, DG]
             elif not (da > 0.0 and db < 0.0):
                 continue
-            c = refine(tag, motion, j, who, pieces, w, low, high, da, db, sign, sample)
+            else:
+                first, bend = highest_between(ga, gb, width * da, width * db)
+                bend *= LAST / width
+                first = low + first * (high - low)
+            c = refine(tag, motion, j, who, pieces, w, low, high, da, db, sign, first, bend, sample)
             found = add_row(rows, found, t, w, c, sample, sign)
     return found
 
