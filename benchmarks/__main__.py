@@ -20,6 +20,7 @@ SECTIONS = {
     "orders": "orders of convergence, agreement of methods, drift",
     "chain": "cost of a step against the number of jointed bodies",
     "space": "objective and exact gradient of one scene in the plane and in space",
+    "profile": "where the time of the applications goes: force sums by what they are for, and milliseconds",
     "lifts": "every planar case of the project beside itself in space: values and gradients",
     "rows": "cost of many competing peaks and members, whose gradients are pulled back in one sweep",
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
@@ -61,6 +62,7 @@ PAGES = {
     "orders": "docs/accuracy.md",
     "chain": "docs/performance.md",
     "space": "docs/performance.md",
+    "profile": "docs/performance.md",
     "fronts": "docs/performance.md",
 }
 #: the same of sections that `--pages` writes

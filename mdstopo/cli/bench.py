@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command("bench")
-@click.argument("what", metavar="WHAT", type=click.Choice(["scaling", "work-precision", "skip"]))
+@click.argument("what", metavar="WHAT", type=click.Choice(["scaling", "work-precision", "profile", "skip"]))
 @click.argument("case_path", metavar="[CASE]", type=CASE_FILE, required=False)
 @set_option
 @click.option("--members", type=click.IntRange(0), metavar="N", help="scaling: at most so many members.")
@@ -38,20 +38,21 @@ def command(
 
     scaling: time and memory against the number of members, up to a million, and of bodies. work-precision: run time
     against error, over integrators, tolerances and sensitivity methods, of CASE or the paper's scene; with --peers
-    beside JAX, diffrax, CasADi and SciPy, those of them that are installed. skip: what is left out where nothing asks
+    beside JAX, diffrax, CasADi and SciPy, those of them that are installed. profile: where an evaluation of CASE spends
+    its force sums and its time. skip: what is left out where nothing asks
     for it, and what that is worth.
     \f
     Arguments, which --help leaves out:
 
-    what: scaling, work-precision or skip.
-    case_path: the case of work-precision; None takes the paper's scene.
+    what: scaling, work-precision, profile or skip.
+    case_path: the case of work-precision or profile; None takes the paper's scene.
     overrides: values of the case's keys.
     members, bodies: the largest numbers of scaling; None takes all.
     picture: the file for the picture of work-precision; None draws none.
     peers: whether other programs are measured too.
     as_json, quiet: print one JSON object; say nothing but mistakes.
     """
-    if case_path is not None and what != "work-precision":
+    if case_path is not None and what not in ("work-precision", "profile"):
         raise click.UsageError(f"bench {what} takes no case")
     if peers and what != "work-precision":
         raise click.UsageError(f"bench {what} takes no --peers")
@@ -84,8 +85,8 @@ def _tables(
 ) -> "Iterator[Table]":
     """The tables of a measurement of the program alone, each as it is done.
 
-    what: scaling, work-precision or skip.
-    case_path: the case of work-precision; None takes the paper's scene.
+    what: scaling, work-precision, profile or skip.
+    case_path: the case of work-precision or profile; None takes the paper's scene.
     overrides: values of the case's keys.
     members, bodies: the largest numbers of scaling; None takes all.
     picture: the file for the picture of work-precision; None draws none.
@@ -100,6 +101,12 @@ def _tables(
         from mdstopo.bench.skip import skip
 
         yield from skip()
+    elif what == "profile":
+        from mdstopo.bench.profile import profile
+        from mdstopo.bench.work_precision import paper
+        from mdstopo.cli.options import open_case
+
+        yield from profile(paper(overrides) if case_path is None else open_case(case_path, overrides))
     else:
         from mdstopo.bench.work_precision import draw, paper, table, work_precision
         from mdstopo.cli.options import open_case

@@ -27,7 +27,8 @@ _SOFT_BRANCH = (
 def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bool) -> int:
     """Read a case and say what is in it: bodies, members, totals, natural frequencies.
 
-    Nothing is run. What cannot be computed yet is listed with its place (exit status 2).
+    Nothing is optimised; one evaluation tells what each costs. What cannot be computed yet is listed with its place
+    (exit status 2).
     """
     from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
@@ -99,10 +100,21 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
             output.say(f"  {sentence}")
         output.table([["integrator", f"{engine.integrator}: {engine.integrator_reason}"]], indent="")
         document |= {"frequencies": found, "skipped": engine.skipped, "integrator": engine.integrator}
+        document["evaluation"] = _say_cost(output, case, engine)
     output.document(document)
     if refused:
         raise CaseError(refused, str(case_path))
     return 0
+
+
+def _say_cost(output: Output, case: "Case", engine: "Evaluator") -> dict[str, Any] | None:
+    """What one evaluation will cost, where something is looked at."""
+    from mdstopo.cli.check_cost import cost, in_words
+
+    found = cost(case, engine)
+    if case.objectives:
+        output.table([["one evaluation with gradients", in_words(found)]], indent="")
+    return found
 
 
 def _mistaken(case_path: Path, error: "CaseError") -> dict[str, Any]:

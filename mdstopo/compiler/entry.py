@@ -7,7 +7,8 @@ its data and its lengths; for a number the number. What it returns comes after t
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,6 +57,24 @@ def types_of(arguments: tuple[Any, ...]) -> str | None:
         else:
             return None
     return " ".join(letters)
+
+
+class NotCompiledError(Exception):
+    """An entry was called in `without_compiling` that has not been compiled on this machine."""
+
+
+#: one item for each `without_compiling` that has begun
+_nothing_is_compiled: list[None] = []
+
+
+@contextmanager
+def without_compiling() -> Iterator[None]:
+    """Entries that have not been compiled raise NotCompiledError instead of taking a minute."""
+    _nothing_is_compiled.append(None)
+    try:
+        yield
+    finally:
+        _nothing_is_compiled.pop()
 
 
 class Entry(Kernel):
@@ -133,6 +152,8 @@ class Entry(Kernel):
     def _built(self, path: Path, types: str) -> Code | None:
         from mdstopo.compiler import store, told, tried
 
+        if _nothing_is_compiled:
+            raise NotCompiledError
         told.compiling(f"{self.py_func.__module__.removeprefix('mdstopo.')}.{self.py_func.__name__}")
         way()
         found = tried.private()

@@ -30,7 +30,17 @@ from mdstopo.general.strides import (
     sums_size,
 )
 from mdstopo.general.structures import bundle
-from mdstopo.general.switches import APART, DAMPED, DIAGONAL, OF_JOINTS, THOROUGH, carriers, switches_of
+from mdstopo.general.switches import (
+    APART,
+    BOTH,
+    DAMPED,
+    DIAGONAL,
+    OF_JOINTS,
+    SECOND,
+    THOROUGH,
+    carriers,
+    switches_of,
+)
 from mdstopo.integrators.banded import factorise, solve
 from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -450,6 +460,18 @@ def matrices_vjp(model, k, z, bar):
         pair_matrix_vjp(model, p, k[p], z, bar)
 
 
+@part
+def body_matrix_vjp(model, p, side, m, z, bar):
+    """bar (n,) -= M^T z, of M (2 D, 2 D) of pair p the part of one of its bodies alone: the other one is held."""
+    at = first_freedom(model, model.pair[p, side])
+    own = freedoms(model) * side
+    for j in range(freedoms(model)):
+        value = m[own, own + j] * z[at]
+        for i in range(1, freedoms(model)):
+            value += m[own + i, own + j] * z[at + i]
+        bar[at + j] -= value
+
+
 @kernel
 def subtract_matrices(model, k, x, out):
     """out (n,) -= K x, K by pairs (n_pair, 2 D, 2 D)."""
@@ -486,10 +508,16 @@ def carried_vjp(model, workspace, k, c, turn, z, bar_q, bar_v):
     """
     damped = workspace.switches[DAMPED] != 0
     for p in range(model.pair.shape[0]):
-        if workspace.carries[p] != 0:
+        carries = workspace.carries[p]
+        if carries == BOTH:
             pair_matrix_vjp(model, p, k[p], z, bar_q)
             if damped:
                 pair_matrix_vjp(model, p, c[p], z, bar_v)
+        elif carries != 0:
+            side = 1 if carries == SECOND else 0
+            body_matrix_vjp(model, p, side, k[p], z, bar_q)
+            if damped:
+                body_matrix_vjp(model, p, side, c[p], z, bar_v)
     turns_vjp(model, turn, z, bar_q, bar_v)
 
 

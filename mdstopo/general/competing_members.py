@@ -11,6 +11,7 @@ import numpy as np
 
 from mdstopo.general.extremes import FRACTIONS, row_of
 from mdstopo.general.model import COUNT, GROUP, OFFSET, SUBJECT
+from mdstopo.general.peak_search import ALIKE, EVEN, MARGIN
 from mdstopo.general.responses import MEMBER_FORCE
 from mdstopo.scene.model import FloatArray, IndexArray
 
@@ -43,12 +44,9 @@ def members_peaks(
     most: how many peaks are wanted at most; it decides which members are followed, the rows may be more.
     """
     count = len(t) - 1
-    if final:
-        places = np.array([[count - 1.0, 1.0]])
-    else:
-        places = np.empty((count * len(FRACTIONS), 2))
-        places[:, 0] = np.repeat(np.arange(count), len(FRACTIONS))
-        places[:, 1] = np.tile(FRACTIONS, count)
+    ends = driver.steps_are_fine  # then samples inside steps are needed here and there only
+    fractions = np.array([0.0, 1.0] if ends else FRACTIONS)
+    places = np.array([[count - 1.0, 1.0]]) if final else _places(np.arange(count), fractions)
     members = np.arange(members_of(driver, j))
     at_once = not final and len(members) * len(places) <= AT_ONCE
     nobody = np.zeros(0, dtype=np.int64)
@@ -59,15 +57,54 @@ def members_peaks(
         seen = [driver.evaluate_one(j, count, places[0], who=int(i)).copy() for i in who]
         return [row_of(t[-1], s[0], count - 1, 1.0, s[1], 1.0, i) for s, i in zip(seen, who.tolist(), strict=True)]
     seen_all = seen_all[who] if at_once else compare(driver, j, places, who, count)[1]
+    seen_all = seen_all.reshape(len(who), count, len(fractions), 2)
     limit = _least(top, window, most)
+    plain = None
+    if ends:
+        seen_all, plain = _inside(driver, j, t, who, seen_all, limit)
     rows = []
     for i, seen_one in zip(who.tolist(), seen_all, strict=True):
         own = min(window, 1.0 - limit / top[i]) if top[i] > 0.0 else window
-        force, rate = np.moveaxis(seen_one.reshape(count, len(FRACTIONS), 2), 2, 0)
+        force, rate = np.moveaxis(seen_one, 2, 0)
         sign = np.where(force >= 0.0, 1.0, -1.0)
         samples = np.stack([sign * force, sign * rate, np.full(force.shape, float(i))], axis=2)
-        rows += list(driver.peaks_of_pieces(j, count, t, samples, 1.0, own, who=i))
+        rows += list(driver.peaks_of_pieces(j, count, t, samples, 1.0, own, who=i, plain=plain))
     return rows
+
+
+def _places(steps: IndexArray, fractions: FloatArray) -> FloatArray:
+    """(K, 2): all these fractions of all these steps."""
+    return np.column_stack([np.repeat(steps, len(fractions)), np.tile(fractions, len(steps))])
+
+
+def _inside(
+    driver: "GeneralDriver", j: int, t: FloatArray, who: IndexArray, ends: FloatArray, limit: float
+) -> tuple[FloatArray, IndexArray]:
+    """Forces and rates at all FRACTIONS, from those at the ends of the steps.
+
+    driver: with a finished run. j: the response.
+    t (m + 1,): the steps' times (s).
+    who (C,): the members.
+    ends (C, m, 2, 2): their forces (N) and rates (N/s) at both ends of every step.
+    limit: force below which no peak is wanted (N).
+
+    Returns (C, m, FRACTIONS, 2), NaN inside steps that can have no peak; and (m,), 1 for these.
+    """
+    sign = np.where(ends[..., 0] >= 0.0, 1.0, -1.0)
+    (a, b), (da, db) = (np.moveaxis(sign * ends[..., k], 2, 0) for k in range(2))
+    h = np.diff(t)
+    # as `peak_search.has_no_peak`
+    uneven = np.abs(b - a - 0.5 * h * (da + db))
+    least = np.minimum(np.abs(da), np.abs(db))
+    low = MARGIN * (h * (np.abs(da) + np.abs(db)) + uneven) < limit - np.maximum(a, b)
+    even = (da * db > 0.0) & (np.abs(db - da) <= ALIKE * least) & (uneven <= EVEN * h * least)
+    plain = np.all(low | even, axis=0).astype(np.int64)
+    steps, inner = np.flatnonzero(plain == 0), np.array(FRACTIONS[1:-1])
+    found = np.full((len(who), len(h), len(FRACTIONS), 2), np.nan)
+    found[:, :, 0], found[:, :, -1] = ends[:, :, 0], ends[:, :, 1]
+    seen = compare(driver, j, _places(steps, inner), who, len(h))[1]
+    found[:, steps, 1:-1] = seen.reshape(len(who), len(steps), len(inner), 2)
+    return found, plain
 
 
 def _least(top: FloatArray, window: float, most: int) -> float:

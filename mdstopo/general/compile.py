@@ -114,13 +114,14 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
     layout = arrange(case, joint, joint_par, steady, free, mass, home, pair, bodies)
     _refuse_redundant(case, load_case, layout.redundant)
     damped = bodies.turns_couple or _damped(case, responses, reductions)
+    by_order_8 = damped or _switches(case)
     model = GeneralModel(
         free=free, mass=mass, q0=np.tile(bodies.at_home, len(names)), v0=v0, home=home, pair=pair, reach=reach,
         **members, times=times, **loads._asdict(), bushing_pair=bushing_pair, bushing=bushing, driven=driven,
         drive=drive, drive_frame=frames_of_turns, drive_turn=turns, joint=joint, joint_par=joint_par, row=layout.row,
         place=layout.place,
         size=np.array(
-            [*layout.size, int(damped), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
+            [*layout.size, int(by_order_8), len(layout.steady), bodies.load_slopes, bodies.attitude], dtype=np.int64
         ), line=layout.line,
         envelope=layout.envelope, product=layout.product, steady=layout.steady,
         response=response, response_par=response_par, contact_pair=contact_pair, contact=contact,
@@ -327,6 +328,12 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
         for response, over_time in zip(responses, reductions, strict=True)
     )
     return forces or adds_damping(case) or bushed or looks or bool(case.joints) or bool(case.contacts)
+
+
+def _switches(case: Case) -> bool:
+    """Whether a member may switch: a step that ends at a switch ends on the polynomial of the method of order 8."""
+    own = (law for group in case.members for law in group.laws)
+    return bool(case.contacts) or any(laws.kernels_of(type(law)).modes is not None for law in own)
 
 
 def _skipped(case: Case, load_case: LoadCase, dimension: Dimension, damped: bool) -> tuple[str, ...]:

@@ -6,19 +6,29 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.method_interface import beside, is_continuous, point_of
+from mdstopo.general.method_interface import beside, derivatives, is_continuous, point_of
 from mdstopo.general.model import KIND, SUBJECT, unpack_general
-from mdstopo.general.responses import APART, MEMBER_FORCE, group_forces, largest_force, rated
+from mdstopo.general.responses import (
+    APART,
+    MEMBER_FORCE,
+    follows_state,
+    group_forces,
+    group_rates,
+    is_plain,
+    largest_force,
+    rated,
+)
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.general.structures import bundle
+from mdstopo.integrators.steps import FORCES, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, most_rows, quintic
 
 #: a finished motion, and a workspace for responses on it: the scene, the method's coefficients, state of the members,
 #: steps and how many there are; one state with its multipliers, slopes of the response there, states beside it
 FIELDS = (
     "model", "tables", "member_state", "history", "count", "work", "workspace", "q", "v", "a", "lam", "bars", "row_bar",
-    "near_q", "near", "ends_q", "ends",
+    "near_q", "near", "own", "ends_q", "ends",
 )  # fmt: skip
 
 
@@ -48,33 +58,38 @@ def finished(model, tables, member_state, history, count, work):
     return Motion(
         model, tables, member_state, history, count, work, make_workspace(model), np.empty(n_q), np.empty(n),
         np.zeros(n), np.zeros(n_row), np.empty((3, n)), np.empty(n_row), np.empty(n_q), np.empty((3, n)),
-        np.empty((2, n_q)), np.empty((2, 2, n)),
+        np.empty(n_row), np.empty((2, n_q)), np.empty((2, 2, n)),
     )  # fmt: skip
 
 
 @kernel
-def evaluate_here(tag, motion, j, k, c, who, rates):
+def evaluate_here(tag, motion, j, k, c, who, rates, balanced, purpose):
     """Response j at the state in `motion.q` and `motion.v`, of fraction c of step k, whose modes are put in place.
 
     tag: the method of integration (`method_interface`).
     motion: the finished motion; a, lam, bars, row_bar and the workspace are overwritten.
     j: the response; below 0 only the balance is made. k, c: the step, and the fraction of it.
     who: the member whose force is meant; -1: the one with the largest.
-    rates: whether the rate is wanted (`responses.rated`).
+    rates, balanced: whether the rate is wanted, and a and lam whatever the response needs (`responses.rated`).
+    purpose: place in `work` of what the balances are for (`integrators.steps`).
 
     Returns the value, its rate (per s) and the number of the member.
     """
     t = time_at(motion.history, k, c)
     q, v, a, lam = motion.q, motion.v, motion.a, motion.lam
     model = motion.model
+    found = 0
     if j >= 0 and model.response[j, KIND] == MEMBER_FORCE and who < 0:
+        found = 1
         segment = motion.history.index[k, SEGMENT]
         solve_accelerations(model, motion.member_state, segment, t, q, v, np.bool_(False), motion.workspace, a, lam)
         who = largest_force(model, motion.member_state, segment, t, model.response[j, SUBJECT], q, v, a)
-    value, rate = rated(
-        tag, model, motion.member_state, motion.history, k, c, j, who, rates, t, q, v, motion.workspace, a,
-        lam, motion.bars, motion.row_bar, motion.near_q, motion.near,
+    value, rate, made = rated(
+        tag, model, motion.member_state, motion.history, k, c, j, who, rates, balanced, t, q, v, motion.workspace, a,
+        lam, motion.bars, motion.row_bar, motion.near_q, motion.near, motion.own,
     )  # fmt: skip
+    motion.work[FORCES] += made + found
+    motion.work[purpose] += made + found
     return value, rate, who
 
 
@@ -130,11 +145,19 @@ def sample_response(
     motion = finished(model, tables, member_state, history, count, work)
     n_row = model.size[0]
     last = -1
+    driven = model.driven.shape[0] > 0
     for i in range(places.shape[0]):
         k = int(places[i, 0])
         c = places[i, 1]
         last = go_to(tag, motion, k, c, exact, last)
-        seen[i, 0], seen[i, 1], seen[i, 2] = evaluate_here(tag, motion, j, k, c, who, rates)
+        seen[i, 0], seen[i, 1], seen[i, 2] = evaluate_here(tag, motion, j, k, c, who, rates, rates, OF_SAMPLES)
+        if driven and rates and j >= 0 and not follows_state(tag, model, j):  # the workspace is of a state beside it
+            segment = history.index[k, SEGMENT]
+            t = time_at(history, k, c)
+            solve_accelerations(
+                model, member_state, segment, t, motion.q, motion.v, np.bool_(False), motion.workspace, motion.a,
+                motion.lam,
+            )  # fmt: skip
         copy_vector(motion.q, out_q[i])
         copy_vector(motion.v, out[0, i])
         copy_vector(motion.a, out[1, i])
@@ -178,6 +201,8 @@ def compare(
     no = np.bool_(False)
     group = model.response[j, SUBJECT]
     force = np.empty(top.shape[0])
+    both = np.empty((2, top.shape[0]))
+    plain = derivatives(tag) > 1 and is_plain(model, group)
     last = -1
     top[:] = 0.0
     for i in range(places.shape[0]):
@@ -188,6 +213,16 @@ def compare(
         t = time_at(history, k, c)
         q, v, a = motion.q, motion.v, motion.a
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+        work[FORCES] += 1
+        work[OF_SAMPLES] += 1
+        if plain and who.shape[0] > 0:
+            group_rates(model, member_state, segment, t, group, q, v, a, workspace.rel, both)
+            for m in range(top.shape[0]):
+                top[m] = max(top[m], abs(both[0, m]))
+            for m in range(who.shape[0]):
+                seen[m, i, 0] = both[0, who[m]]
+                seen[m, i, 1] = both[1, who[m]]
+            continue
         group_forces(model, member_state, segment, t, group, q, v, a, force)
         for m in range(top.shape[0]):
             top[m] = max(top[m], abs(force[m]))
@@ -197,6 +232,8 @@ def compare(
         if who.shape[0] == 0:
             continue
         apart = APART * (history.t[k + 1] - history.t[k])
+        work[FORCES] += 2
+        work[OF_SAMPLES] += 2
         for side in (-1.0, 1.0):
             e = side * apart
             beside(tag, model, history, k, c, e, q, v, a, near_q, near[0])
@@ -246,6 +283,8 @@ def go_to(tag, motion, k, c, exact, last):
                     model, member_state, segment, history.t[k + e], ends_q[e], ends[e, 0], no, workspace, ends[e, 1],
                     motion.lam,
                 )  # fmt: skip
+            motion.work[FORCES] += 2
+            motion.work[OF_SAMPLES] += 2
             last = k
         quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], q, v)
     drive_state(model, segment, time_at(history, k, c), q, v)

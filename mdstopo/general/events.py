@@ -16,7 +16,7 @@ import math
 
 import numpy as np
 
-from mdstopo.compiler.jit import kernel
+from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.contact import contact_switch
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START, STOP
@@ -46,6 +46,10 @@ from mdstopo.mechanics.laws.table import (
 #: error of the cubic through both ends of a step, relative to the square of its length times the second derivative:
 #: (h omega)^2 / 384 of a vibration
 SLACK = 0.03
+#: how near to the ends of a piece of a step it is not worth cutting
+EDGE = 1e-7
+#: a margin is watched unless the least control value of its cubic over a step is above this share of what it changes by
+FAR = 0.25
 
 
 @kernel
@@ -59,53 +63,47 @@ def has_switches(model, knots):
 
 
 @kernel
-def smallest_margin(model, segment, member_state, rel):
-    """The smallest margin of all acting members and contacts at relative poses rel (n_pair, POSE), and whose it is."""
-    best = np.inf
-    who = -1
+def room_for_watched(model):
+    """Room for a list of members and contacts: how many they are, then their numbers (`watch_all`, `watch_near`)."""
+    return np.zeros(1 + model.member.shape[1] + model.contact_pair.shape[0], np.int64)
+
+
+@kernel
+def watch_all(model, segment, watched):
+    """Write into `watched` (`room_for_watched`) all members that act in a segment and may switch, and all contacts."""
+    found = 0
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
         if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
             continue
-        r = rel[model.block[k, PAIR]]
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
-            _, x, rate = member_motion(model, i, r)
-            x -= member_state[SET, i]
-            s = law_margin(code, model.law[k], x, rate, int(member_state[MODE, i]), model.curves)
-            if s < best:
-                best = s
-                who = i
+            found += 1
+            watched[found] = i
     for j in range(model.contact_pair.shape[0]):
-        i = model.member.shape[1] + j
-        height, rise, room, _, _ = contact_seen(model, j, rel[model.contact_pair[j]])
-        s = contact_margin(model.contact[j], height, rise, room, int(member_state[MODE, i]))
-        if s < best:
-            best = s
-            who = i
-    return best, who
+        found += 1
+        watched[found] = model.member.shape[1] + j
+    watched[0] = found
 
 
 @kernel
-def first_dip(model, segment, member_state, rel0, rel1, h, parts):
-    """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
+def watch_near(model, segment, member_state, rel0, rel1, h, watched):
+    """Write into `watched` those that may leave their mode within a step; the others have far to go.
 
-    Looked for on the cubic through a margin's values and rates at both poses.
+    The margin of a member is followed on the cubic by its values and rates at both ends, which stays above the least of
+    the cubic's four control values; FAR of what it changes by lies between that and zero. A margin that has rates in it
+    is always watched, and so are contacts.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
-      h: time between them (s).
-      parts: of how many parts of a step this is one, whose cubic the poses were taken from.
-
-    Returns the earliest fraction at which a minimum is below zero, 2 where none is; the fraction of the lowest minimum
-    that may be below zero in truth, 2 where there is none; its value, infinite where there is none.
+      h: length of the step (s).
+    Out:
+      watched: the list (`room_for_watched`), in the order of `watch_all`.
     """
-    best = 2.0
-    near = 2.0
-    low = np.inf
+    found = 0
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
         if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
@@ -113,43 +111,94 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
         p = model.block[k, PAIR]
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
-            mode = int(member_state[MODE, i])
-            r = rel0[p]
-            _, x, rate = member_motion(model, i, r)
-            x -= member_state[SET, i]
-            s0 = law_margin(code, model.law[k], x, rate, mode, model.curves)
-            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
-            if by_rate != 0.0:
-                continue
-            d0 = h * by_x * rate
-            r = rel1[p]
-            _, x, rate = member_motion(model, i, r)
-            x -= member_state[SET, i]
-            s1 = law_margin(code, model.law[k], x, rate, mode, model.curves)
-            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
-            if by_rate != 0.0:
-                continue
-            d1 = h * by_x * rate
-            c, dip = lowest_between(s0, d0, s1, d1)
-            if dip < 0.0:
-                best = min(best, c)
-            elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
-                low = dip
-                near = c
+            s0, d0, plain0 = margin_of_member(model, k, i, member_state, rel0[p], h)
+            s1, d1, plain1 = margin_of_member(model, k, i, member_state, rel1[p], h)
+            least = min(min(s0, s1), min(s0 + d0 / 3.0, s1 - d1 / 3.0))
+            if not (plain0 and plain1 and least > FAR * (abs(d0) + abs(d1) + abs(s1 - s0))):
+                found += 1
+                watched[found] = i
     for j in range(model.contact_pair.shape[0]):
-        row = model.contact[j]
-        mode = int(member_state[MODE, model.member.shape[1] + j])
-        p = model.contact_pair[j]
-        height, rise, room, room_rate, end = contact_seen(model, j, rel0[p])
-        by_height, by_rise, by_room = contact_margin_slopes(row, height, rise, room, mode)
-        s0 = contact_margin(row, height, rise, room, mode)
-        d0 = h * (by_room * room_rate + by_height * rise)
-        height, rise, room, room_rate, at_end = contact_seen(model, j, rel1[p])
-        at_height, at_rise, at_room = contact_margin_slopes(row, height, rise, room, mode)
-        if by_rise != 0.0 or at_rise != 0.0 or by_height != at_height or (by_room != 0.0 and end != at_end):
-            continue
-        s1 = contact_margin(row, height, rise, room, mode)
-        d1 = h * (at_room * room_rate + at_height * rise)
+        found += 1
+        watched[found] = model.member.shape[1] + j
+    watched[0] = found
+
+
+@part
+def margin_of_member(model, k, i, member_state, r, h):
+    """Margin of member i of block k, its change at its present rate within h (s), and whether no rate is in it.
+
+    member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+    r (POSE,): relative pose of its pair. The change is 0 where rates are in the margin.
+    """
+    code = model.block[k, CODE]
+    mode = int(member_state[MODE, i])
+    _, x, rate = member_motion(model, i, r)
+    x -= member_state[SET, i]
+    s = law_margin(code, model.law[k], x, rate, mode, model.curves)
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
+    plain = by_rate == 0.0
+    return s, (h * by_x * rate if plain else 0.0), plain
+
+
+@kernel
+def smallest_margin(model, member_state, rel, watched):
+    """The smallest margin of those that are watched, at relative poses rel (n_pair, POSE), and whose it is."""
+    best = np.inf
+    who = -1
+    first = model.member.shape[1]
+    for m in range(1, watched[0] + 1):
+        i = watched[m]
+        if i < first:
+            k = block_of(model, i)
+            _, x, rate = member_motion(model, i, rel[model.block[k, PAIR]])
+            x -= member_state[SET, i]
+            s = law_margin(model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), model.curves)
+        else:
+            j = i - first
+            height, rise, room, _, _ = contact_seen(model, j, rel[model.contact_pair[j]])
+            s = contact_margin(model.contact[j], height, rise, room, int(member_state[MODE, i]))
+        if s < best:
+            best = s
+            who = i
+    return best, who
+
+
+@kernel
+def first_dip(model, member_state, rel0, rel1, h, parts, watched):
+    """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
+
+    Looked for on the cubic through a margin's values and rates at both poses.
+
+    Constant:
+      model: the compiled scene.
+      member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      rel0, rel1 (n_pair, POSE): relative poses at both ends.
+      h: time between them (s).
+      parts: of how many parts of a step this is one, whose cubic the poses were taken from.
+      watched: the members and contacts that are looked at (`watch_near`).
+
+    Returns the earliest fraction at which a minimum is below zero, 2 where none is; the fraction of the lowest minimum
+    that may be below zero in truth, 2 where there is none; its value, infinite where there is none.
+    """
+    best = 2.0
+    near = 2.0
+    low = np.inf
+    first = model.member.shape[1]
+    for m in range(1, watched[0] + 1):
+        i = watched[m]
+        if i < first:
+            k = block_of(model, i)
+            p = model.block[k, PAIR]
+            s0, d0, plain = margin_of_member(model, k, i, member_state, rel0[p], h)
+            if not plain:
+                continue
+            s1, d1, plain = margin_of_member(model, k, i, member_state, rel1[p], h)
+            if not plain:
+                continue
+        else:
+            s0, d0, s1, d1, plain = margins_of_contact(model, i - first, int(member_state[MODE, i]), rel0, rel1, h)
+            if not plain:
+                continue
         c, dip = lowest_between(s0, d0, s1, d1)
         if dip < 0.0:
             best = min(best, c)
@@ -157,6 +206,23 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
             low = dip
             near = c
     return best, near, low
+
+
+@part
+def margins_of_contact(model, j, mode, rel0, rel1, h):
+    """Margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin."""
+    row = model.contact[j]
+    p = model.contact_pair[j]
+    height, rise, room, room_rate, end = contact_seen(model, j, rel0[p])
+    by_height, by_rise, by_room = contact_margin_slopes(row, height, rise, room, mode)
+    s0 = contact_margin(row, height, rise, room, mode)
+    d0 = h * (by_room * room_rate + by_height * rise)
+    height, rise, room, room_rate, at_end = contact_seen(model, j, rel1[p])
+    at_height, at_rise, at_room = contact_margin_slopes(row, height, rise, room, mode)
+    s1 = contact_margin(row, height, rise, room, mode)
+    d1 = h * (at_room * room_rate + at_height * rise)
+    uneven = by_rise != 0.0 or at_rise != 0.0 or by_height != at_height or (by_room != 0.0 and end != at_end)
+    return s0, d0, s1, d1, not uneven
 
 
 @kernel
@@ -178,36 +244,31 @@ def lowest_between(s0, d0, s1, d1):
 
 
 @kernel
-def probes_needed(model, segment, rel0, rel1):
+def probes_needed(model, rel0, rel1, watched):
     """In how many parts a step is looked through: more where the bodies move far compared with a member's length.
 
     The distance from a curved surface's centre or axis is to a contact what its length is to a member.
     """
     needed = 4.0
-    for k in range(model.block.shape[0]):
-        code = model.block[k, CODE]
-        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
-            continue
-        p = model.block[k, PAIR]
+    first = model.member.shape[1]
+    for m in range(1, watched[0] + 1):
+        i = watched[m]
+        p = model.block[block_of(model, i), PAIR] if i < first else model.contact_pair[i - first]
         moved = deflection(model, rel1, rel0, p)
-        lo = model.block[k, START]
-        for i in range(lo, lo + model.block[k, COUNT]):
-            for r in (rel0[p], rel1[p]):
-                length, _, _ = member_motion(model, i, r)
-                needed = max(needed, min(8.0 * moved / max(length, 1e-300), 200.0))
-            turn = turning_rate(model, rel1, p) + turning_rate(model, rel0, p)
-            needed = max(needed, min(4.0 * turn, 8.0))
-    for j in range(model.contact_pair.shape[0]):
-        p = model.contact_pair[j]
-        needed = max(needed, min(4.0 * (turning_rate(model, rel1, p) + turning_rate(model, rel0, p)), 8.0))
-        near = min(contact_distance(model, j, rel0[p]), contact_distance(model, j, rel1[p]))
+        if i < first:
+            one, _, _ = member_motion(model, i, rel0[p])
+            two, _, _ = member_motion(model, i, rel1[p])
+            near = min(one, two)
+        else:
+            near = min(contact_distance(model, i - first, rel0[p]), contact_distance(model, i - first, rel1[p]))
         if near < np.inf:
-            needed = max(needed, min(8.0 * deflection(model, rel1, rel0, p) / max(near, 1e-300), 200.0))
+            needed = max(needed, min(8.0 * moved / max(near, 1e-300), 200.0))
+        needed = max(needed, min(4.0 * (turning_rate(model, rel1, p) + turning_rate(model, rel0, p)), 8.0))
     return int(needed)
 
 
 @kernel
-def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, noise):
+def first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched):
     """Where in a step a member seems to leave its mode and come back before the end.
 
     Looked for on the cubic through the states at both ends, in as many parts as the motion asks for, and in each part
@@ -215,42 +276,61 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
 
     Constant:
       model: the compiled scene.
-      segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends.
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
       noise: how far below zero a margin is by rounding alone (m).
+      watched: the members and contacts that are looked at (`watch_near`).
 
     Returns the earliest fraction, or 2; and the fraction of the lowest margin that may be below zero in truth, or 2.
     """
-    parts = probes_needed(model, segment, rel0, rel1)
+    if watched[0] == 0:
+        return 2.0, 2.0
+    parts = probes_needed(model, rel0, rel1, watched)
     q = np.empty(q0.shape[0])
     v = np.empty(v0.shape[0])
     before = rel0.copy()
     rel = np.empty(rel0.shape)
     near = 2.0
     low = np.inf
-    for part in range(1, parts + 1):
-        c = part / parts
-        if part == parts:
+    for piece in range(1, parts + 1):
+        c = piece / parts
+        if piece == parts:
             relative_pose(model, q1, v1, rel)
         else:
             cubic(model, c, h, q0, v0, q1, v1, q, v)
             relative_pose(model, q, v, rel)
-            margin, _ = smallest_margin(model, segment, member_state, rel)
+            margin, _ = smallest_margin(model, member_state, rel, watched)
             if margin < -noise:
                 return c, near
-        dip, may, lowest = first_dip(model, segment, member_state, before, rel, h / parts, parts)
+        dip, may, lowest = first_dip(model, member_state, before, rel, h / parts, parts, watched)
         if dip < 1.0:
-            return (part - 1 + dip) / parts, near
+            return (piece - 1 + dip) / parts, near
         if lowest < low:
             low = lowest
-            near = (part - 1 + may) / parts
+            near = (piece - 1 + may) / parts
         for p in range(rel.shape[0]):
             for i in range(rel.shape[1]):
                 before[p, i] = rel[p, i]
     return 2.0, near
+
+
+@kernel
+def is_doubtful(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched):
+    """Whether a member may leave its mode and come back within a step; arguments as of `first_sign`.
+
+    model: the compiled scene.
+    member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+    q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends.
+    rel0, rel1 (n_pair, POSE): relative poses at both ends.
+    h: length of the step (s).
+    noise: how far below zero a margin is by rounding alone (m).
+    watched: the members and contacts that are looked at (`watch_near`).
+    """
+    dip, near = first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched)
+    c = dip if dip < 1.0 else near
+    return EDGE < c < 1.0 - EDGE
 
 
 @kernel

@@ -86,7 +86,8 @@ class GeneralDriver:
         self._start = model.q0, model.v0
         self._model = model
         self._packed = self.ints, self.floats = self._pack(model)
-        self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS])
+        integrated = any(name in INTEGRALS for name in scene.reductions)
+        self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(integrated)])
         self.work = np.zeros(WORK, dtype=np.int64)
         padded, n_design, count = model.member.shape[1], case.n_design, len(scene.responses)
         self._placing = Placing(case, scene.load_case, model) if case.variables else None
@@ -323,9 +324,14 @@ class GeneralDriver:
         found: int = self.ready(
             f"peaks_of_steps {j}", self.entry.peaks_of_steps, self.entry.TAG, self.ints, self.floats,
             self.method.tables, self.limits, count, self.room, self.room_ints, self.member_state, j, both,
-            not self.method.kind.adaptive, window, self._rows_of[j], self.work,
+            self.steps_are_fine, window, self._rows_of[j], self.work,
         )  # fmt: skip
         return found
+
+    @property
+    def steps_are_fine(self) -> bool:
+        """Whether no step is as long as a vibration (`peak_search.sample_steps`)."""
+        return self.method.kind.explicit or not self.method.kind.adaptive
 
     def peaks_of_pieces(
         self,
@@ -337,6 +343,7 @@ class GeneralDriver:
         window: float,
         pieces: FloatArray = NO_PIECES,
         who: int = -1,
+        plain: IndexArray | None = None,
     ) -> FloatArray:
         """The peaks (K, COLUMNS) of response j in sampled pieces of steps (`peak_search.peaks_of_pieces`).
 
@@ -348,11 +355,13 @@ class GeneralDriver:
         window: how far below the highest sample a peak may be, relative to it.
         pieces (P, 4): what they are; no rows: the steps of the run.
         who: of the steps the member whose force is looked at; -1: at each place the one with the largest.
+        plain (P,): 1 where the samples inside a piece are left out; None: nowhere.
         """
+        plain = np.zeros(len(seen), dtype=np.int64) if plain is None else plain
         rows = np.empty(((LAST + 2) * len(t), COLUMNS))
         found = self.entry.peaks_of_pieces(
             self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count, self.room, self.room_ints,
-            self.member_state, j, who, pieces, t, seen, sign, window, rows, self.work,
+            self.member_state, j, who, pieces, t, seen, plain, sign, window, rows, self.work,
         )  # fmt: skip
         return rows[:found].copy()
 

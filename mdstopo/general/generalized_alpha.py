@@ -15,7 +15,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.events import first_sign, has_switches, smallest_margin
+from mdstopo.general.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
 from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, rate_of
 from mdstopo.general.locate import (
@@ -145,6 +145,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     t = times[0]
     drive_state(model, np.int64(0), t, q, v)
     switching = has_switches(model, no)
+    watched = room_for_watched(model)
+    watch_all(model, np.int64(0), watched)
     if switching:
         singular = start_modes(model, member_state, workspace, q, v, a0, lam, no)
         if singular >= 0:
@@ -201,11 +203,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             drive_state(model, segment, t, q, v)
             keep_state(history, count, t, q, v, history.push[count, 0], history.push[count, 1])
             if switching:
+                watch_all(model, segment, watched)
                 solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
                 first = events
                 events = log_switches(
-                    model, member_state, segment, t, q, v, workspace, a0, lam, history, count, events, -1.0, rounding,
-                    work, where,
+                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events, -1.0,
+                    rounding, work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
@@ -237,7 +240,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             happens = False
             who = nowhere
             if switching:
-                margin, who = smallest_margin(model, segment, member_state, rel)
+                margin, who = smallest_margin(model, member_state, rel, watched)
                 low = 0.0
                 high = h
                 top = 0
@@ -251,8 +254,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(model, left_q, left_v, before)
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
                     dip, near = first_sign(
-                        model, segment, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before, rel,
-                        cut[top] - low, rounding,
+                        model, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before, rel,
+                        cut[top] - low, rounding, watched,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
                     if middle < 0.0 or cuts == CUTS:
@@ -275,7 +278,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         where[0] = singular
                         return code, count, events, t
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
-                    value, near_who = smallest_margin(model, segment, member_state, rel)
+                    value, near_who = smallest_margin(model, member_state, rel, watched)
                     if value < -rounding:
                         high = middle
                         margin = value
@@ -286,7 +289,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 relative_pose(model, left_q, left_v, before)
                 happens = margin < -rounding
                 if happens:
-                    at_low, _ = smallest_margin(model, segment, member_state, before)
+                    at_low, _ = smallest_margin(model, member_state, before, watched)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
@@ -300,7 +303,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     for tries in range(TRIALS):
                         foreseen = foreseen_trial(
                             model, member_state, segment, t, piece, stop, curve_q, curve, trials, tries, rounding,
-                            trial_q, trial[VELOCITY], rel,
+                            watched, trial_q, trial[VELOCITY], rel,
                         )  # fmt: skip
                         middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
                         if middle < 0.0:
@@ -315,7 +318,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             where[0] = singular
                             return code, count, events, t
                         relative_pose(model, trial_q, trial[VELOCITY], rel)
-                        value, who = smallest_margin(model, segment, member_state, rel)
+                        value, who = smallest_margin(model, member_state, rel, watched)
                         note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
@@ -366,8 +369,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             if happens:
                 solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a0, lam)
                 events = log_switches(
-                    model, member_state, segment, t, q, v, workspace, a0, lam, history, count, events, graze, rounding,
-                    work, where,
+                    model, member_state, segment, t, q, v, watched, workspace, a0, lam, history, count, events, graze,
+                    rounding, work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t

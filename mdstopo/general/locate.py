@@ -12,7 +12,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
-from mdstopo.general.events import block_of, smallest_margin
+from mdstopo.general.events import EDGE, block_of, smallest_margin
 from mdstopo.general.members import MODE, SCALE, SET
 from mdstopo.general.model import CODE, PAIR
 from mdstopo.general.step_history import copy_vector
@@ -22,8 +22,8 @@ from mdstopo.mechanics.laws.table import law_grazes
 
 #: trials of the moment of one event
 TRIALS = 100
-#: cuts of one step, and how near to the ends of a piece none is worth making
-CUTS, EDGE = 24, 1e-7
+#: cuts of one step
+CUTS = 24
 #: margins (times rounding) at which a place behind the switch is near enough, and which is aimed at
 NEAR, AIM = 50.0, 5.0
 #: trials that are foreseen; evaluations of the quintic's margin for its root, and how near that is found; by which
@@ -58,7 +58,7 @@ def quintic_ends(model, member_state, segment, t, low, high, q0, v0, q1, v1, wor
 
 
 @kernel
-def foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c, room_q, room_v, rel):
+def foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c, watched, room_q, room_v, rel):
     """The smallest margin on the quintic through both ends of a piece (`quintic_ends`).
 
     model: the compiled scene.
@@ -67,17 +67,18 @@ def foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c,
     t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
     ends_q (2, n_q), ends (2, 2, n): of the quintic.
     c: fraction of the piece.
+    watched: the members and contacts that are looked at (`events.watch_near`).
     room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
     """
     quintic(model, c, high - low, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], room_q, room_v)
     drive_state(model, segment, t + low + c * (high - low), room_q, room_v)
     relative_pose(model, room_q, room_v, rel)
-    margin, _ = smallest_margin(model, segment, member_state, rel)
+    margin, _ = smallest_margin(model, member_state, rel, watched)
     return margin
 
 
 @kernel
-def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room_q, room_v, rel):
+def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, watched, room_q, room_v, rel):
     """Where in a piece of a step the quintic's smallest margin falls through zero, or -1: it does not.
 
     model: the compiled scene.
@@ -85,14 +86,15 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room
     segment: number of the stretch of time between two breakpoints.
     t, low, high: time at the start of the step, and where the piece begins and ends from there (s).
     ends_q (2, n_q), ends (2, 2, n): of the quintic (`quintic_ends`).
+    watched: the members and contacts that are looked at (`events.watch_near`).
     room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
 
     Returns a length of the step (s).
     """
     a = 0.0
     b = 1.0
-    at_a = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, a, room_q, room_v, rel)
-    at_b = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, b, room_q, room_v, rel)
+    at_a = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, a, watched, room_q, room_v, rel)
+    at_b = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, b, watched, room_q, room_v, rel)
     if not at_b < 0.0:
         return -1.0
     if at_a < -1e-3 * at_b:  # the piece begins on the switch of a member that has just left it: half-way first
@@ -105,7 +107,9 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room
             c = 0.5 * (a + b)
         if b - a <= CLOSE:
             break
-        value = foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c, room_q, room_v, rel)
+        value = foreseen_margin(
+            model, member_state, segment, t, low, high, ends_q, ends, c, watched, room_q, room_v, rel
+        )
         if value < 0.0:
             if b - c <= CLOSE and side == 1:
                 break
@@ -127,7 +131,7 @@ def foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room
 
 @kernel
 def foreseen_trial(
-    model, member_state, segment, t, low, high, ends_q, ends, trials, tries, rounding, room_q, room_v, rel
+    model, member_state, segment, t, low, high, ends_q, ends, trials, tries, rounding, watched, room_q, room_v, rel
 ):
     """Where the next trial is to be by what the quintic and the trials so far foresee, or -1: nowhere.
 
@@ -141,13 +145,14 @@ def foreseen_trial(
       trials (2, 2): length of the step (s) and smallest margin of the last trial and of the one before.
       tries: how many trials there have been.
       rounding: what rounding leaves of a margin.
+      watched: the members and contacts that are looked at (`events.watch_near`).
     Out:
       room_q (n_q,), room_v (n,), rel (n_pair, POSE): overwritten.
 
     Returns a length of the step (s).
     """
     if tries == 0:
-        return foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, room_q, room_v, rel)
+        return foreseen_root(model, member_state, segment, t, low, high, ends_q, ends, watched, room_q, room_v, rel)
     if tries >= FORESEEN:
         return -1.0
     last = trials[0, 0]
@@ -155,10 +160,10 @@ def foreseen_trial(
     if tries == 1:
         c = min(max((last - low) / (high - low), BESIDE), 1.0 - BESIDE)
         ahead = foreseen_margin(
-            model, member_state, segment, t, low, high, ends_q, ends, c + BESIDE, room_q, room_v, rel
+            model, member_state, segment, t, low, high, ends_q, ends, c + BESIDE, watched, room_q, room_v, rel
         )
         behind = foreseen_margin(
-            model, member_state, segment, t, low, high, ends_q, ends, c - BESIDE, room_q, room_v, rel
+            model, member_state, segment, t, low, high, ends_q, ends, c - BESIDE, watched, room_q, room_v, rel
         )
         rate = (ahead - behind) / (2.0 * BESIDE * (high - low))
     else:

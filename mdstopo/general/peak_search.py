@@ -2,13 +2,16 @@
 
 A motion is a sequence of steps, or of pieces of steps (`minima`), on each of which the response is smooth. Samples of a
 piece lie at its start, its end and in between (`SAMPLES`); between two of them where the rate falls through zero a peak
-is refined on the method's own motion. Where steps are many to a vibration, as those of a method without error control
-are, what lies between the ends of one is sampled only where a peak may be.
+is refined on the method's own motion. Where no step is as long as a vibration, as those of explicit methods and of one
+without error control are, what lies between the ends of one is sampled only where a peak may be.
 """
+
+import math
 
 import numpy as np
 
-from mdstopo.compiler.jit import entry, kernel
+from mdstopo.compiler.jit import entry, kernel, part
+from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.dense_output import evaluate_here, finished, go_to, time_at
 from mdstopo.general.extremes import (
     COLUMNS,
@@ -25,10 +28,11 @@ from mdstopo.general.extremes import (
     VALUE,
     WHO,
 )
-from mdstopo.general.method_interface import derivatives, is_continuous
-from mdstopo.general.model import ORDER, unpack_general
-from mdstopo.general.responses import kinked, rate_is_by_state
+from mdstopo.general.method_interface import is_continuous
+from mdstopo.general.model import unpack_general
+from mdstopo.general.responses import follows_state, kinked
 from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.integrators.steps import FORCES, OF_POINTS, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
 
 #: columns of a sample: value, rate, member
@@ -45,6 +49,8 @@ RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 JUMP = 1e-9
 #: how often a bracket of a peak is narrowed at most
 TRIALS = 60
+#: a change of the fraction at which a peak has settled: secants square it, or nearly
+SETTLED = 1e-8
 #: a step has no peak inside if its ends stay below the limit by so many times what it may rise by; or if it rises (or
 #: falls) at both ends, with rates that differ by at most one share, and a mean rate that is theirs to another
 MARGIN, ALIKE, EVEN = 4.0, 0.5, 0.1
@@ -60,7 +66,7 @@ def evaluate_exactly(tag, motion, j, k, c, who):
     who: the member whose force is meant; -1: the one with the largest.
     """
     go_to(tag, motion, k, c, np.bool_(True), -1)
-    return evaluate_here(tag, motion, j, k, c, who, np.bool_(True))
+    return evaluate_here(tag, motion, j, k, c, who, np.bool_(True), np.bool_(False), OF_POINTS)
 
 
 @kernel
@@ -69,12 +75,12 @@ def sample_ends(tag, motion, j, seen, accelerations):
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j: the response.
     seen (count, SAMPLES, 3): the first and the last sample of each step are written.
-    accelerations (count, 2, n): those at both ends of each step are written.
+    accelerations (count, 2, n): those at both ends of each step are written, NaN where the response needs no balance.
 
     What is behind a boundary is what is in front of it where no law, load or mode changes there.
     """
     history = motion.history
-    shared = rate_is_by_state(motion.model, j) and motion.model.response[j, ORDER] < derivatives(tag)
+    shared = follows_state(tag, motion.model, j)
     for k in range(motion.count):
         restore_modes(history, history.index[k, EVENTS], motion.member_state)
         for e in range(2):
@@ -92,7 +98,10 @@ def sample_ends(tag, motion, j, seen, accelerations):
             copy_vector(history.v[k + e], motion.v)
             t = time_at(history, k, float(e))
             drive_state(motion.model, history.index[k, SEGMENT], t, motion.q, motion.v)
-            value, rate, who = evaluate_here(tag, motion, j, k, float(e), -1, np.bool_(True))
+            motion.a[:] = np.nan
+            value, rate, who = evaluate_here(
+                tag, motion, j, k, float(e), -1, np.bool_(True), np.bool_(False), OF_SAMPLES
+            )
             seen[k, e * LAST, G] = value
             seen[k, e * LAST, DG] = rate
             seen[k, e * LAST, MEMBER] = who
@@ -105,7 +114,7 @@ def sample_inside(tag, motion, j, k, seen, accelerations):
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j, k: the response, the step.
     seen (SAMPLES, 3): all samples but the first and the last are written.
-    accelerations (2, n): at both ends of the step.
+    accelerations (2, n): at both ends of the step; made where they are NaN.
     """
     history = motion.history
     h = history.t[k + 1] - history.t[k]
@@ -121,13 +130,20 @@ def sample_inside(tag, motion, j, k, seen, accelerations):
     for e in range(2):
         copy_vector(history.q[k + e], ends_q[e])
         copy_vector(history.v[k + e], ends[e, 0])
+        if accelerations.shape[1] > 0 and np.isnan(accelerations[e, 0]):
+            solve_accelerations(
+                model, motion.member_state, history.index[k, SEGMENT], history.t[k + e], ends_q[e], ends[e, 0],
+                np.bool_(False), motion.workspace, accelerations[e], motion.lam,
+            )  # fmt: skip
+            motion.work[FORCES] += 1
+            motion.work[OF_SAMPLES] += 1
         copy_vector(accelerations[e], ends[e, 1])
         drive_state(model, history.index[k, SEGMENT], history.t[k + e], ends_q[e], ends[e, 0])
     for i in range(1, LAST):
         c = i / LAST
         quintic(model, c, h, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], motion.q, motion.v)
         drive_state(motion.model, history.index[k, SEGMENT], time_at(history, k, c), motion.q, motion.v)
-        value, rate, who = evaluate_here(tag, motion, j, k, c, -1, np.bool_(True))
+        value, rate, who = evaluate_here(tag, motion, j, k, c, -1, np.bool_(True), np.bool_(False), OF_SAMPLES)
         seen[i, G] = value
         seen[i, DG] = rate
         seen[i, MEMBER] = who
@@ -158,7 +174,7 @@ def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
       motion: the finished motion.
       j: the response.
       both: whether peaks of -g are wanted, too.
-      fine: whether steps are many to a vibration, so that not all have to be sampled inside.
+      fine: whether no step is as long as a vibration, so that not all have to be sampled inside.
       closeness: how far below the highest a peak may be, relative to it.
     Out:
       seen (count, SAMPLES, 3): values, rates, members; NaN inside steps that are plain.
@@ -172,7 +188,8 @@ def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
         for e in range(2):
             top = max(top, seen[k, e * LAST, G])
             low = min(low, seen[k, e * LAST, G])
-    sparing = fine and not kinked(motion.model, j)
+    # an absolute value or a norm turns round at its minima alone
+    sparing = fine and not (both and kinked(motion.model, j))
     for k in range(motion.count):
         h = motion.history.t[k + 1] - motion.history.t[k]
         plain[k] = 0
@@ -234,27 +251,39 @@ def evaluate_piece(tag, motion, j, who, pieces, w, c, sample):
 
 
 @kernel
-def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, sample):
-    """The fraction of piece w at which the rate vanishes, by Illinois' rule on the method's own motion.
+def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, first, bend, sample):
+    """The fraction of piece w at which the rate vanishes, on the method's own motion.
+
+    By secants, from a first guess and its slope; where these lead out of the bracket by Illinois' rule.
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j, who: response and member.
     pieces (P, 4), w: of `evaluate_piece`.
     low, high: fractions between which the rate falls through zero. rise, fall: sign times the rate at them.
     sign: 1, or -1 for peaks of -g. sample (3,): out, what is there.
+    first, bend: the guess, and how the rate changes there with the fraction; NaN: none.
     """
     size = max(rise, -fall)
     side = 0
     c = np.nan
     last = np.nan
+    at_last = np.nan
+    foreseen = first
     for _ in range(TRIALS):
-        c = (low * fall - high * rise) / (fall - rise)
+        c = foreseen
+        if not low < c < high:
+            c = (low * fall - high * rise) / (fall - rise)
         if not low < c < high:
             c = 0.5 * (low + high)
         evaluate_piece(tag, motion, j, who, pieces, w, c, sample)
         rate = sign * sample[DG]
-        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= 1e-13:
+        # the next secant would lead no farther than the square of this one
+        if abs(rate) <= ROUNDING * size or high - low <= 1e-14 or abs(c - last) <= SETTLED:
             break
+        if c != last and not np.isnan(last):
+            bend = (rate - at_last) / (c - last)
+        foreseen = c - rate / bend if bend < 0.0 else np.nan
         last = c
+        at_last = rate
         if rate > 0.0:
             low = c
             rise = rate
@@ -268,6 +297,16 @@ def refine(tag, motion, j, who, pieces, w, low, high, rise, fall, sign, sample):
                 rise *= 0.5
             side = 1
     return c
+
+
+@part
+def highest_between(one, two, rise, fall):
+    """Where the cubic with these values and slopes (above 0, and below) at 0 and 1 is highest, and its bend there."""
+    cube = rise + fall - 2.0 * (two - one)
+    square = two - one - rise - cube
+    root = math.sqrt(max(square * square - 3.0 * cube * rise, 0.0))
+    c = rise / (root - square) if root > square else 0.5
+    return c, 2.0 * square + 6.0 * cube * c
 
 
 @kernel
@@ -298,6 +337,7 @@ def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows,
             if not max(ga + max(da, 0.0) * width, gb + max(-db, 0.0) * width) >= limit:
                 continue
             low, high = i / LAST, (i + 1) / LAST
+            first = bend = np.nan
             if da * db > 0.0:  # both rates of one sign: the cubic through them may yet turn twice
                 slope = (gb - ga) / width
                 half = 3.0 * slope - 2.0 * da - db
@@ -323,7 +363,11 @@ def peaks_inside(tag, motion, j, who, pieces, t, seen, plain, sign, limit, rows,
                 db = sign * seen[w, i + 2, DG]
             elif not (da > 0.0 and db < 0.0):
                 continue
-            c = refine(tag, motion, j, who, pieces, w, low, high, da, db, sign, sample)
+            else:
+                first, bend = highest_between(ga, gb, width * da, width * db)
+                bend *= LAST / width
+                first = low + first * (high - low)
+            c = refine(tag, motion, j, who, pieces, w, low, high, da, db, sign, first, bend, sample)
             found = add_row(rows, found, t, w, c, sample, sign)
     return found
 
@@ -528,7 +572,7 @@ def peaks_of_steps(
     history = carve_history(model, limits, room, room_ints)
     motion = finished(model, tables, member_state, history, count, work)
     seen = np.empty((count, SAMPLES, 3))
-    plain = np.empty(count, np.int8)
+    plain = np.empty(count, np.int64)
     sample_steps(tag, motion, j, both, fine, closeness, seen, plain)
     no_pieces = np.empty((0, 4))
     rows = np.empty((2 * (LAST + 2) * (count + 1), COLUMNS))
@@ -541,8 +585,8 @@ def peaks_of_steps(
 
 @entry
 def peaks_of_pieces(
-    tag, ints, floats, tables, limits, count, room, room_ints, member_state, j, who, pieces, t, seen, sign, closeness,
-    rows, work,
+    tag, ints, floats, tables, limits, count, room, room_ints, member_state, j, who, pieces, t, seen, plain, sign,
+    closeness, rows, work,
 ):  # fmt: skip
     """The peaks of a response on pieces of steps that have been sampled; not ranked.
 
@@ -559,6 +603,7 @@ def peaks_of_pieces(
       pieces (P, 4): step, fractions at its start and its end, member; no rows: the steps as they are.
       t (P + 1,): ends of the pieces (s).
       seen (P, SAMPLES, 3): value, rate (per s) and member at the samples.
+      plain (P,): 1 where the samples inside a piece are left out.
       sign: 1 for peaks of g, -1 for those of -g.
       closeness: how far below the highest sample a peak may be, relative to it.
     In place:
@@ -572,7 +617,6 @@ def peaks_of_pieces(
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
     motion = finished(model, tables, member_state, history, count, work)
-    plain = np.zeros(seen.shape[0], np.int8)
     return search(tag, motion, j, who, pieces, t, seen, plain, sign, closeness, rows, np.int64(0))
 
 

@@ -51,6 +51,7 @@ from mdstopo.general.step_history import (
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     freedoms,
+    member_motion,
     member_rows,
     member_work,
     pair_displacement,
@@ -62,6 +63,7 @@ from mdstopo.mechanics.laws.table import (
     FREE_LENGTH,
     law,
     law_divides,
+    law_is_idle,
     law_makes_set,
     law_remembers,
     law_set_slope,
@@ -141,6 +143,42 @@ def add_sets(model, segment, member_state, q, v, z, weight, out):
                 if length > 0.0:
                     force, stored = set_slopes(model, k, i, member_state, x - member_state[SET, i], 0.0)
                     out[slot] += energy * stored - force * along
+            slot += 1
+
+
+@kernel
+def add_sets_of_rows(model, segment, member_state, history, at, z, j, out):
+    """`add_sets` at one stage for the virtual displacements of many rows, without energy.
+
+    Constant:
+      model: the compiled scene.
+      history, at: the history of steps (`StepHistory`), and the number of the stage.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      z (R, s or more, n), j: virtual displacements of each row at each stage; the stage, counted from the step's first.
+    Out:
+      out (R, slots): derivatives by the sets, added to.
+    """
+    rel = np.empty((model.pair.shape[0], pose_size(model)))
+    u = np.empty(freedoms(model))
+    relative_pose(model, history.stage_q[at], history.stage_v[at], rel)
+    slot = 0
+    for k in range(model.block.shape[0]):
+        code = model.block[k, CODE]
+        if not law_remembers(code):
+            continue
+        lo = model.block[k, START]
+        p = model.block[k, PAIR]
+        for i in range(lo, lo + model.block[k, COUNT]):
+            if model.active[segment, k] != 0 and not law_is_idle(code, int(member_state[MODE, i])):
+                length, x, _ = member_motion(model, i, rel[p])
+                force, _ = set_slopes(model, k, i, member_state, x - member_state[SET, i], 0.0)
+                if length > 0.0 and force != 0.0:
+                    for m in range(out.shape[0]):
+                        pair_displacement(model, rel, p, z[m, j], u)
+                        _, _, along = member_work(model, i, rel[p], u)
+                        out[m, slot] -= force * along
             slot += 1
 
 

@@ -55,18 +55,21 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     MOMENT,
     add_pair_force,
     angle_motion,
+    freedoms,
     kinematics_of,
     member_rows,
     most_rows,
     point_motion,
+    pose_acceleration,
     retract,
+    second_rate,
     stretch_between,
     tilt_motion,
     transmitted,
     turn_motion,
     turn_of,
 )
-from mdstopo.mechanics.laws.table import law
+from mdstopo.mechanics.laws.table import law, law_is_idle, law_is_timed
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -131,6 +134,24 @@ def _is_by_state(kind):
 def rate_is_by_state(model, j):
     """Whether the rate of response j is g_q v + g_v a (`ResponseKernels.by_state`)."""
     return _is_by_state(model.response[j, 0])
+
+
+@kernel
+def is_plain(model, group):
+    """Whether forces of a group depend on elongations and their rates alone: no inerters, no laws of time."""
+    for k in range(model.block.shape[0]):
+        if model.block[k, GROUP] == group and (model.block[k, CODE] == INERTER or law_is_timed(model.block[k, CODE])):
+            return False
+    return True
+
+
+@kernel
+def follows_state(tag, model, j):
+    """Whether the rate of response j is g_q v + g_v a on the motion of a method."""
+    kind = model.response[j, KIND]
+    if kind == MEMBER_FORCE:
+        return derivatives(tag) > 1 and is_plain(model, model.response[j, SUBJECT])
+    return _is_by_state(kind) and model.response[j, ORDER] < derivatives(tag)
 
 
 @kernel
@@ -220,12 +241,57 @@ def group_forces(model, member_state, segment, t, group, q, v, a, out):
             if model.block[k, CODE] == INERTER:
                 out[first + i] += scale * inerter_force(model, k, i, q, v, a, row)
                 continue
+            if law_is_idle(model.block[k, CODE], int(member_state[MODE, i])):
+                continue
             x, rate = stretch_between(model, p, i, turn_one, turn_two, q, v)
             x -= member_state[SET, i]
             f, _, _, _, _ = law(
                 model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves
             )
             out[first + i] += scale * f
+
+
+@kernel
+def group_rates(model, member_state, segment, t, group, q, v, a, rel, out):
+    """Forces of `group_forces`, and their rates, of a group that is plain (`is_plain`).
+
+    Constant:
+      model: the compiled scene.
+    In:
+      member_state (3, M_padded + n_contact + 1): scale, mode and permanent set of every member.
+      segment: number of the stretch of time between two breakpoints.
+      t: time (s).
+      group: the group.
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+      rel (n_pair, POSE): relative poses there.
+    Out:
+      out (2, M): f* of each member of the group (N), and its rate (N/s).
+    """
+    out[:] = 0.0
+    second = np.empty(freedoms(model))
+    for k in range(model.block.shape[0]):
+        if model.block[k, GROUP] != group or model.active[segment, k] == 0:
+            continue
+        p = model.block[k, PAIR]
+        code = model.block[k, CODE]
+        turn_one = turn_of(model, model.pair[p, 0], q)
+        turn_two = turn_of(model, model.pair[p, 1], q)
+        pose_acceleration(model, rel, p, a, second)
+        value = level_of(model, segment, k, t)
+        first = model.block[k, OFFSET] - model.block[k, START]
+        for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+            mode = int(member_state[MODE, i])
+            if law_is_idle(code, mode):
+                continue
+            scale = member_state[SCALE, i]
+            x, rate = stretch_between(model, p, i, turn_one, turn_two, q, v)
+            x -= member_state[SET, i]
+            f, by_x, by_rate, _, _ = law(code, model.law[k], x, rate, mode, t, value, model.curves)
+            slope = by_x * rate
+            if by_rate != 0.0:
+                slope += by_rate * second_rate(model, i, rel[p], second)
+            out[0, first + i] += scale * f
+            out[1, first + i] += scale * slope
 
 
 @kernel
@@ -749,12 +815,13 @@ def value_at(model, member_state, segment, t, q, v, j, workspace):
 
 @kernel
 def rated(
-    tag, model, member_state, history, k, c, j, who, rates, t, q, v, workspace, a, lam, bars, row_bar, near_q, near
-):
+    tag, model, member_state, history, k, c, j, who, rates, balanced, t, q, v, workspace, a, lam, bars, row_bar,
+    near_q, near, own,
+):  # fmt: skip
     """Value of response j and its rate in time at a state within a step.
 
     Where g depends on q alone, or on q and v and the motion has the accelerations of its balance, the rate is
-    dg/dt = g_q v + g_v a; else it is differenced along the method's own motion.
+    dg/dt = g_q v + g_v a (`follows_state`); else it is differenced along the method's own motion.
 
     Constant:
       tag: the method of integration (`method_interface`).
@@ -765,48 +832,54 @@ def rated(
       k, c: number of the step, and the fraction of it at which the state is.
       j: the response; below 0 none is asked for, and only the balance is made.
       who: of a member force the number of the member in its group.
-      rates: whether the rate is wanted; else it may be meaningless, and where g is one of positions or velocities alone
-        there is no balance: a, lam and the workspace stay those of another state.
+      rates: whether the rate is wanted; else it may be meaningless.
+      balanced: whether a and lam are wanted, whatever the response needs; else those of one that needs no balance stay
+        what they were.
       t: time (s).
       q (n_q,), v (n,): coordinates and velocities.
     Out:
       a (n,), lam (n_row,): accelerations and multipliers of the state.
-      workspace: workspace as the balance of the state leaves it.
+      workspace: overwritten.
       bars (3, n), row_bar (n_row,): slopes of the response by q, v, a and by lam.
-      near_q (n_q,), near (3, n): scratch.
+      near_q (n_q,), near (3, n), own (n_row,): scratch.
+
+    Returns the value, its rate (per s), and how many balances were made.
     """
     n = v.shape[0]
     segment = history.index[k, SEGMENT]
-    h = history.t[k + 1] - history.t[k]
     no = np.bool_(False)
-    rate = 0.0
     if j < 0:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
-        return np.nan, np.nan
+        return np.nan, np.nan, 1
     kind = model.response[j, KIND]
-    if not rates and not needs_accelerations(kind) and model.response[j, ORDER] < 2:
-        return response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar), rate
-    simple = not rates or (_is_by_state(kind) and model.response[j, ORDER] < derivatives(tag))
-    if not simple:
+    order = model.response[j, ORDER]
+    simple = not rates or follows_state(tag, model, j)
+    by_itself = not needs_accelerations(kind) and (order == 0 or (order == 1 and not rates))
+    made = 0
+    if balanced or not simple or not by_itself:
         solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
-        for d in range(n):
-            near[0, d] = a[d]
-        apart = APART * h
-        sides = np.zeros(2)
-        for side in range(2):
-            e = apart if side == 1 else -apart
-            beside(tag, model, history, k, c, e, q, v, near[0], near_q, near[1])
-            solve_accelerations(model, member_state, segment, t + e, near_q, near[1], no, workspace, near[2], lam)
-            sides[side] = response(
-                model, member_state, segment, j, who, t + e, near_q, near[1], near[2], lam, workspace, bars, row_bar
-            )
-        rate = (sides[1] - sides[0]) / (2.0 * apart)
-    solve_accelerations(model, member_state, segment, t, q, v, no, workspace, a, lam)
+        made = 1
     value = response(model, member_state, segment, j, who, t, q, v, a, lam, workspace, bars, row_bar)
+    rate = 0.0
+    if not rates:
+        return value, rate, made
     if simple:
         for d in range(n):
-            rate += bars[0, d] * v[d] + bars[1, d] * a[d]
-    return value, rate
+            rate += bars[0, d] * v[d]
+        if order > 0 or needs_accelerations(kind):
+            for d in range(n):
+                rate += bars[1, d] * a[d]
+        return value, rate, made
+    apart = APART * (history.t[k + 1] - history.t[k])
+    sides = np.zeros(2)
+    for side in range(2):
+        e = apart if side == 1 else -apart
+        beside(tag, model, history, k, c, e, q, v, a, near_q, near[1])
+        solve_accelerations(model, member_state, segment, t + e, near_q, near[1], no, workspace, near[2], own)
+        sides[side] = response(
+            model, member_state, segment, j, who, t + e, near_q, near[1], near[2], own, workspace, bars, row_bar
+        )
+    return value, (sides[1] - sides[0]) / (2.0 * apart), made + 2
 
 
 # Records

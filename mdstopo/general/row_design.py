@@ -70,7 +70,7 @@ def add_designs_of_rows(model, segment, history, o, stages, member_state, z, out
     longest = 0
     for k in range(model.block.shape[0]):
         longest = max(longest, model.block[k, COUNT])
-    seen = np.empty((freedoms(model) + 1, longest))
+    seen = np.empty((freedoms(model) + 2, longest))
     for k in range(model.block.shape[0]):
         if model.block[k, DESIGN] < 0 or model.active[segment, k] == 0:
             continue

@@ -15,7 +15,7 @@ from mdstopo.general.members import unscale_general
 from mdstopo.general.method_interface import step_back
 from mdstopo.general.model import unpack_general
 from mdstopo.general.parameters import add_times
-from mdstopo.general.permanent_sets import add_sets, count_sets, keep_start
+from mdstopo.general.permanent_sets import add_sets_of_rows, count_sets, keep_start
 from mdstopo.general.row_design import add_designs_of_rows
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, carve_history, restore_modes
 
@@ -63,20 +63,10 @@ def step_of_rows(
     else:
         add_designs_of_rows(model, segment, history, o, stages, member_state, z, out, work)
     before = history.index[w, PARENT]
+    if bar_set.shape[1] > 0:
+        for j in range(stages):
+            add_sets_of_rows(model, segment, member_state, history, o + j, z, j, bar_set)
     for m in range(lam_q.shape[0]):
-        if bar_set.shape[1] > 0:
-            restore_modes(history, history.index[w, EVENTS], member_state)
-            for j in range(stages):
-                add_sets(
-                    model,
-                    segment,
-                    member_state,
-                    history.stage_q[o + j],
-                    history.stage_v[o + j],
-                    z[m, j],
-                    0.0,
-                    bar_set[m],
-                )
         if model.varied.shape[0] > 0:
             add_times(
                 model, history, member_state, count, before + 1, np.int64(-1), np.bool_(False), lam_v[m], 0.0, out[m]

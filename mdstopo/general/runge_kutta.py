@@ -10,19 +10,19 @@ import numpy as np
 from mdstopo.compiler.jit import entry, kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
-from mdstopo.general.events import first_sign, has_switches, smallest_margin, switch_any
-from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
-from mdstopo.general.locate import (
-    CUTS,
-    TRIALS,
-    cut_at,
-    foreseen_trial,
-    matters,
-    narrowed,
-    next_trial,
-    note_trial,
-    quintic_ends,
+from mdstopo.general.events import (
+    has_switches,
+    is_doubtful,
+    room_for_watched,
+    smallest_margin,
+    switch_any,
+    watch_all,
+    watch_near,
 )
+from mdstopo.general.first_step import first_step, motion_scale, rounding_at_start
+from mdstopo.general.landing import CORRECTIONS, first_event, landing_of
+from mdstopo.general.locate import AIM
+from mdstopo.general.locate import NEAR as NEAR_SWITCH
 from mdstopo.general.members import MODE, SET, meeting, scale_general, set_modes
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
@@ -51,26 +51,26 @@ from mdstopo.general.step_history import (
     TIME_BY_SET,
     carve_history,
     copy_vector,
-    has_factors,
-    keep_stage,
     keep_state,
 )
+from mdstopo.general.step_inside import make_stages
 from mdstopo.general.strides import energy_column
-from mdstopo.general.switches import APART, THOROUGH
 from mdstopo.integrators.runge_kutta import MOST, _error
-from mdstopo.integrators.runge_kutta_tables import ORDERS, STAGES
+from mdstopo.integrators.runge_kutta_tables import INSIDE, ORDERS, STAGES
 from mdstopo.integrators.steps import (
     ACCEPTED,
     CHATTERING,
     FORCES,
     NEEDS_ROOM,
     NON_FINITE,
+    OF_REJECTED,
+    OF_STARTS,
+    OF_SWITCHES,
     OK,
     REJECTED,
     SINGULAR,
     STEP_LIMIT,
     STEP_TOO_SMALL,
-    TANGENTS,
     TURN,
 )
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -85,7 +85,6 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     pose_acceleration,
     pose_size,
     relative_pose,
-    stage_state,
 )
 
 TAG = (0,)
@@ -153,24 +152,11 @@ def advance(
 
     Returns -1, or what `projection.project` returns of joints that are singular or do not fit.
     """
-    vectors = table[2]
-    workspace.switches[THOROUGH] = 0  # a small eigenvalue shows at the step's end, too
-    workspace.switches[APART] = 1 if has_factors(history) else 0
-    for i in range(s):
-        stage_state(model, table, h, i, q0, v0, q, v, a, workspace.slopes)
-        time = t + h * vectors[0, i]
-        singular = solve_accelerations(model, member_state, segment, time, q[i], v[i], tangent, workspace, a[i], lam)
-        work[FORCES] += 1
-        if singular >= 0:
-            workspace.switches[THOROUGH] = 1
-            workspace.switches[APART] = 0
-            return singular
-        if o >= 0:
-            keep_stage(history, o + i, time, q[i], v[i], a[i], lam, workspace, tangent)
-    workspace.switches[THOROUGH] = 1
-    workspace.switches[APART] = 0
-    if tangent:
-        work[TANGENTS] += s
+    singular = make_stages(
+        model, table, 0, s, member_state, segment, t, h, q0, v0, tangent, o, workspace, lam, q, v, a, history, work
+    )
+    if singular >= 0:
+        return singular
     end_state(model, table, s, h, q0, v0, q, v, a, workspace.slopes, end_q, end_v)
     drive_state(model, segment, t + h, end_q, end_v)
     return project(model, size, end_q, end_v, workspace, push[0], push[1])
@@ -223,7 +209,7 @@ def start_modes(model, member_state, workspace, q, v, a, lam, knots):
 
 @kernel
 def log_switches(
-    model, member_state, segment, t, q, v, workspace, a, lam, history, state, events, graze, noise, work, where
+    model, member_state, segment, t, q, v, watched, workspace, a, lam, history, state, events, graze, noise, work, where
 ):
     """Switch every member whose margin is used up, one after the other, and note each as an event.
 
@@ -235,6 +221,7 @@ def log_switches(
       segment: number of the stretch of time between two breakpoints.
       t: time (s).
       q (n_q,), v (n,): coordinates and velocities.
+      watched: the members and contacts that may switch (`events.watch_near`).
       state: number of the state at which this happens.
       events: how many events there have been.
       graze: a member whose margin would fall below zero by less than this only grazes (m).
@@ -257,7 +244,7 @@ def log_switches(
     relative_pose(model, q, v, rel)
     done = 0
     while True:
-        margin, who = smallest_margin(model, segment, member_state, rel)
+        margin, who = smallest_margin(model, member_state, rel, watched)
         if not margin < -noise or done > 2 * member_state.shape[1]:
             return events
         if events >= history.event.shape[0]:
@@ -284,10 +271,58 @@ def log_switches(
             saltation[2, d] = a[d]
         solve_accelerations(model, member_state, segment, t, q, v, np.bool_(False), workspace, a, lam)
         work[FORCES] += 1
+        work[OF_STARTS] += 1
         for d in range(n):
             saltation[2, d] -= a[d]
         if new == old:
             return events
+
+
+@kernel
+def advance_to_switch(
+    step, table, s, segment, t, h, c, rate, rounding, tangent, o, lam, history, end_q, end_v, push, work
+):
+    """Make a step anew that ends where a member switches, for the sake of what needs all stages within a step.
+
+    Constant:
+      step: the step (`landing.Landing`), whose stages are overwritten.
+      table (3, 17, 17), s: coefficients of the method, and how many stages it has.
+    In:
+      segment: number of the stretch of time between two breakpoints.
+      t, h: time at the start, and length of the step that is too long (s).
+      c, rate: the fraction of it that is found on its polynomial, and the rate of the margin there (`first_event`).
+      rounding: what rounding leaves of a margin.
+      tangent, o: whether tangents of the stages are wanted; number of the first stage in `history`.
+    Out:
+      lam (n_row,): multipliers of the joints at the last stage.
+      history: the history of steps (`StepHistory`), where stages are kept.
+      end_q (n_q,), end_v (n,), push (2, n_row): the end of the step, and the multipliers of its projection.
+      work (WORK,): counts of work, added to.
+
+    Returns the length (s), and whether a margin is used up at its end.
+    """
+    length = c * h
+    before = 0.0
+    at_before = 0.0
+    value = 0.0
+    for tries in range(CORRECTIONS):
+        advance(
+            step.model, table, s, step.member_state, segment, t, length, step.q0, step.v0, tangent, o, step.workspace,
+            lam, step.q, step.v, step.a, history, end_q, end_v, push, step.size, work,
+        )  # fmt: skip
+        work[OF_SWITCHES] += s if tries > 0 else 0
+        relative_pose(step.model, end_q, end_v, step.rel)
+        value, _ = smallest_margin(step.model, step.member_state, step.rel, step.watched)
+        near = value < -rounding and (value >= -NEAR_SWITCH * rounding or tries >= CORRECTIONS // 2)
+        if near or tries + 1 == CORRECTIONS:
+            break
+        if tries > 0 and length != before and (value - at_before) / (length - before) < 0.0:
+            rate = (value - at_before) / (length - before)
+        before = length
+        at_before = value
+        shift = -(value + AIM * rounding) / rate if rate < 0.0 else 4e-16 * (abs(t) + h) * 4.0**tries
+        length = min(max(length + shift, 0.5 * length), h)
+    return length, value < -rounding
 
 
 @entry
@@ -297,7 +332,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     Constant:
       ints, floats: the packed scene (`pack_general`).
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
-      settings (4,): the tolerance; -; a fixed step (s; above 0: no error control); -.
+      settings (5,): the tolerance; -; a fixed step (s; above 0: no error control); -; not 0 where stages are to lie
+        within their steps, as for integrals over time: then steps that end at a switch are made anew, and shorter.
       limits (6,): steps allowed, then sizes of the history of steps (`carve_history`).
     In:
       alpha (N,): the design.
@@ -331,7 +367,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     times = model.times
     workspace = make_workspace(model)
     no = np.bool_(False)
-    nowhere = np.int64(-1)
     keep = np.bool_(tangent)
     size = scene_size(model)
     rounding = ROUNDING * size  # margins below this count as zero: a member that has just switched has such a one
@@ -345,16 +380,6 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     push = np.zeros((2, n_row))
     end_q = np.empty(n_q)
     end_v = np.empty(n)
-    trial_q = np.empty(n_q)
-    trial_v = np.empty(n)
-    trials = np.zeros((2, 2))
-    curve_q = np.empty((2, n_q))
-    curve = np.empty((2, 2, n))
-    cut = np.empty(CUTS + 1)
-    beyond_q = np.empty((CUTS + 1, n_q))
-    beyond_v = np.empty((CUTS + 1, n))
-    left_q = np.empty(n_q)
-    left_v = np.empty(n)
     weight = np.empty(n)
     a0 = np.zeros(n)
     q0 = model.q0.copy()
@@ -365,6 +390,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
     t = times[0]
     drive_state(model, np.int64(0), t, q0, v0)
     switching = has_switches(model, np.bool_(True))
+    watched = room_for_watched(model)
+    step = landing_of(model, table, size, member_state, q0, v0, q, v, a, workspace, watched)
     rubbing = model.contact_pair.shape[0] > 0
     brake = 0.0  # the rate at which contacts brake
     braking = -1  # the contact that brakes most
@@ -378,6 +405,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             where[2] = begins_divided(model, member_state, q0, v0, graze)
     singular = solve_accelerations(model, member_state, np.int64(0), t, q0, v0, np.bool_(True), workspace, a0, lam)
     work[FORCES] += 1
+    work[OF_STARTS] += 1
     if singular >= 0:
         where[0] = singular
         return SINGULAR, 0, 0, t
@@ -440,11 +468,14 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             keep_state(history, count, t, q0, v0, history.push[count, 0], history.push[count, 1])
             if switching:
                 # a member whose law begins to act at this time may be on either side of its switch
+                watch_all(model, segment, watched)
                 solve_accelerations(model, member_state, segment, t, q0, v0, no, workspace, a0, lam)
+                work[FORCES] += 1
+                work[OF_STARTS] += 1
                 first = events
                 events = log_switches(
-                    model, member_state, segment, t, q0, v0, workspace, a0, lam, history, count, events, -1.0, rounding,
-                    work, where,
+                    model, member_state, segment, t, q0, v0, watched, workspace, a0, lam, history, count, events, -1.0,
+                    rounding, work, where,
                 )  # fmt: skip
                 if events < 0:
                     return NEEDS_ROOM, count, 0, t
@@ -471,7 +502,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     lands = False
             if not h > 1e-14 * max(abs(t), abs(end)) or h < 1e-15 * span:
                 return STEP_TOO_SMALL, count, events, t
-            if count + 4 > history.t.shape[0] or stages + 2 * s > history.when.shape[0]:
+            if count + 4 > history.t.shape[0] or stages + INSIDE + s > history.when.shape[0]:
                 return NEEDS_ROOM, count, events, t
             singular = advance(
                 model, table, s, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q, v, a, history,
@@ -485,6 +516,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 wanted = 0.25 * h
                 must = False
                 work[REJECTED] += 1
+                work[OF_REJECTED] += s
                 continue
             sigma_end = least_singular_value(model, workspace)
             relative_pose(model, end_q, end_v, rel)
@@ -515,6 +547,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     wanted = 0.1 * h
                     must = False
                     work[REJECTED] += 1
+                    work[OF_REJECTED] += s
                     continue
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
                 if change > 1.0:
@@ -524,96 +557,56 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 if error > tolerance or turned > 1.1 * TURN:
                     must = False
                     work[REJECTED] += 1
+                    work[OF_REJECTED] += s
                     continue
                 if sigma_end < NEAR * sigma and not lands and h > 1e-9 * span:
                     wanted = 0.6 * h
                     work[REJECTED] += 1
+                    work[OF_REJECTED] += s
                     continue
             happens = False
+            own = s  # stages of the step
+            history.share[count] = 1.0
             if switching:
-                margin, who = smallest_margin(model, segment, member_state, rel)
-                low = 0.0
-                high = h
-                # pieces of the step that are still to be looked at, the next one last: from `low` to cut[top]
-                top = 0
-                cuts = 0
-                cut[0] = h
-                copy_vector(end_q, beyond_q[0])
-                copy_vector(end_v, beyond_v[0])
-                copy_vector(q0, left_q)
-                copy_vector(v0, left_v)
-                while top >= 0:
-                    relative_pose(model, left_q, left_v, before)
-                    relative_pose(model, beyond_q[top], beyond_v[top], rel)
-                    dip, near = first_sign(
-                        model, segment, member_state, left_q, left_v, beyond_q[top], beyond_v[top], before, rel,
-                        cut[top] - low, rounding,
+                relative_pose(model, q0, v0, before)
+                watch_near(model, segment, member_state, before, rel, h, watched)
+                margin, who = smallest_margin(model, member_state, rel, watched)
+                c = 2.0
+                rate = 0.0
+                if margin < -rounding or is_doubtful(
+                    model, member_state, q0, v0, end_q, end_v, before, rel, h, rounding, watched
+                ):
+                    singular = make_stages(
+                        model, table, s, INSIDE, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q,
+                        v, a, history, work,
                     )  # fmt: skip
-                    middle = cut_at(dip, near, low, cut[top])
-                    if middle < 0.0 or cuts == CUTS:
-                        if top == 0 and margin < -rounding:
-                            break
-                        low = cut[top]
-                        copy_vector(beyond_q[top], left_q)
-                        copy_vector(beyond_v[top], left_v)
-                        top -= 1
+                    work[OF_SWITCHES] += INSIDE - s
+                    if singular >= 0:
+                        wanted = 0.25 * h
+                        must = False
+                        work[REJECTED] += 1
+                        work[OF_REJECTED] += s
                         continue
-                    cuts += 1
-                    top += 1
-                    cut[top] = middle
-                    advance(
-                        model, table, s, member_state, segment, t, middle, q0, v0, no, nowhere, workspace, lam, q, v, a,
-                        history, beyond_q[top], beyond_v[top], push, size, work,
+                    c, who, rate = first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, where)
+                happens = c <= 1.0
+                if happens and settings[4] != 0.0:
+                    work[OF_SWITCHES] += s
+                    h, happens = advance_to_switch(
+                        step, table, s, segment, t, h, c, rate, rounding, keep, stages, lam, history, end_q, end_v,
+                        push, work,
                     )  # fmt: skip
-                    relative_pose(model, beyond_q[top], beyond_v[top], rel)
-                    value, near_who = smallest_margin(model, segment, member_state, rel)
-                    if value < -rounding:
-                        high = middle
-                        margin = value
-                        who = near_who
-                        break
-                    if value < graze and matters(model, member_state, rel, near_who):
-                        where[2] = near_who
-                relative_pose(model, left_q, left_v, before)
-                happens = margin < -rounding
-                if happens:
-                    at_low, _ = smallest_margin(model, segment, member_state, before)
-                    at_low = max(at_low, rounding)
-                    at_high = margin
-                    side = 0
-                    begin = low
-                    stop = high
-                    quintic_ends(
-                        model, member_state, segment, t, begin, stop, left_q, left_v, beyond_q[top], beyond_v[top],
-                        workspace, lam, curve_q, curve,
-                    )  # fmt: skip
-                    work[FORCES] += 2
-                    for tries in range(TRIALS):
-                        foreseen = foreseen_trial(
-                            model, member_state, segment, t, begin, stop, curve_q, curve, trials, tries, rounding,
-                            trial_q, trial_v, rel,
-                        )  # fmt: skip
-                        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, 4e-16 * (abs(t) + h), tries)
-                        if middle < 0.0:
-                            break
-                        advance(
-                            model, table, s, member_state, segment, t, middle, q0, v0, no, nowhere, workspace, lam, q,
-                            v, a, history, trial_q, trial_v, push, size, work,
-                        )  # fmt: skip
-                        relative_pose(model, trial_q, trial_v, rel)
-                        value, who = smallest_margin(model, segment, member_state, rel)
-                        note_trial(trials, middle, value)
-                        low, high, at_low, at_high, side = narrowed(
-                            low, high, at_low, at_high, middle, value, rounding, side
-                        )
-                    h = high
+                elif happens:
+                    own = INSIDE
+                    history.share[count] = c
+                    h *= c
+                    copy_vector(step.at_q, end_q)
+                    copy_vector(step.at_v, end_v)
+                    copy_vector(step.push[0], push[0])
+                    copy_vector(step.push[1], push[1])
+                if c <= 1.0:
                     lands = lands and h >= end - t
-                    singular = advance(
-                        model, table, s, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q, v, a,
-                        history, end_q, end_v, push, size, work,
-                    )  # fmt: skip
                     sigma_end = least_singular_value(model, workspace)
-                relative_pose(model, end_q, end_v, rel)
+                    relative_pose(model, end_q, end_v, rel)
             largest = max(largest, sigma_end)
             way = way_to_pose(h, sigma, sigma_end, largest)
             sigma = sigma_end
@@ -631,15 +624,17 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             history.index[count, PARENT] = count - 1
             history.index[count, SEGMENT] = segment
             history.index[count, EVENTS] = happened
-            stages += s
+            stages += own
             count += 1
             history.index[count, FIRST] = stages
             keep_state(history, count, t, q0, v0, push[0], push[1])
             work[ACCEPTED] += 1
             if happens:
                 solve_accelerations(model, member_state, segment, t, q0, v0, no, workspace, a0, lam)
+                work[FORCES] += 1
+                work[OF_STARTS] += 1
                 events = log_switches(
-                    model, member_state, segment, t, q0, v0, workspace, a0, lam, history, count, events, graze,
+                    model, member_state, segment, t, q0, v0, watched, workspace, a0, lam, history, count, events, graze,
                     rounding, work, where,
                 )  # fmt: skip
                 if events < 0:

@@ -6,9 +6,11 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.method_interface import implement
 from mdstopo.general.runge_kutta import TAG, advance, scene_size
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
+from mdstopo.general.step_inside import table_of_step
 from mdstopo.general.step_linear import explicit_back, explicit_forward
 from mdstopo.integrators.runge_kutta import MOST
 from mdstopo.integrators.runge_kutta_tables import STAGES
+from mdstopo.integrators.steps import OF_POINTS
 from mdstopo.mechanics.kinematics.kinematics_interface import advance_coordinates
 
 
@@ -48,6 +50,7 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
         history.v[k], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]), np.empty((MOST, n_q)),
         np.empty((MOST, n)), np.empty((MOST, n)), history, q, v, push, scene_size(model), work,
     )  # fmt: skip
+    work[OF_POINTS] += s
     if not keep:
         return k
     w = count + 1
@@ -149,9 +152,9 @@ def weights_of(tag, model, tables, history, w, out):
     w: number of the step.
     out (s or more,): the weights (s).
     """
-    method = 1 if model.size[2] != 0 else 0
-    for j in range(STAGES[method]):
-        out[j] = (history.t[w + 1] - history.t[w]) * tables[method, 2, 2, j]
+    table, stages = table_of_step(model, tables, history, w)
+    for j in range(stages):
+        out[j] = (history.t[w + 1] - history.t[w]) * table[2, 2, j]
 
 
 implement(

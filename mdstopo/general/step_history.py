@@ -55,6 +55,10 @@ class StepHistory:
     push: Annotated[
         FloatArray, Field("steps + 1, 2, n_row", "the multipliers mu, nu that put the state there (`projection`)")
     ]
+    share: Annotated[
+        FloatArray,
+        Field("steps + 1", "what part a step is of that which its stages were made for; 1 unless it ends at a switch"),
+    ]
     index: Annotated[
         IndexArray, Field("steps + 1, 4", "first stage; step before; segment; how many events had happened")
     ]

@@ -18,8 +18,8 @@ from mdstopo.general.accelerations import (
 from mdstopo.general.joint_matrix import solve_joints
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.step_history import FIRST, has_factors, mass_of
+from mdstopo.general.step_inside import table_of_step
 from mdstopo.general.switches import DAMPED
-from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_shift,
@@ -156,9 +156,7 @@ def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y,
       work (WORK,): counts of work, added to.
     """
     count, n = lam_q.shape
-    method = 1 if model.size[2] != 0 else 0
-    s = STAGES[method]
-    table = tables[method]
+    table, s = table_of_step(model, tables, history, w)
     o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
     work[REVERSE] += count
@@ -237,9 +235,7 @@ def explicit_forward(model, tables, history, w, dq, dv, force, stage_changes, ro
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = dq.shape[0]
-    method = 1 if model.size[2] != 0 else 0
-    s = STAGES[method]
-    table = tables[method]
+    table, s = table_of_step(model, tables, history, w)
     o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
     q = history.stage_q[o : o + s]

@@ -11,6 +11,8 @@ from mdstopo.mechanics.laws.table import SPRING
 #: the joints' matrix; whether forces may depend on rates (else `c` stays zero); whether joints are searched for a small
 #: eigenvalue; whether tangents leave out the joints' part
 DIAGONAL, OF_JOINTS, DAMPED, THOROUGH, APART = range(5)
+#: which bodies of a pair move (`carriers`)
+BOTH, SECOND, FIRST = 1, 2, 3
 
 
 @kernel
@@ -47,7 +49,10 @@ def is_damped(model):
 
 @kernel
 def carriers(model):
-    """(n_pair,): 1 where members, bushings or contacts act between two bodies, 0 where only joints do."""
+    """(n_pair,): not 0 where members, bushings or contacts act between two bodies, 0 where only joints do.
+
+    It is BOTH where both bodies move, or SECOND or FIRST where that body alone does.
+    """
     found = np.zeros(model.pair.shape[0], np.int64)
     for k in range(model.block.shape[0]):
         found[model.block[k, PAIR]] = 1
@@ -55,4 +60,12 @@ def carriers(model):
         found[model.bushing_pair[j]] = 1
     for j in range(model.contact_pair.shape[0]):
         found[model.contact_pair[j]] = 1
+    each = freedoms(model)
+    for p in range(found.shape[0]):
+        if found[p] != 0:
+            moves = np.zeros(2, np.int64)
+            for side in range(2):
+                for i in range(each):
+                    moves[side] += model.free[each * model.pair[p, side] + i] != 0
+            found[p] = FIRST if moves[1] == 0 else (SECOND if moves[0] == 0 else BOTH)
     return found

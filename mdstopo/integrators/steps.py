@@ -38,12 +38,17 @@ _STATUS = {
 #: and rejected steps, Newton corrections, body-level sweeps, reverse steps, states in design gradient passes, and, in
 #: scenes of springs, members that were summed over all states
 FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN, SPRINGS = range(9)
-WORK = 9
+#: in general scenes, what of FORCES was not for the stages of steps: at the start and behind switches and breakpoints;
+#: steps that were rejected; where within a step a member switches; samples of responses; states inside steps and
+#: responses there, as at peaks
+OF_STARTS, OF_REJECTED, OF_SWITCHES, OF_SAMPLES, OF_POINTS = range(9, 14)
+WORK = 14
 
 
 def work_named(counts: Sequence[int]) -> dict[str, int]:
     """Work counts (WORK,) by their names."""
-    forces, tangents, accepted, rejected, newton, sweeps, reverse, design, springs = counts
+    forces, tangents, accepted, rejected, newton, sweeps, reverse, design, springs = counts[:OF_STARTS]
+    starts, lost, switches, samples, points = counts[OF_STARTS:]
     return {
         "force_sums": forces,
         "tangents": tangents,
@@ -54,6 +59,11 @@ def work_named(counts: Sequence[int]) -> dict[str, int]:
         "reverse_steps": reverse,
         "design_states": design,
         "spring_states": springs,
+        "sums_of_starts": starts,
+        "sums_of_rejected_steps": lost,
+        "sums_of_switches": switches,
+        "sums_of_samples": samples,
+        "sums_of_points": points,
     }
 
 

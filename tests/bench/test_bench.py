@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from mdstopo.bench import skip, work_precision
+from mdstopo.bench import profile, skip, work_precision
 from mdstopo.bench.scaling import exponent, whole_run
 from mdstopo.bench.scenes import chain, plate
 from mdstopo.case.reader import read_case
@@ -47,6 +47,46 @@ def test_scenes_have_the_size_that_is_asked_for():
 def test_an_exponent_is_the_slope_of_logarithms():
     sizes = [10.0, 100.0, 1000.0]
     assert exponent(sizes, [3.0 * size**1.5 for size in sizes]) == pytest.approx(1.5)
+
+
+BOUNCE = """
+format: 1
+gravity: [0, -10]
+time: {end: 1}
+bodies: {ball: {mass: 2, inertia: 1, position: [0, 1]}}
+motions: [{body: ball, x: {velocity: 0}, angle: {velocity: 0}}]
+members:
+  floor:
+    from: {body: ground, at: [0, -1]}
+    to: {body: ball, at: [0, 1]}
+    law: {type: gap, stiffness: 5000, gap: 0.8, side: compression}
+design: {initial: 1}
+objectives: {deep: {response: {displacement: {body: ball}}, over_time: max}}
+"""
+
+
+def test_a_profile_tells_all_force_sums_and_all_the_time():
+    sums, times = profile.profile(read_case(BOUNCE))
+    counts = {row[0]: int(row[1].replace(",", "")) for row in sums.rows}
+    assert sum(counts.values()) == 2 * counts["all"]
+    assert 0 < counts["where within a step a member switches"] < counts["stages of steps"]
+    parts = {row[0]: float(row[1]) for row in times.rows}
+    assert parts["all"] > 0.0
+    assert parts["Python"] < parts["all"]
+    assert parts["motion: force sums, with solutions for accelerations"] > 0.0
+
+
+def test_a_profile_of_springs_between_free_bodies_names_what_is_called():
+    sums, times = profile.profile(read_case(plate(100)))
+    assert sums.rows[0][1] == sums.rows[-1][1]
+    assert sum(float(row[2].rstrip("%")) for row in times.rows[:-1]) == pytest.approx(100.0, abs=15.0)
+
+
+def test_no_call_is_timed_any_more_after_a_profile():
+    before = profile.Entry.__call__, profile.Entry.prepare
+    with pytest.raises(RuntimeError, match="ends here"), profile.compiled_calls():
+        raise RuntimeError("ends here")
+    assert (profile.Entry.__call__, profile.Entry.prepare) == before
 
 
 def test_a_whole_run_is_measured():

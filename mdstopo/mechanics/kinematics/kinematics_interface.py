@@ -920,7 +920,7 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
       j, pair: the pose, and the pair of the members.
     Out:
       out (R, M_padded or more): added to.
-      seen (D + 1, count or more): scratch.
+      seen (D + 2, count or more): scratch.
     """
     raise NotImplementedError
 

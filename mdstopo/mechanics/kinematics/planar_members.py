@@ -27,7 +27,7 @@ from mdstopo.mechanics.laws.alike import (
 )
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED, elastic_force, elastic_tangent, elongation_of
 from mdstopo.mechanics.laws.sums import add_forces, add_tangent
-from mdstopo.mechanics.laws.table import SPRING, law
+from mdstopo.mechanics.laws.table import SPRING, law, law_is_idle
 from mdstopo.scene.model import EXCESS, HOME_X, HOME_Y, L0, PX, PY, QX, QY
 
 
@@ -142,6 +142,8 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
     vy = r[5]
     vt = r[6]
     for i in range(lo, lo + count):
+        if law_is_idle(code, int(member_state[1, i])):
+            continue
         length, bx, by, bt, y, ax, ay = direction(member, i, r[0], r[1], r[2], r[3])
         if length == 0.0:  # not y == 0.0: that is so infinitely far away, too
             continue
@@ -224,6 +226,8 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
         return
     curves = model.curves
     for i in range(lo, lo + count):
+        if law_is_idle(code, int(modes_of[i])):
+            continue
         length, bx, by, bt, _, _, _ = direction(member, i, r[0], r[1], r[2], r[3])
         if length == 0.0:
             continue
@@ -267,24 +271,28 @@ def spring_designs_of_rows(model, p, lo, count, rel, u, pair, room, out):
 @part
 def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r, u, j, pair, seen, out):
     """`member_designs` for many rows; see `kinematics_interface.member_designs_of_rows`."""
-    for e in range(count):
-        i = lo + e
+    acting = 0
+    for i in range(lo, lo + count):
+        if law_is_idle(code, int(member_state[1, i])):
+            continue
         length, bx, by, bt, _, _, _ = direction(model.member, i, r[0], r[1], r[2], r[3])
-        f = 0.0
-        if length > 0.0:
-            rate = bx * r[4] + by * r[5] + bt * r[6]
-            x = stretched(model.member, i, r, length) - member_state[2, i]
-            f, _, _, _, _ = law(code, p, x, rate, int(member_state[1, i]), t, value, model.curves)
-        seen[0, e] = f
-        seen[1, e] = bx
-        seen[2, e] = by
-        seen[3, e] = bt
+        if not length > 0.0:
+            continue
+        rate = bx * r[4] + by * r[5] + bt * r[6]
+        x = stretched(model.member, i, r, length) - member_state[2, i]
+        f, _, _, _, _ = law(code, p, x, rate, int(member_state[1, i]), t, value, model.curves)
+        seen[0, acting] = f
+        seen[1, acting] = bx
+        seen[2, acting] = by
+        seen[3, acting] = bt
+        seen[4, acting] = i
+        acting += 1
     for m in range(out.shape[0]):
         x = u[m, j, pair, 0]
         y = u[m, j, pair, 1]
         angle = u[m, j, pair, 2]
-        for e in range(count):
-            out[m, lo + e] += seen[0, e] * (seen[1, e] * x + seen[2, e] * y + seen[3, e] * angle)
+        for e in range(acting):
+            out[m, int(seen[4, e])] += seen[0, e] * (seen[1, e] * x + seen[2, e] * y + seen[3, e] * angle)
 
 
 @part

@@ -69,7 +69,7 @@ from mdstopo.mechanics.kinematics.vectors import (
     vector_at,
 )
 from mdstopo.mechanics.laws.spring import ZERO_LENGTH_SQUARED
-from mdstopo.mechanics.laws.table import SPRING, law
+from mdstopo.mechanics.laws.table import SPRING, law, law_is_idle
 
 
 @part
@@ -158,6 +158,8 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
     w = vector_at(r, W)
     speed_of_origin = vector_at(r, D_RATE)
     for i in range(lo, lo + count):
+        if law_is_idle(code, int(member_state[1, i])):
+            continue
         x, arm, length, y = vector_of(model, i, r)
         if length == 0.0:  # not y == 0.0: that is so infinitely far away, too
             continue
@@ -230,6 +232,8 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
     move = vector_at(u, 0)
     turn = vector_at(u, 3)
     for i in range(lo, lo + count):
+        if law_is_idle(code, int(modes_of[i])):
+            continue
         x, arm, length, y = vector_of(model, i, r)
         if length == 0.0:
             continue
@@ -285,6 +289,8 @@ def spring_designs_of_rows(model, p, lo, count, rel, u, pair, room, out):
 def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r, u, j, pair, seen, out):
     """`member_designs` for many rows; see `kinematics_interface.member_designs_of_rows`."""
     for i in range(lo, lo + count):
+        if law_is_idle(code, int(member_state[1, i])):
+            continue
         x, arm, length, y = vector_of(model, i, r)
         if length == 0.0:
             continue

@@ -27,6 +27,12 @@ def crush_force(p, x, mode):
 
 
 @inline
+def crush_idle(mode):
+    """Open, nothing acts."""
+    return mode == OPEN
+
+
+@inline
 def crush_margin(p, x, xd, mode):
     """How far the mode is from its end: y or what is left to the plateau in m, or the rate in m/s."""
     if mode == CRUSHING:
@@ -147,6 +153,7 @@ KERNELS = LawKernels(
         margin_slope=crush_margin_slope,
         next_mode=crush_next,
         first_mode=crush_start,
+        idle=crush_idle,
         grazes=crush_grazes,
     ),
     permanent_set=PermanentSet(

@@ -32,6 +32,12 @@ def _clips(p):
 
 
 @inline
+def gap_idle(mode):
+    """Open, nothing acts."""
+    return mode == OPEN
+
+
+@inline
 def gap_margin(p, x, xd, mode):
     """How far the mode is from its end: y in m, or the unclipped force by k + c, which may be all damping."""
     y = p[3] * x - p[2]
@@ -156,6 +162,7 @@ KERNELS = LawKernels(
         margin_slope=gap_margin_slope,
         next_mode=gap_next,
         first_mode=gap_start,
+        idle=gap_idle,
         grazes=gap_grazes,
     ),
 )

@@ -32,6 +32,7 @@ class Modes:
     margin_slope: of it by the parameter at a place; None where no parameter that may vary is in it.
     next_mode: where to go behind the end. first_mode: at the start of the motion.
     switches (p): whether this law has several modes at all; None where it always has.
+    idle (mode): whether nothing acts and nothing is stored in a mode; None where that is true of none.
     grazes (p, x, mode): what a margin that is only just used up (or not) does to derivatives: nothing 0, the force 1,
     the motion 2; None where it is always 0.
     pieces: whether modes are pieces of one function that is smooth enough for motion and derivatives, so that only the
@@ -44,6 +45,7 @@ class Modes:
     first_mode: Function
     margin_slope: Function | None = None
     switches: Function | None = None
+    idle: Function | None = None
     grazes: Function | None = None
     pieces: bool = False
 

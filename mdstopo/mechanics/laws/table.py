@@ -6,6 +6,7 @@ ones are part of the mass (`general.forces`), and their code stands for no kerne
 """
 
 import importlib
+import inspect
 
 import numpy as np
 
@@ -61,6 +62,12 @@ for _law in LAWS.values():
     if _law.kernels.startswith("mdstopo."):
         enter(_law)
 LISTED.is_filled = True
+
+
+def _asks_for_time(each: LawKernels) -> bool:
+    """Whether a law's force takes the time, or a value that is given over time."""
+    asked = inspect.signature(getattr(each.force, "py_func", each.force)).parameters if each.force else {}
+    return "t" in asked or "value" in asked
 
 
 @chosen(LISTED, lambda each: each.force, inline)
@@ -131,12 +138,24 @@ def law_is_given(code):
     return False
 
 
+@chosen(LISTED, lambda each: True if _asks_for_time(each) else None, inline)
+def law_is_timed(code):
+    """Whether the force depends on time by itself."""
+    return False
+
+
 # Modes
 
 
 @chosen(LISTED, lambda each: None if each.modes is None else each.modes.switches or True, inline)
 def law_switches(code, p):
     """Whether the law has more than one mode."""
+    return False
+
+
+@chosen(LISTED, lambda each: each.modes and each.modes.idle, inline)
+def law_is_idle(code, mode):
+    """Whether a member in this mode has no force and stores nothing, wherever its ends are."""
     return False
 
 
