@@ -6,7 +6,7 @@ member changes its mode and, where the force jumps, the accelerations with it. T
 
     dt_e = -(s_q dq + s_v dv) / s',      and behind it  dv+ = dv- + (a- - a+) dt_e      (saltation).
 
-With L' = B v, dL'/dq is dB/dt, so s_q = s_x B + s_xd dB/dt, s_v = s_xd B, s' = s_x x' + s_xd x''.
+With L' = B v, dL'/dq is dB/dt, so s_q = s_x B + s_xd dB/dt, s_v = s_xd B, s' = s_x x' + s_xd x'' + s_t.
 
 Where a margin only just falls below zero, or only just does not, the derivative may be another one on either side:
 s'^2 / (2 |s''|) is how far it goes beyond. Less than the motion is accurate to, and it grazes (`law_grazes`).
@@ -19,7 +19,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.contact import contact_switch
 from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START, STOP
+from mdstopo.general.model import CODE, COUNT, INERTER, MEMBER_FREE_LENGTH, PAIR, START, STOP
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -37,8 +37,11 @@ from mdstopo.mechanics.laws.table import (
     law_grazes,
     law_has_pieces,
     law_margin,
+    law_margin_by_time,
     law_margin_slopes,
+    law_margins,
     law_next,
+    law_one_margin,
     law_set,
     law_switches,
 )
@@ -53,26 +56,30 @@ def has_switches(model, knots):
     """Whether any member can switch at all; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code != INERTER and law_switches(code, model.law[k]) and (knots or not law_has_pieces(code)):
+        if code != INERTER and law_switches(code, model.law[k], model.curves) and (knots or not law_has_pieces(code)):
             return True
     return model.contact_pair.shape[0] > 0
 
 
 @kernel
-def smallest_margin(model, segment, member_state, rel):
-    """The smallest margin of all acting members and contacts at relative poses rel (n_pair, POSE), and whose it is."""
+def smallest_margin(model, segment, t, member_state, rel):
+    """The smallest margin of all acting members and contacts at relative poses rel (n_pair, POSE), and whose it is.
+
+    t: time (s).
+    """
     best = np.inf
     who = -1
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k], model.curves):
             continue
         r = rel[model.block[k, PAIR]]
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
             _, x, rate = member_motion(model, i, r)
             x -= member_state[SET, i]
-            s = law_margin(code, model.law[k], x, rate, int(member_state[MODE, i]), model.curves)
+            rest = model.member[MEMBER_FREE_LENGTH, i]
+            s = law_margin(code, model.law[k], x, rate, int(member_state[MODE, i]), t, model.curves, rest)
             if s < best:
                 best = s
                 who = i
@@ -87,7 +94,7 @@ def smallest_margin(model, segment, member_state, rel):
 
 
 @kernel
-def first_dip(model, segment, member_state, rel0, rel1, h, parts):
+def first_dip(model, segment, t, member_state, rel0, rel1, h, parts):
     """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
 
     Looked for on the cubic through a margin's values and rates at both poses.
@@ -96,6 +103,7 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time at the first pose (s).
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: time between them (s).
       parts: of how many parts of a step this is one, whose cubic the poses were taken from.
@@ -108,34 +116,33 @@ def first_dip(model, segment, member_state, rel0, rel1, h, parts):
     low = np.inf
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k], model.curves):
             continue
         p = model.block[k, PAIR]
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
             mode = int(member_state[MODE, i])
-            r = rel0[p]
-            _, x, rate = member_motion(model, i, r)
-            x -= member_state[SET, i]
-            s0 = law_margin(code, model.law[k], x, rate, mode, model.curves)
-            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
-            if by_rate != 0.0:
-                continue
-            d0 = h * by_x * rate
-            r = rel1[p]
-            _, x, rate = member_motion(model, i, r)
-            x -= member_state[SET, i]
-            s1 = law_margin(code, model.law[k], x, rate, mode, model.curves)
-            by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
-            if by_rate != 0.0:
-                continue
-            d1 = h * by_x * rate
-            c, dip = lowest_between(s0, d0, s1, d1)
-            if dip < 0.0:
-                best = min(best, c)
-            elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
-                low = dip
-                near = c
+            _, x0, rate0 = member_motion(model, i, rel0[p])
+            _, x1, rate1 = member_motion(model, i, rel1[p])
+            x0 -= member_state[SET, i]
+            x1 -= member_state[SET, i]
+            rest = model.member[MEMBER_FREE_LENGTH, i]
+            row = model.law[k]
+            for which in range(law_margins(code, row, model.curves)):
+                s0, d0, by_rate, by_time = law_one_margin(code, row, which, x0, rate0, mode, t, model.curves, rest)
+                if by_rate != 0.0:
+                    continue
+                d0 = h * d0 * rate0 + h * by_time
+                s1, d1, by_rate, by_time = law_one_margin(code, row, which, x1, rate1, mode, t + h, model.curves, rest)
+                if by_rate != 0.0:
+                    continue
+                d1 = h * d1 * rate1 + h * by_time
+                c, dip = lowest_between(s0, d0, s1, d1)
+                if dip < 0.0:
+                    best = min(best, c)
+                elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
+                    low = dip
+                    near = c
     for j in range(model.contact_pair.shape[0]):
         row = model.contact[j]
         mode = int(member_state[MODE, model.member.shape[1] + j])
@@ -186,7 +193,7 @@ def probes_needed(model, segment, rel0, rel1):
     needed = 4.0
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k], model.curves):
             continue
         p = model.block[k, PAIR]
         moved = deflection(model, rel1, rel0, p)
@@ -207,7 +214,7 @@ def probes_needed(model, segment, rel0, rel1):
 
 
 @kernel
-def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, noise):
+def first_sign(model, segment, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise):
     """Where in a step a member seems to leave its mode and come back before the end.
 
     Looked for on the cubic through the states at both ends, in as many parts as the motion asks for, and in each part
@@ -217,6 +224,7 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time at the first end (s).
       q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends.
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
@@ -238,10 +246,12 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
         else:
             cubic(model, c, h, q0, v0, q1, v1, q, v)
             relative_pose(model, q, v, rel)
-            margin, _ = smallest_margin(model, segment, member_state, rel)
+            margin, _ = smallest_margin(model, segment, t + c * h, member_state, rel)
             if margin < -noise:
                 return c, near
-        dip, may, lowest = first_dip(model, segment, member_state, before, rel, h / parts, parts)
+        dip, may, lowest = first_dip(
+            model, segment, t + (c - 1.0 / parts) * h, member_state, before, rel, h / parts, parts
+        )
         if dip < 1.0:
             return (part - 1 + dip) / parts, near
         if lowest < low:
@@ -254,13 +264,14 @@ def first_sign(model, segment, member_state, q0, v0, q1, v1, rel0, rel1, h, nois
 
 
 @kernel
-def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
+def switch_any(model, segment, t, member_state, rel, q, v, a, who, slopes):
     """What becomes of a member or contact whose margin is used up.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time (s).
       rel (n_pair, POSE): relative poses.
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       who: the member or contact, as a column of `member_state`.
@@ -277,18 +288,19 @@ def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
         return new, beyond, contact_grazes(model.contact[j], old), 0.0, 0.0
     k = block_of(model, who)
     code = model.block[k, CODE]
-    new, beyond, by_set = switch_of(model, segment, member_state, q, v, a, who, k, slopes)
+    new, beyond, by_set = switch_of(model, segment, t, member_state, q, v, a, who, k, slopes)
     x, _ = stretch_of(model, who, rel[model.block[k, PAIR]])
     x -= member_state[SET, who]
     first = member_state[SCALE, who] != 0.0 and member_state[SET, who] == 0.0
-    kind = law_grazes(code, model.law[k], x, old) if first else 0
+    rest = model.member[MEMBER_FREE_LENGTH, who]
+    kind = law_grazes(code, model.law[k], x, old, t, model.curves, rest) if first else 0
     if law_has_pieces(code):  # nothing jumps at a knot: when it is passed makes no difference
         slopes[:] = 0.0
     return new, beyond, kind, by_set, law_set(code, model.law[k], x, old, new)
 
 
 @kernel
-def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
+def switch_of(model, segment, t, member_state, q, v, a, i, k, slopes):
     """The mode that a member goes to, s'^2 / (2 |s''|), and -s_x / s'.
 
     The second, how far its margin s goes beyond zero (m), is given for margins of Delta alone; infinite for others.
@@ -298,6 +310,7 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time (s).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       i, k: the member (padded), and its block.
     Out:
@@ -315,8 +328,10 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
         d = place_in_pair(model, p, r)
         second += row[r] * a[d] + row_rate[r] * v[d]
     mode = int(member_state[MODE, i])
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
     speed = by_x * rate + by_rate * second
+    speed += law_margin_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
     for d in range(n):
         slopes[0, d] = 0.0
         slopes[1, d] = 0.0
@@ -328,7 +343,8 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
     bend = 2.0 * abs(by_x * second)
     beyond = speed * speed / bend if by_rate == 0.0 and bend > 0.0 else np.inf
     by_set = -by_x / speed if speed != 0.0 else 0.0
-    return law_next(code, model.law[k], x, rate, second, mode, model.curves), beyond, by_set
+    new = law_next(code, model.law[k], x, rate, second, mode, t, model.curves, rest)
+    return new, beyond, by_set
 
 
 @kernel

@@ -39,6 +39,7 @@ from mdstopo.general.singular_poses import (
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
+    GIVEN,
     GRAZES,
     MEMBER,
     NEW,
@@ -257,13 +258,13 @@ def log_switches(
     relative_pose(model, q, v, rel)
     done = 0
     while True:
-        margin, who = smallest_margin(model, segment, member_state, rel)
+        margin, who = smallest_margin(model, segment, t, member_state, rel)
         if not margin < -noise or done > 2 * member_state.shape[1]:
             return events
         if events >= history.event.shape[0]:
             return -1
         saltation = history.saltation[events]
-        new, beyond, kind, by_set, grown = switch_any(model, segment, member_state, rel, q, v, a, who, saltation)
+        new, beyond, kind, by_set, grown = switch_any(model, segment, t, member_state, rel, q, v, a, who, saltation)
         old = int(member_state[MODE, who])
         if beyond < graze and kind == 2:
             where[2] = who
@@ -272,6 +273,7 @@ def log_switches(
         history.event[events, OLD] = old
         history.event[events, NEW] = new
         history.event[events, GRAZES] = 1 if beyond < graze and kind > 0 else 0
+        history.event[events, GIVEN] = 0
         history.kept[events, SET_BEFORE] = member_state[SET, who]
         member_state[SET, who] += grown
         history.kept[events, SET_AFTER] = member_state[SET, who]
@@ -410,6 +412,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 history.event[events, OLD] = 0
                 history.event[events, NEW] = int(member_state[MODE, i])
                 history.event[events, GRAZES] = 0
+                history.event[events, GIVEN] = 1
                 history.kept[events, SET_BEFORE] = 0.0
                 history.kept[events, SET_AFTER] = member_state[SET, i]
                 history.kept[events, TIME_BY_SET] = 0.0
@@ -451,6 +454,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 for e in range(first, events):
                     history.saltation[e] = 0.0  # the time is given: it does not vary with the design
                     history.kept[e, TIME_BY_SET] = 0.0
+                    history.event[e, GIVEN] = 1
         while t < end:
             where[0] = -1
             held = held + 1 if wanted * brake > BRAKED else 0
@@ -531,7 +535,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     continue
             happens = False
             if switching:
-                margin, who = smallest_margin(model, segment, member_state, rel)
+                margin, who = smallest_margin(model, segment, t + h, member_state, rel)
                 low = 0.0
                 high = h
                 # pieces of the step that are still to be looked at, the next one last: from `low` to cut[top]
@@ -546,8 +550,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(model, left_q, left_v, before)
                     relative_pose(model, beyond_q[top], beyond_v[top], rel)
                     dip, near = first_sign(
-                        model, segment, member_state, left_q, left_v, beyond_q[top], beyond_v[top], before, rel,
-                        cut[top] - low, rounding,
+                        model, segment, t + low, member_state, left_q, left_v, beyond_q[top], beyond_v[top], before,
+                        rel, cut[top] - low, rounding,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
                     if middle < 0.0 or cuts == CUTS:
@@ -566,18 +570,18 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         history, beyond_q[top], beyond_v[top], push, size, work,
                     )  # fmt: skip
                     relative_pose(model, beyond_q[top], beyond_v[top], rel)
-                    value, near_who = smallest_margin(model, segment, member_state, rel)
+                    value, near_who = smallest_margin(model, segment, t + middle, member_state, rel)
                     if value < -rounding:
                         high = middle
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, member_state, rel, near_who):
+                    if value < graze and matters(model, t + middle, member_state, rel, near_who):
                         where[2] = near_who
                 relative_pose(model, left_q, left_v, before)
                 happens = margin < -rounding
                 if happens:
-                    at_low, _ = smallest_margin(model, segment, member_state, before)
+                    at_low, _ = smallest_margin(model, segment, t + low, member_state, before)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
@@ -601,7 +605,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             v, a, history, trial_q, trial_v, push, size, work,
                         )  # fmt: skip
                         relative_pose(model, trial_q, trial_v, rel)
-                        value, who = smallest_margin(model, segment, member_state, rel)
+                        value, who = smallest_margin(model, segment, t + middle, member_state, rel)
                         note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side
