@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from mdstopo.case.definitions import Definitions
 from mdstopo.case.kinds import Flag, Kind, Name, Number, NumberOrWord, OneOf, Ref, Text, Version, Word
+from mdstopo.case.laws.expression import FormulaText, Parameters
 from mdstopo.case.mesh_files import MeshFaces, MeshFile
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
@@ -220,6 +221,7 @@ def _simple(kind: Kind) -> str:
         Flag: "`true`, `false`", Text: "text", Name: "a new name", FileName: "path of a file",
         MeshFile: "path of an STL or OBJ file", MeshFaces: "path of an STL or OBJ file", Anything: "any value",
         Definitions: "`{name: number or expression, ...}`", SvgPath: "text of a path",
+        FormulaText: "an [expression](expressions.md#laws)", Parameters: "`{name: number, ...}`",
     }  # fmt: skip
     return texts[type(kind)]
 

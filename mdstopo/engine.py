@@ -97,6 +97,8 @@ class Evaluator:
             for group, part in zip(case.design_groups, case.group_slices.values(), strict=True)
             if group.power < 1.0
         ]
+        #: groups with laws whose slopes may be infinite or without a value
+        self._unsure = [group.name for group in case.members if any(law.may_lack_slopes for law in group.laws)]
         self._narrower: dict[tuple[str, ...], Evaluator] = {}
         self._others: dict[tuple[Any, ...], Evaluator] = {}
 
@@ -166,6 +168,10 @@ class Evaluator:
             status, message = Status.NO_GRADIENT, edge
         if grazing and gradient and status.ok:
             status, message = Status.GRAZING, grazing
+        if self._unsure and gradient and status.usable and not _has_slopes(looked):
+            where = "group " if len(self._unsure) == 1 else "one of the groups "
+            message = f"a slope of a formula of {where}{', '.join(self._unsure)} is infinite or has no value"
+            status = Status.NO_GRADIENT
         return self._evaluation(looked, gradient, work_named(_total(work)), status, message)
 
     def with_errors(self, alpha: FloatArray, found: Evaluation, sensitivity: str | None = None) -> Evaluation:
@@ -366,6 +372,12 @@ def _total(counts: list[list[int]]) -> list[int]:
 
 def _of_motion(tolerance: float) -> float:
     return min(tolerance, max(LOOSEST, 0.5 * tolerance))
+
+
+def _has_slopes(looked: Mapping[str, tuple[Peak, ...]]) -> bool:
+    """Whether all derivatives of what was looked at are finite."""
+    rows = (peak.gradient for peaks in looked.values() for peak in peaks)
+    return all(row is None or bool(np.isfinite(row).all()) for row in rows)
 
 
 def _family(beyond: str) -> SceneFamily:

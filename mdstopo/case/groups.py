@@ -75,7 +75,9 @@ def build_laws(fields: Fields, reading: Reading) -> tuple[Law, ...] | None:
         values = {key: value for key, value in part.items() if key != "type"}
         if isinstance(values.get("table"), np.ndarray):
             values["table"] = Table(values["table"][:, 0], values["table"][:, 1:])
-        laws.append(LAWS[part["type"]](**values))
+        law = LAWS[part["type"]].made(part, values, reading)
+        if law is not None:
+            laws.append(law)
     count = len(stated) if isinstance(stated, list) else 1
     return tuple(laws) if len(laws) == count else None
 

@@ -20,11 +20,14 @@ from mdstopo.case.kinds import (
     OneOf,
     OpenWord,
     Ref,
+    Schema,
     Text,
     Version,
     explained,
 )
+from mdstopo.case.nodes import SCALAR, Node
 from mdstopo.case.number_rows import FileName
+from mdstopo.case.reading import Reading
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of, unit_stated
 from mdstopo.case.schema_contact import CONTACT
@@ -43,6 +46,7 @@ from mdstopo.case.schema_scene import (
     parameter_words,
 )
 from mdstopo.case.schema_uncertainty import UNCERTAINTY
+from mdstopo.case.value import frozen
 from mdstopo.settings.optimizer_options import OPTIONS
 from mdstopo.settings.optimizer_presets import PRESETS
 from mdstopo.settings.optimizers import names as optimizers
@@ -70,7 +74,26 @@ _POWER = Key(
     "goes through a list, which rises, from one optimum to the next; everything else takes its last",
     default=1.0,
 )
-_PARAMETER = OpenWord(tuple(parameter_words()), "", tuple(parameter_words().values()), parameter_words)
+
+
+@frozen
+class ParameterWord(OpenWord):
+    """A number of a law; those of formulas are called as the case calls them."""
+
+    def read(self, node: Node, path: str, reading: Reading) -> Any:
+        """str or BAD."""
+        value = node.scalar() if node.kind == SCALAR else None
+        if isinstance(value, str) and value in reading.declared.get("law parameter", ()):
+            return value
+        return OpenWord(self.words, self.instead, self.meanings, self.anew).read(node, path, reading)
+
+    def schema(self) -> Schema:
+        """Known words, and any other."""
+        known = OpenWord(self.words, self.instead, self.meanings, self.anew).schema()
+        return {"anyOf": [known, {"type": "string", "description": "a parameter of a law of formulas"}]}
+
+
+_PARAMETER = ParameterWord(tuple(parameter_words()), "", tuple(parameter_words().values()), parameter_words)
 _VARIABLE = Record(
     "a design variable",
     (

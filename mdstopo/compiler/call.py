@@ -22,7 +22,8 @@ _SLOTS = {"f": "d", "i": "q", "b": "?7x"}
 
 
 @functools.cache
-def _target() -> Any:
+def target() -> Any:
+    """The processor's target."""
     for start in ("initialize", "initialize_native_target", "initialize_native_asmprinter"):
         with contextlib.suppress(RuntimeError):  # done by LLVM itself in later versions
             getattr(llvm, start)()
@@ -69,7 +70,7 @@ class Native:
 
     def __init__(self, name: str, code: Code, types: str) -> None:
         # an engine owns its target machine: each has one
-        machine = _target().create_target_machine(jit=True)
+        machine = target().create_target_machine(jit=True)
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
         for part in (code.body, code.glue):
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(part))

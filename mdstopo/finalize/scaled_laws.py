@@ -8,12 +8,15 @@ from typing import Any
 import numpy as np
 
 from mdstopo.case.arrays import Table
+from mdstopo.case.laws.expression import OfFormulas
 from mdstopo.case.laws.law import with_role
 from mdstopo.case.model import Law
 
 
 def sized(law: Law, factor: float) -> dict[str, Any]:
     """The law times a factor, as the mapping of the case file; keys that have their defaults are left out."""
+    if isinstance(law, OfFormulas):
+        return law.stated_times(factor)
     stated: dict[str, Any] = {"type": law.type}
     scaled = with_role(type(law), "scales")
     for each in fields(law):

@@ -7,7 +7,7 @@ equal parts being one object that is what keeps derivatives short.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from mdstopo.formula.tree import NAME, NUMBER, Expression, number, operation, parts
 from mdstopo.formula.values import value_of
@@ -101,6 +101,16 @@ def choose(condition: Expression, a: Expression, b: Expression) -> Expression:
     return a if a is b else operation("if", condition, a, b)
 
 
+def where_not_zero(part: Expression, make: Callable[[Expression], Expression]) -> Expression:
+    """What `make` makes of a part, and 0 where an `if` says that the part is 0, whatever else is multiplied with it."""
+    if part.operator == "if":
+        condition, one, other = part.operands
+        if is_number(one, 0.0) or is_number(other, 0.0):
+            made = [each if is_number(each, 0.0) else where_not_zero(each, make) for each in (one, other)]
+            return choose(condition, *made)
+    return make(part)
+
+
 def call(function: str, *operands: Expression) -> Expression:
     """Any other operation."""
     return _folded(function, *operands)
@@ -169,12 +179,14 @@ def _slope(part: Expression, slopes: list[Expression]) -> Expression:
     if operator == "neg":
         return negate(slopes[0])
     if operator == "*":
-        return add(multiply(slopes[0], u[1]), multiply(u[0], slopes[1]))
+        by_left = where_not_zero(slopes[0], lambda slope: multiply(slope, u[1]))
+        return add(by_left, where_not_zero(slopes[1], lambda slope: multiply(u[0], slope)))
     if operator == "/":
-        return subtract(divide(slopes[0], u[1]), divide(multiply(part, slopes[1]), u[1]))
+        by_upper = where_not_zero(slopes[0], lambda slope: divide(slope, u[1]))
+        return subtract(by_upper, where_not_zero(slopes[1], lambda slope: divide(multiply(part, slope), u[1])))
     if operator == "^":
-        by_base = multiply(multiply(u[1], power(u[0], subtract(u[1], ONE))), slopes[0])
-        return by_base if is_number(slopes[1], 0.0) else add(by_base, multiply(call("powlog", *u), slopes[1]))
+        by_base = _times(multiply(u[1], power(u[0], subtract(u[1], ONE))), slopes[0])
+        return by_base if is_number(slopes[1], 0.0) else add(by_base, _times(call("powlog", *u), slopes[1]))
     if operator == "if":
         return choose(u[0], slopes[1], slopes[2])
     if operator in ("min", "max"):
@@ -184,12 +196,17 @@ def _slope(part: Expression, slopes: list[Expression]) -> Expression:
         return choose(operation("<", operation("min", u[0], u[2]), u[1]), slopes[1], below)
     if operator == "atan2":
         square = add(power(u[0], TWO), power(u[1], TWO))
-        return divide(subtract(multiply(u[1], slopes[0]), multiply(u[0], slopes[1])), square)
+        return divide(subtract(_times(u[1], slopes[0]), _times(u[0], slopes[1])), square)
     if operator in ("sign", "step", "<", "<=", ">", ">="):
         return ZERO
     if operator == "powlog":
         return _slope_of_powlog(part, slopes)
-    return multiply(_slope_of_function(operator, u[0], part), slopes[0])
+    return _times(_slope_of_function(operator, u[0], part), slopes[0])
+
+
+def _times(outer: Expression, slope: Expression) -> Expression:
+    """The chain rule: nothing where the slope of what is inside is 0, even where the outer one is infinite."""
+    return where_not_zero(slope, lambda each: multiply(outer, each))
 
 
 def _slope_of_powlog(part: Expression, slopes: list[Expression]) -> Expression:
@@ -198,7 +215,7 @@ def _slope_of_powlog(part: Expression, slopes: list[Expression]) -> Expression:
     less = subtract(exponent, ONE)
     by_base = add(multiply(exponent, call("powlog", base, less)), power(base, less))
     by_exponent = multiply(part, call("log", base))
-    return add(multiply(by_base, slopes[0]), multiply(by_exponent, slopes[1]))
+    return add(_times(by_base, slopes[0]), _times(by_exponent, slopes[1]))
 
 
 def _slope_of_extreme(operator: str, u: tuple[Expression, ...], slopes: list[Expression]) -> Expression:

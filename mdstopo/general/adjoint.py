@@ -21,7 +21,7 @@ from mdstopo.general.forces import general_forces
 from mdstopo.general.gather import add_design, add_designs, explicit_part, force_sign
 from mdstopo.general.method_interface import point_of, step_back, weights_of
 from mdstopo.general.model import KIND, SUBJECT
-from mdstopo.general.parameters import add_event, add_times
+from mdstopo.general.parameters import add_event, add_times, event_slope
 from mdstopo.general.permanent_sets import add_looked_sets, add_sets, count_sets, keep_start, sets_back, time_back
 from mdstopo.general.responses import (
     ENERGY,
@@ -246,7 +246,7 @@ def row_cotangents(
     if c <= 0.0 and k > 0:
         apply_saltation_transposed(model, history, k, bars[0], bars[1], bar_set, np.empty(0), member_state, out)
     if (c <= 0.0 and k > 0) or c >= 1.0:
-        event = _first_event(history, at)
+        event = _first_event(model, history, member_state, at)
         if event >= 0:
             if model.varied.shape[0] > 0:
                 add_event(model, history, member_state, event, rate, out)
@@ -259,7 +259,7 @@ def row_cotangents(
 
 
 @kernel
-def _first_event(history, state):
+def _first_event(model, history, member_state, state):
     """The first event of a state whose time varies, or -1."""
     if state == 0:
         return -1
@@ -270,6 +270,9 @@ def _first_event(history, state):
             for d in range(history.saltation.shape[2]):
                 if history.saltation[e, part, d] != 0.0:
                     return e
+        for entry in range(model.varied.shape[0]):
+            if event_slope(model, history, member_state, e, entry) != 0.0:
+                return e
     return -1
 
 

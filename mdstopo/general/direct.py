@@ -18,6 +18,7 @@ from mdstopo.general.model import (
     COUNT,
     DESIGN,
     INERTER,
+    MEMBER_FREE_LENGTH,
     PAIR,
     START,
     VARIED_BLOCK,
@@ -115,7 +116,10 @@ def own_force(model, k, i, segment, t, member_state, q, v, a, row, row_rate):
     x, rate = member_rows(model, model.block[k, PAIR], i, q, v, row, row_rate)
     x -= member_state[SET, i]
     value = level_of(model, segment, k, t)
-    f, _, _, _, _ = law(model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves)
+    f, _, _, _, _ = law(
+        model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
     return f
 
 

@@ -6,7 +6,7 @@ member changes its mode and, where the force jumps, the accelerations with it. T
 
     dt_e = -(s_q dq + s_v dv) / s',      and behind it  dv+ = dv- + (a- - a+) dt_e      (saltation).
 
-With L' = B v, dL'/dq is dB/dt, so s_q = s_x B + s_xd dB/dt, s_v = s_xd B, s' = s_x x' + s_xd x''.
+With L' = B v, dL'/dq is dB/dt, so s_q = s_x B + s_xd dB/dt, s_v = s_xd B, s' = s_x x' + s_xd x'' + s_t.
 
 Where a margin only just falls below zero, or only just does not, the derivative may be another one on either side:
 s'^2 / (2 |s''|) is how far it goes beyond. Less than the motion is accurate to, and it grazes (`law_grazes`).
@@ -19,7 +19,7 @@ import numpy as np
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.general.contact import contact_switch
 from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import CODE, COUNT, INERTER, PAIR, START, STOP
+from mdstopo.general.model import CODE, COUNT, INERTER, MEMBER_FREE_LENGTH, PAIR, START, STOP
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.contact import contact_grazes, contact_margin, contact_margin_slopes
 from mdstopo.mechanics.kinematics.kinematics_interface import (
@@ -37,8 +37,11 @@ from mdstopo.mechanics.laws.table import (
     law_grazes,
     law_has_pieces,
     law_margin,
+    law_margin_by_time,
     law_margin_slopes,
+    law_margins,
     law_next,
+    law_one_margin,
     law_set,
     law_switches,
 )
@@ -57,7 +60,7 @@ def has_switches(model, knots):
     """Whether any member can switch at all; knots: as of `members.set_modes`."""
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code != INERTER and law_switches(code, model.law[k]) and (knots or not law_has_pieces(code)):
+        if code != INERTER and law_switches(code, model.law[k], model.curves) and (knots or not law_has_pieces(code)):
             return True
     return model.contact_pair.shape[0] > 0
 
@@ -74,7 +77,7 @@ def watch_all(model, segment, watched):
     found = 0
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k], model.curves):
             continue
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
@@ -87,7 +90,7 @@ def watch_all(model, segment, watched):
 
 
 @kernel
-def watch_near(model, segment, member_state, rel0, rel1, h, watched):
+def watch_near(model, segment, t, member_state, rel0, rel1, h, watched):
     """Write into `watched` those that may leave their mode within a step; the others have far to go.
 
     The margin of a member is followed on the cubic by its values and rates at both ends, which stays above the least of
@@ -98,6 +101,7 @@ def watch_near(model, segment, member_state, rel0, rel1, h, watched):
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time at the first pose (s).
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
     Out:
@@ -106,17 +110,19 @@ def watch_near(model, segment, member_state, rel0, rel1, h, watched):
     found = 0
     for k in range(model.block.shape[0]):
         code = model.block[k, CODE]
-        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k]):
+        if code == INERTER or model.active[segment, k] == 0 or not law_switches(code, model.law[k], model.curves):
             continue
         p = model.block[k, PAIR]
         lo = model.block[k, START]
         for i in range(lo, lo + model.block[k, COUNT]):
-            s0, d0, plain0 = margin_of_member(model, k, i, member_state, rel0[p], h)
-            s1, d1, plain1 = margin_of_member(model, k, i, member_state, rel1[p], h)
-            least = min(min(s0, s1), min(s0 + d0 / 3.0, s1 - d1 / 3.0))
-            if not (plain0 and plain1 and least > FAR * (abs(d0) + abs(d1) + abs(s1 - s0))):
-                found += 1
-                watched[found] = i
+            for which in range(law_margins(code, model.law[k], model.curves)):
+                s0, d0, plain0 = margin_of_member(model, k, i, which, t, member_state, rel0[p], h)
+                s1, d1, plain1 = margin_of_member(model, k, i, which, t + h, member_state, rel1[p], h)
+                least = min(min(s0, s1), min(s0 + d0 / 3.0, s1 - d1 / 3.0))
+                if not (plain0 and plain1 and least > FAR * (abs(d0) + abs(d1) + abs(s1 - s0))):
+                    found += 1
+                    watched[found] = i
+                    break
     for j in range(model.contact_pair.shape[0]):
         found += 1
         watched[found] = model.member.shape[1] + j
@@ -124,25 +130,30 @@ def watch_near(model, segment, member_state, rel0, rel1, h, watched):
 
 
 @part
-def margin_of_member(model, k, i, member_state, r, h):
-    """Margin of member i of block k, its change at its present rate within h (s), and whether no rate is in it.
+def margin_of_member(model, k, i, which, t, member_state, r, h):
+    """A margin of a member, its change at its present rate within h (s), and whether no rate is in it.
 
+    model: the compiled scene.
+    k, i: the block, and the member (padded).
+    which: number of the margin, of a law that has several (`law_margins`).
+    t: time (s).
     member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
     r (POSE,): relative pose of its pair. The change is 0 where rates are in the margin.
     """
-    code = model.block[k, CODE]
-    mode = int(member_state[MODE, i])
     _, x, rate = member_motion(model, i, r)
     x -= member_state[SET, i]
-    s = law_margin(code, model.law[k], x, rate, mode, model.curves)
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    mode = int(member_state[MODE, i])
+    s, by_x, by_rate, by_time = law_one_margin(
+        model.block[k, CODE], model.law[k], which, x, rate, mode, t, model.curves, rest
+    )
     plain = by_rate == 0.0
-    return s, (h * by_x * rate if plain else 0.0), plain
+    return s, (h * by_x * rate + h * by_time if plain else 0.0), plain
 
 
 @kernel
-def smallest_margin(model, member_state, rel, watched):
-    """The smallest margin of those that are watched, at relative poses rel (n_pair, POSE), and whose it is."""
+def smallest_margin(model, t, member_state, rel, watched):
+    """The smallest margin of those that are watched, at time t and relative poses rel (n_pair, POSE); whose it is."""
     best = np.inf
     who = -1
     first = model.member.shape[1]
@@ -152,7 +163,9 @@ def smallest_margin(model, member_state, rel, watched):
             k = block_of(model, i)
             _, x, rate = member_motion(model, i, rel[model.block[k, PAIR]])
             x -= member_state[SET, i]
-            s = law_margin(model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), model.curves)
+            code = model.block[k, CODE]
+            rest = model.member[MEMBER_FREE_LENGTH, i]
+            s = law_margin(code, model.law[k], x, rate, int(member_state[MODE, i]), t, model.curves, rest)
         else:
             j = i - first
             height, rise, room, _, _ = contact_seen(model, j, rel[model.contact_pair[j]])
@@ -164,13 +177,14 @@ def smallest_margin(model, member_state, rel, watched):
 
 
 @kernel
-def first_dip(model, member_state, rel0, rel1, h, parts, watched):
+def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
     """Where in a step a margin dips below zero between two poses at which it is not negative: members that come and go.
 
     Looked for on the cubic through a margin's values and rates at both poses.
 
     Constant:
       model: the compiled scene.
+      t: time at the first pose (s).
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: time between them (s).
@@ -186,25 +200,24 @@ def first_dip(model, member_state, rel0, rel1, h, parts, watched):
     first = model.member.shape[1]
     for m in range(1, watched[0] + 1):
         i = watched[m]
-        if i < first:
-            k = block_of(model, i)
-            p = model.block[k, PAIR]
-            s0, d0, plain = margin_of_member(model, k, i, member_state, rel0[p], h)
+        k = block_of(model, i) if i < first else -1
+        for which in range(law_margins(model.block[k, CODE], model.law[k], model.curves) if k >= 0 else 1):
+            if k >= 0:
+                p = model.block[k, PAIR]
+                s0, d0, plain = margin_of_member(model, k, i, which, t, member_state, rel0[p], h)
+                if not plain:
+                    continue
+                s1, d1, plain = margin_of_member(model, k, i, which, t + h, member_state, rel1[p], h)
+            else:
+                s0, d0, s1, d1, plain = margins_of_contact(model, i - first, int(member_state[MODE, i]), rel0, rel1, h)
             if not plain:
                 continue
-            s1, d1, plain = margin_of_member(model, k, i, member_state, rel1[p], h)
-            if not plain:
-                continue
-        else:
-            s0, d0, s1, d1, plain = margins_of_contact(model, i - first, int(member_state[MODE, i]), rel0, rel1, h)
-            if not plain:
-                continue
-        c, dip = lowest_between(s0, d0, s1, d1)
-        if dip < 0.0:
-            best = min(best, c)
-        elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
-            low = dip
-            near = c
+            c, dip = lowest_between(s0, d0, s1, d1)
+            if dip < 0.0:
+                best = min(best, c)
+            elif dip < low and dip < SLACK * parts * parts * (d1 - d0):
+                low = dip
+                near = c
     return best, near, low
 
 
@@ -268,7 +281,7 @@ def probes_needed(model, rel0, rel1, watched):
 
 
 @kernel
-def first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched):
+def first_sign(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched):
     """Where in a step a member seems to leave its mode and come back before the end.
 
     Looked for on the cubic through the states at both ends, in as many parts as the motion asks for, and in each part
@@ -277,6 +290,7 @@ def first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watche
     Constant:
       model: the compiled scene.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time at the first end (s).
       q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends.
       rel0, rel1 (n_pair, POSE): relative poses at both ends.
       h: length of the step (s).
@@ -301,10 +315,11 @@ def first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watche
         else:
             cubic(model, c, h, q0, v0, q1, v1, q, v)
             relative_pose(model, q, v, rel)
-            margin, _ = smallest_margin(model, member_state, rel, watched)
+            margin, _ = smallest_margin(model, t + c * h, member_state, rel, watched)
             if margin < -noise:
                 return c, near
-        dip, may, lowest = first_dip(model, member_state, before, rel, h / parts, parts, watched)
+        start = t + (c - 1.0 / parts) * h
+        dip, may, lowest = first_dip(model, start, member_state, before, rel, h / parts, parts, watched)
         if dip < 1.0:
             return (piece - 1 + dip) / parts, near
         if lowest < low:
@@ -317,10 +332,11 @@ def first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watche
 
 
 @kernel
-def is_doubtful(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched):
+def is_doubtful(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched):
     """Whether a member may leave its mode and come back within a step; arguments as of `first_sign`.
 
     model: the compiled scene.
+    t: time at the first end (s).
     member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
     q0, q1 (n_q,), v0, v1 (n,): coordinates and velocities at both ends.
     rel0, rel1 (n_pair, POSE): relative poses at both ends.
@@ -328,19 +344,20 @@ def is_doubtful(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watch
     noise: how far below zero a margin is by rounding alone (m).
     watched: the members and contacts that are looked at (`watch_near`).
     """
-    dip, near = first_sign(model, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched)
+    dip, near = first_sign(model, t, member_state, q0, v0, q1, v1, rel0, rel1, h, noise, watched)
     c = dip if dip < 1.0 else near
     return EDGE < c < 1.0 - EDGE
 
 
 @kernel
-def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
+def switch_any(model, segment, t, member_state, rel, q, v, a, who, slopes):
     """What becomes of a member or contact whose margin is used up.
 
     Constant:
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time (s).
       rel (n_pair, POSE): relative poses.
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       who: the member or contact, as a column of `member_state`.
@@ -357,18 +374,19 @@ def switch_any(model, segment, member_state, rel, q, v, a, who, slopes):
         return new, beyond, contact_grazes(model.contact[j], old), 0.0, 0.0
     k = block_of(model, who)
     code = model.block[k, CODE]
-    new, beyond, by_set = switch_of(model, segment, member_state, q, v, a, who, k, slopes)
+    new, beyond, by_set = switch_of(model, segment, t, member_state, q, v, a, who, k, slopes)
     x, _ = stretch_of(model, who, rel[model.block[k, PAIR]])
     x -= member_state[SET, who]
     first = member_state[SCALE, who] != 0.0 and member_state[SET, who] == 0.0
-    kind = law_grazes(code, model.law[k], x, old) if first else 0
+    rest = model.member[MEMBER_FREE_LENGTH, who]
+    kind = law_grazes(code, model.law[k], x, old, t, model.curves, rest) if first else 0
     if law_has_pieces(code):  # nothing jumps at a knot: when it is passed makes no difference
         slopes[:] = 0.0
     return new, beyond, kind, by_set, law_set(code, model.law[k], x, old, new)
 
 
 @kernel
-def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
+def switch_of(model, segment, t, member_state, q, v, a, i, k, slopes):
     """The mode that a member goes to, s'^2 / (2 |s''|), and -s_x / s'.
 
     The second, how far its margin s goes beyond zero (m), is given for margins of Delta alone; infinite for others.
@@ -378,6 +396,7 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
       model: the compiled scene.
       segment: segment of `model.times`.
       member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
+      t: time (s).
       q (n_q,), v, a (n,): coordinates, velocities, accelerations.
       i, k: the member (padded), and its block.
     Out:
@@ -395,8 +414,10 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
         d = place_in_pair(model, p, r)
         second += row[r] * a[d] + row_rate[r] * v[d]
     mode = int(member_state[MODE, i])
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
     speed = by_x * rate + by_rate * second
+    speed += law_margin_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
     for d in range(n):
         slopes[0, d] = 0.0
         slopes[1, d] = 0.0
@@ -408,7 +429,8 @@ def switch_of(model, segment, member_state, q, v, a, i, k, slopes):
     bend = 2.0 * abs(by_x * second)
     beyond = speed * speed / bend if by_rate == 0.0 and bend > 0.0 else np.inf
     by_set = -by_x / speed if speed != 0.0 else 0.0
-    return law_next(code, model.law[k], x, rate, second, mode, model.curves), beyond, by_set
+    new = law_next(code, model.law[k], x, rate, second, mode, t, model.curves, rest)
+    return new, beyond, by_set
 
 
 @kernel

@@ -43,7 +43,7 @@ PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
 def unstretched_force(model, k):
     """The largest force of a member of block k at unit strength that does not come from its elongation."""
     code = model.block[k, CODE]
-    most = law_unstretched(code, model.law[k])
+    most = law_unstretched(code, model.law[k], model.curves)
     if law_is_given(code):
         for segment in range(model.level.shape[0]):
             start = model.level[segment, k, 0]

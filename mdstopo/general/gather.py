@@ -5,7 +5,20 @@ import numpy as np
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SET, level_of, rate_of_row
-from mdstopo.general.model import CODE, COUNT, DESIGN, GROUP, INERTER, KIND, OFFSET, PAIR, ROW, START, SUBJECT
+from mdstopo.general.model import (
+    CODE,
+    COUNT,
+    DESIGN,
+    GROUP,
+    INERTER,
+    KIND,
+    MEMBER_FREE_LENGTH,
+    OFFSET,
+    PAIR,
+    ROW,
+    START,
+    SUBJECT,
+)
 from mdstopo.general.parameters import add_force_parameters, add_parameters
 from mdstopo.general.responses import MEMBER_FORCE, member_force
 from mdstopo.general.step_history import has_factors
@@ -237,6 +250,7 @@ def _unit_force(model, k, i, segment, t, r, member_state):
     stretch -= member_state[SET, i]
     value = level_of(model, segment, k, t)
     f, _, _, _, _ = law(
-        model.block[k, CODE], model.law[k], stretch, rate, int(member_state[MODE, i]), t, value, model.curves
-    )
+        model.block[k, CODE], model.law[k], stretch, rate, int(member_state[MODE, i]), t, value, model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
     return f

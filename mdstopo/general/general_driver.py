@@ -284,7 +284,7 @@ class GeneralDriver:
         if self.events == 0:
             return -1
         steps, events = int(self.limits[1]), int(self.limits[3])
-        event = self.room_ints[4 * (steps + 1) :].reshape(events, 5)[: self.events]
+        event = self.room_ints[4 * (steps + 1) :].reshape(events, 6)[: self.events]
         for state, member, *_ in event[event[:, GRAZES] != 0].tolist():
             for rows, found in zip(self.rows, self.found, strict=True):
                 if np.any(rows[:found, STEP] + rows[:found, FRACTION] == state):

@@ -36,6 +36,7 @@ from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_s
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
+    GIVEN,
     GRAZES,
     MEMBER,
     NEW,
@@ -185,6 +186,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 history.event[events, OLD] = 0
                 history.event[events, NEW] = int(member_state[MODE, i])
                 history.event[events, GRAZES] = 0
+                history.event[events, GIVEN] = 1
                 history.kept[events, SET_BEFORE] = 0.0
                 history.kept[events, SET_AFTER] = member_state[SET, i]
                 history.kept[events, TIME_BY_SET] = 0.0
@@ -215,6 +217,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 for e in range(first, events):
                     history.saltation[e] = 0.0
                     history.kept[e, TIME_BY_SET] = 0.0
+                    history.event[e, GIVEN] = 1
         begin = t
         pieces = max(np.ceil((end - begin) / step - 1e-9), 1.0)
         done = 0.0
@@ -240,7 +243,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             happens = False
             who = nowhere
             if switching:
-                margin, who = smallest_margin(model, member_state, rel, watched)
+                margin, who = smallest_margin(model, t + h, member_state, rel, watched)
                 low = 0.0
                 high = h
                 top = 0
@@ -254,8 +257,8 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                     relative_pose(model, left_q, left_v, before)
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
                     dip, near = first_sign(
-                        model, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before, rel,
-                        cut[top] - low, rounding, watched,
+                        model, t + low, member_state, left_q, left_v, beyond_q[top], beyond[top, VELOCITY], before,
+                        rel, cut[top] - low, rounding, watched,
                     )  # fmt: skip
                     middle = cut_at(dip, near, low, cut[top])
                     if middle < 0.0 or cuts == CUTS:
@@ -278,18 +281,18 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                         where[0] = singular
                         return code, count, events, t
                     relative_pose(model, beyond_q[top], beyond[top, VELOCITY], rel)
-                    value, near_who = smallest_margin(model, member_state, rel, watched)
+                    value, near_who = smallest_margin(model, t + middle, member_state, rel, watched)
                     if value < -rounding:
                         high = middle
                         margin = value
                         who = near_who
                         break
-                    if value < graze and matters(model, member_state, rel, near_who):
+                    if value < graze and matters(model, t + middle, member_state, rel, near_who):
                         where[2] = near_who
                 relative_pose(model, left_q, left_v, before)
                 happens = margin < -rounding
                 if happens:
-                    at_low, _ = smallest_margin(model, member_state, before, watched)
+                    at_low, _ = smallest_margin(model, t + low, member_state, before, watched)
                     at_low = max(at_low, rounding)
                     at_high = margin
                     side = 0
@@ -318,7 +321,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                             where[0] = singular
                             return code, count, events, t
                         relative_pose(model, trial_q, trial[VELOCITY], rel)
-                        value, who = smallest_margin(model, member_state, rel, watched)
+                        value, who = smallest_margin(model, t + middle, member_state, rel, watched)
                         note_trial(trials, middle, value)
                         low, high, at_low, at_high, side = narrowed(
                             low, high, at_low, at_high, middle, value, rounding, side

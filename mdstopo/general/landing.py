@@ -85,7 +85,7 @@ def margin_inside(step, segment, t, h, c, watched, on_joints, q, v):
         )
         drive_state(model, segment, t + c * h, q, v)
     relative_pose(model, q, v, step.rel)
-    return smallest_margin(model, step.member_state, step.rel, watched)
+    return smallest_margin(model, t + c * h, step.member_state, step.rel, watched)
 
 
 @kernel
@@ -117,8 +117,8 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         relative_pose(model, step.left_q, step.left_v, step.before)
         relative_pose(model, step.cut_q[top], step.cut_v[top], step.rel)
         dip, near = first_sign(
-            model, member_state, step.left_q, step.left_v, step.cut_q[top], step.cut_v[top], step.before, step.rel,
-            (step.cut[top] - low) * h, rounding, watched,
+            model, t + low * h, member_state, step.left_q, step.left_v, step.cut_q[top], step.cut_v[top], step.before,
+            step.rel, (step.cut[top] - low) * h, rounding, watched,
         )  # fmt: skip
         middle = cut_at(dip, near, low, step.cut[top])
         if middle < 0.0 or cuts == CUTS:
@@ -138,7 +138,7 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
         if value < -rounding:
             at_high = value
             break
-        if value < graze and matters(model, member_state, step.rel, who):
+        if value < graze and matters(model, t + middle * h, member_state, step.rel, who):
             where[2] = who
     if top < 0:
         return 2.0, 2.0, 0.0
@@ -147,13 +147,13 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
 
 
 @kernel
-def keep_used(step, rounding):
-    """Leave on the list of the members that are watched those alone whose margin is used up at the pose `step.rel`."""
+def keep_used(step, t, rounding):
+    """Leave on the list of the members that are watched those alone whose margin is used up at time t, `step.rel`."""
     step.one[0] = 1
     found = 0
     for m in range(1, step.watched[0] + 1):
         step.one[1] = step.watched[m]
-        margin, _ = smallest_margin(step.model, step.member_state, step.rel, step.one)
+        margin, _ = smallest_margin(step.model, t, step.member_state, step.rel, step.one)
         if margin < -rounding:
             found += 1
             step.few[found] = step.watched[m]
@@ -179,9 +179,9 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     if low > 1.0:
         return 2.0, -1, 0.0
     begin = low
-    keep_used(step, rounding)
+    keep_used(step, t + high * h, rounding)
     few = step.few
-    at_low, _ = smallest_margin(step.model, step.member_state, step.before, few)
+    at_low, _ = smallest_margin(step.model, t + low * h, step.member_state, step.before, few)
     at_low = max(at_low, rounding)
     resolution = 4e-16 * (abs(t) + h) / h
     jointed = step.model.size[0] > 0

@@ -14,7 +14,7 @@ from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
 from mdstopo.general.events import EDGE, block_of, smallest_margin
 from mdstopo.general.members import MODE, SCALE, SET
-from mdstopo.general.model import CODE, PAIR
+from mdstopo.general.model import CODE, MEMBER_FREE_LENGTH, PAIR
 from mdstopo.general.step_history import copy_vector
 from mdstopo.mechanics.contact import contact_grazes
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic, relative_pose, stretch_of
@@ -73,7 +73,7 @@ def foreseen_margin(model, member_state, segment, t, low, high, ends_q, ends, c,
     quintic(model, c, high - low, ends_q[0], ends[0, 0], ends[0, 1], ends_q[1], ends[1, 0], ends[1, 1], room_q, room_v)
     drive_state(model, segment, t + low + c * (high - low), room_q, room_v)
     relative_pose(model, room_q, room_v, rel)
-    margin, _ = smallest_margin(model, member_state, rel, watched)
+    margin, _ = smallest_margin(model, t + low + c * (high - low), member_state, rel, watched)
     return margin
 
 
@@ -236,11 +236,11 @@ def cut_at(dip, near, low, high):
 
 
 @kernel
-def matters(model, member_state, rel, i):
+def matters(model, t, member_state, rel, i):
     """Whether derivatives depend on it that member or contact i only just does not leave its mode.
 
-    rel (n_pair, POSE): relative poses at that moment. Members with a permanent set are left out: where no energy is
-    lost they come back to the very place at which the set was made, which is no touch to warn of.
+    t, rel (n_pair, POSE): that time (s), and relative poses then. Members with a permanent set are left out: where no
+    energy is lost they come back to the very place at which the set was made, which is no touch to warn of.
     """
     if i >= model.member.shape[1]:
         return contact_grazes(model.contact[i - model.member.shape[1]], int(member_state[MODE, i])) == 2
@@ -248,4 +248,6 @@ def matters(model, member_state, rel, i):
         return False
     k = block_of(model, i)
     x, _ = stretch_of(model, i, rel[model.block[k, PAIR]])
-    return law_grazes(model.block[k, CODE], model.law[k], x, int(member_state[MODE, i])) == 2
+    rest = model.member[MEMBER_FREE_LENGTH, i]
+    mode = int(member_state[MODE, i])
+    return law_grazes(model.block[k, CODE], model.law[k], x, mode, t, model.curves, rest) == 2

@@ -109,7 +109,13 @@ def set_modes(model, member_state, rel, rel_rate, knots):
             _, x, rate = member_motion(model, i, r)
             second = second_rate(model, i, r, acc)
             whole = law_has_pieces(code) and (not knots or model.block[k, COUNT] > KNOTTED)
-            member_state[MODE, i] = 0.0 if whole else law_start(code, model.law[k], x, rate, second, model.curves)
+            if whole:
+                member_state[MODE, i] = 0.0
+            else:
+                rest = model.member[MEMBER_FREE_LENGTH, i]
+                member_state[MODE, i] = law_start(
+                    code, model.law[k], x, rate, second, model.times[0], model.curves, rest
+                )
             member_state[SET, i] = law_first_set(code, model.law[k], x, int(member_state[MODE, i]))
             if law_remembers(code) and model.active[0, k] == 0:  # it has not acted yet
                 member_state[MODE, i] = 0.0
@@ -174,7 +180,7 @@ def meeting(model, segment, t, member_state, before, after):
                 continue
             f, _, _, _, _ = law(
                 model.block[k, CODE], model.law[k], -model.member[MEMBER_FREE_LENGTH, i] - member_state[SET, i], 0.0,
-                int(member_state[MODE, i]), t, value, model.curves,
+                int(member_state[MODE, i]), t, value, model.curves, model.member[MEMBER_FREE_LENGTH, i],
             )  # fmt: skip
             if f * member_state[SCALE, i] != 0.0:
                 return i

@@ -32,6 +32,7 @@ from mdstopo.general.model import (
     DESIGN,
     GROUP,
     INERTER,
+    MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
     START,
@@ -41,13 +42,14 @@ from mdstopo.general.model import (
     VARIED_VALUE,
 )
 from mdstopo.general.responses import value_at
-from mdstopo.general.step_history import EVENTS, MEMBER, OLD, SEGMENT, SET_BEFORE, STATE, restore_modes
+from mdstopo.general.step_history import EVENTS, GIVEN, MEMBER, OLD, SEGMENT, SET_BEFORE, STATE, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
 from mdstopo.mechanics.kinematics.kinematics_interface import inerter_row, member_rows
 from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
     FREE_LENGTH,
+    law_margin_by_time,
     law_margin_slope,
     law_margin_slopes,
     law_slopes,
@@ -86,8 +88,9 @@ def parameter_slopes(model, k, i, place, segment, t, member_state, q, v, a, row,
     x -= member_state[SET, i]
     level = level_of(model, segment, k, t)
     return law_slopes(
-        model.block[k, CODE], model.law[k], place, x, rate, int(member_state[MODE, i]), t, level, model.curves
-    )
+        model.block[k, CODE], model.law[k], place, x, rate, int(member_state[MODE, i]), t, level, model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
 
 
 @kernel
@@ -165,13 +168,8 @@ def event_slope(model, history, member_state, event, e):
     place = model.varied[e, VARIED_PLACE]
     state = history.event[event, STATE]
     who = history.event[event, MEMBER]
-    if place > FREE_LENGTH or state == 0 or block_of(model, who) != k:
-        return 0.0
-    given = True
-    for part in range(2):
-        for d in range(model.mass.shape[0]):
-            given = given and history.saltation[event, part, d] == 0.0
-    if given:
+    given = state == 0 or history.event[event, GIVEN] != 0
+    if place > FREE_LENGTH or given or block_of(model, who) != k:
         return 0.0
     segment = history.index[state - 1, SEGMENT]
     q = history.q[state]
@@ -182,11 +180,14 @@ def event_slope(model, history, member_state, event, e):
     x -= history.kept[event, SET_BEFORE]
     code = model.block[k, CODE]
     mode = int(history.event[event, OLD])
-    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, model.curves)
+    t = history.t[state]
+    rest = model.member[MEMBER_FREE_LENGTH, who]
+    by_time = law_margin_by_time(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    by_p = law_margin_slope(code, model.law[k], place, x, rate, mode, t, model.curves, rest)
     if by_p == 0.0:
         return 0.0
-    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, model.curves)
-    speed = by_x * rate
+    by_x, by_rate = law_margin_slopes(code, model.law[k], x, rate, mode, t, model.curves, rest)
+    speed = by_x * rate + by_time
     if by_rate != 0.0:
         a = np.empty(model.mass.shape[0])
         lam = np.empty(model.size[0])
@@ -198,7 +199,7 @@ def event_slope(model, history, member_state, event, e):
         for r in range(pair_freedoms(model)):
             d = place_in_pair(model, model.block[k, PAIR], r)
             speed += by_rate * (row[r] * a[d] + row_rate[r] * v[d])
-    return -by_p / speed
+    return -by_p / speed if speed != 0.0 else 0.0
 
 
 @kernel

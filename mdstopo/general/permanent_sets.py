@@ -25,6 +25,7 @@ from mdstopo.general.model import (
     DESIGN,
     GROUP,
     KIND,
+    MEMBER_FREE_LENGTH,
     OFFSET,
     PAIR,
     START,
@@ -105,8 +106,9 @@ def set_slopes(model, k, i, member_state, x, rate):
     rate: rate of the elongation (m/s).
     """
     _, by_x, _, _, pull = law(
-        model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), 0.0, 0.0, model.curves
-    )
+        model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), 0.0, 0.0, model.curves,
+        model.member[MEMBER_FREE_LENGTH, i],
+    )  # fmt: skip
     return -member_state[SCALE, i] * by_x, -member_state[SCALE, i] * pull
 
 

@@ -29,6 +29,7 @@ from mdstopo.general.model import (
     GROUP,
     INERTER,
     KIND,
+    MEMBER_FREE_LENGTH,
     OFFSET,
     ORDER,
     PAIR,
@@ -202,8 +203,9 @@ def member_force(model, member_state, segment, t, group, i, q, v, a, slopes, own
             continue
         value = level_of(model, segment, k, t)
         f, by_x, by_rate, _, _ = law(
-            model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, m]), t, value, model.curves
-        )
+            model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, m]), t, value, model.curves,
+            model.member[MEMBER_FREE_LENGTH, m],
+        )  # fmt: skip
         total += scale * f
         for r in range(pair_freedoms(model)):
             slopes[0, r] += scale * (by_x * own[0, r] + by_rate * own[1, r])
@@ -246,8 +248,9 @@ def group_forces(model, member_state, segment, t, group, q, v, a, out):
             x, rate = stretch_between(model, p, i, turn_one, turn_two, q, v)
             x -= member_state[SET, i]
             f, _, _, _, _ = law(
-                model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves
-            )
+                model.block[k, CODE], model.law[k], x, rate, int(member_state[MODE, i]), t, value, model.curves,
+                model.member[MEMBER_FREE_LENGTH, i],
+            )  # fmt: skip
             out[first + i] += scale * f
 
 
@@ -286,7 +289,8 @@ def group_rates(model, member_state, segment, t, group, q, v, a, rel, out):
             scale = member_state[SCALE, i]
             x, rate = stretch_between(model, p, i, turn_one, turn_two, q, v)
             x -= member_state[SET, i]
-            f, by_x, by_rate, _, _ = law(code, model.law[k], x, rate, mode, t, value, model.curves)
+            rest = model.member[MEMBER_FREE_LENGTH, i]
+            f, by_x, by_rate, _, _ = law(code, model.law[k], x, rate, mode, t, value, model.curves, rest)
             slope = by_x * rate
             if by_rate != 0.0:
                 slope += by_rate * second_rate(model, i, rel[p], second)

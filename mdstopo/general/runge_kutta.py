@@ -39,6 +39,7 @@ from mdstopo.general.singular_poses import (
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,
+    GIVEN,
     GRAZES,
     MEMBER,
     NEW,
@@ -244,13 +245,13 @@ def log_switches(
     relative_pose(model, q, v, rel)
     done = 0
     while True:
-        margin, who = smallest_margin(model, member_state, rel, watched)
+        margin, who = smallest_margin(model, t, member_state, rel, watched)
         if not margin < -noise or done > 2 * member_state.shape[1]:
             return events
         if events >= history.event.shape[0]:
             return -1
         saltation = history.saltation[events]
-        new, beyond, kind, by_set, grown = switch_any(model, segment, member_state, rel, q, v, a, who, saltation)
+        new, beyond, kind, by_set, grown = switch_any(model, segment, t, member_state, rel, q, v, a, who, saltation)
         old = int(member_state[MODE, who])
         if beyond < graze and kind == 2:
             where[2] = who
@@ -259,6 +260,7 @@ def log_switches(
         history.event[events, OLD] = old
         history.event[events, NEW] = new
         history.event[events, GRAZES] = 1 if beyond < graze and kind > 0 else 0
+        history.event[events, GIVEN] = 0
         history.kept[events, SET_BEFORE] = member_state[SET, who]
         member_state[SET, who] += grown
         history.kept[events, SET_AFTER] = member_state[SET, who]
@@ -312,7 +314,7 @@ def advance_to_switch(
         )  # fmt: skip
         work[OF_SWITCHES] += s if tries > 0 else 0
         relative_pose(step.model, end_q, end_v, step.rel)
-        value, _ = smallest_margin(step.model, step.member_state, step.rel, step.watched)
+        value, _ = smallest_margin(step.model, t + length, step.member_state, step.rel, step.watched)
         near = value < -rounding and (value >= -NEAR_SWITCH * rounding or tries >= CORRECTIONS // 2)
         if near or tries + 1 == CORRECTIONS:
             break
@@ -438,6 +440,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 history.event[events, OLD] = 0
                 history.event[events, NEW] = int(member_state[MODE, i])
                 history.event[events, GRAZES] = 0
+                history.event[events, GIVEN] = 1
                 history.kept[events, SET_BEFORE] = 0.0
                 history.kept[events, SET_AFTER] = member_state[SET, i]
                 history.kept[events, TIME_BY_SET] = 0.0
@@ -482,6 +485,7 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
                 for e in range(first, events):
                     history.saltation[e] = 0.0  # the time is given: it does not vary with the design
                     history.kept[e, TIME_BY_SET] = 0.0
+                    history.event[e, GIVEN] = 1
         while t < end:
             where[0] = -1
             held = held + 1 if wanted * brake > BRAKED else 0
@@ -569,12 +573,12 @@ def simulate(ints, floats, tables, alpha, tangent, settings, limits, room, room_
             history.share[count] = 1.0
             if switching:
                 relative_pose(model, q0, v0, before)
-                watch_near(model, segment, member_state, before, rel, h, watched)
-                margin, who = smallest_margin(model, member_state, rel, watched)
+                watch_near(model, segment, t, member_state, before, rel, h, watched)
+                margin, who = smallest_margin(model, t + h, member_state, rel, watched)
                 c = 2.0
                 rate = 0.0
                 if margin < -rounding or is_doubtful(
-                    model, member_state, q0, v0, end_q, end_v, before, rel, h, rounding, watched
+                    model, t, member_state, q0, v0, end_q, end_v, before, rel, h, rounding, watched
                 ):
                     singular = make_stages(
                         model, table, s, INSIDE, member_state, segment, t, h, q0, v0, keep, stages, workspace, lam, q,

@@ -16,7 +16,7 @@ from mdstopo.general.switches import DAMPED
 from mdstopo.scene.model import FloatArray, IndexArray
 
 FIRST, PARENT, SEGMENT, EVENTS = range(4)
-STATE, MEMBER, OLD, NEW, GRAZES = range(5)
+STATE, MEMBER, OLD, NEW, GRAZES, GIVEN = range(6)
 #: what is kept of a stage beside: nothing, the factors of the joints' matrix, or rows of `window`
 FACTORS, WINDOWS = 1, 2
 #: rows of `window`: coefficients of the window's polynomial; x, y, u of its node (`kinematics_interface`)
@@ -103,9 +103,9 @@ class StepHistory:
     event: Annotated[
         IndexArray,
         Field(
-            "events, 5",
+            "events, 6",
             "the state at which it happened, member (padded), mode before and after; whether it only just happened, so "
-            "that forces at it have no derivative",
+            "that forces at it have no derivative; whether its time is given, so that it varies with nothing",
         ),
     ]
 

@@ -110,6 +110,11 @@ class Placing:
             now = replace(record, **changed)
             if laws.kernels_of(type(now)).data is None:
                 law[k] = laws.parameters(now, [])
+            else:
+                for name, value in changed.items():
+                    place = laws.place_of(type(now), name)
+                    if place < laws.PARAMETERS:
+                        law[k, place] = value
             if "free_length" in changed:
                 first = int(model.block[k, START])
                 part, free = slice(first, first + int(model.block[k, COUNT])), changed["free_length"]

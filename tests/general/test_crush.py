@@ -49,27 +49,27 @@ def one(end=1.5, v=-3.0, g=-10.0, foot=-1.0, more="gap: 0.1"):
 
 @compiled
 def _law(p, x, mode):
-    return table.law(CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0))
+    return table.law(CRUSH, p, x, 0.0, mode, 0.0, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _margin(p, x, xd, mode):
-    return table.law_margin(CRUSH, p, x, xd, mode, np.empty(0))
+    return table.law_margin(CRUSH, p, x, xd, mode, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _slopes(p, x, xd, mode):
-    return table.law_margin_slopes(CRUSH, p, x, xd, mode, np.empty(0))
+    return table.law_margin_slopes(CRUSH, p, x, xd, mode, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _next(p, x, mode):
-    return table.law_next(CRUSH, p, x, 0.0, 0.0, mode, np.empty(0))
+    return table.law_next(CRUSH, p, x, 0.0, 0.0, mode, 0.0, np.empty(0), 1.0)
 
 
 @compiled
 def _start(p, x, xd, xdd):
-    mode = table.law_start(CRUSH, p, x, xd, xdd, np.empty(0))
+    mode = table.law_start(CRUSH, p, x, xd, xdd, 0.0, np.empty(0), 1.0)
     return mode, table.law_first_set(CRUSH, p, x, mode)
 
 

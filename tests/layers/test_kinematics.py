@@ -32,6 +32,7 @@ NO_STRIDES = {
     ("accelerations.py", "3 * model.size[1] + 1"): "a banded matrix with room for its pivots",
     ("compile.py", "reshape(-1, 6)"): "columns of a response",
     ("general_driver.py", "np.zeros((1, 3))"): "a response, its rate and its member",
+    ("general_driver.py", "reshape(events, 6)"): "columns of an event",
     ("extremes.py", "reshape(count, SAMPLES, 3)"): "a response, its rate and its member",
     ("generalized_alpha_step.py", "range(3)"): "names of columns",
     ("layout.py", "reshape(-1, 3)"): "columns of a product",
@@ -43,6 +44,7 @@ NO_STRIDES = {
     ("responses.py", "range(3)"): "coordinates, velocities, accelerations; terms of a difference",
     ("settle.py", "range(3)"): "how often it lands",
     ("step_history.py", "range(3)"): "names of columns",
+    ("step_history.py", "range(6)"): "names of columns",
 }
 #: modules that say what is planar, or spatial, when a case is compiled
 OF_ONE_DIMENSION = {"planar_scene.py", "spatial_scene.py", "turning_drives.py"}

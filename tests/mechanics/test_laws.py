@@ -41,7 +41,14 @@ ROOT = Path(__file__).resolve().parents[2]
 OPEN, CLOSED, CLIPPED = gap.OPEN, gap.CLOSED, gap.CLIPPED
 LINEAR, UPPER, LOWER = actuator.LINEAR, actuator.UPPER, actuator.LOWER
 #: what is not a function of elongation and rate, or remembers, and the module that tests it instead
-ELSEWHERE = {"inerter": "tests/general/test_inerter.py", "crush": "tests/general/test_crush.py"}
+ELSEWHERE = {
+    "inerter": "tests/general/test_inerter.py",
+    "crush": "tests/general/test_crush.py",
+    "expression": "tests/general/test_expression_laws.py",
+}
+
+#: time and free length, where they make no difference
+TIME, REST = 0.0, 1.0
 
 seeds = st.integers(0, 2**32 - 1)
 many = settings(max_examples=60, deadline=None, derandomize=True)
@@ -50,47 +57,47 @@ many = settings(max_examples=60, deadline=None, derandomize=True)
 # Kernels have no Python wrapper: these are their callers.
 @numba.njit
 def _law(code, p, x, xd, mode, t, value, curves):
-    return table.law(code, p, x, xd, mode, t, value, curves)
+    return table.law(code, p, x, xd, mode, t, value, curves, REST)
 
 
 @numba.njit
 def _by_parameter(code, p, place, x, xd, mode, t, value, curves):
-    return table.law_slopes(code, p, place, x, xd, mode, t, value, curves)
+    return table.law_slopes(code, p, place, x, xd, mode, t, value, curves, REST)
 
 
 @numba.njit
 def _margin_by_parameter(code, p, place, x, xd, mode, curves):
-    return table.law_margin_slope(code, p, place, x, xd, mode, curves)
+    return table.law_margin_slope(code, p, place, x, xd, mode, TIME, curves, REST)
 
 
 @numba.njit
 def _margin(code, p, x, xd, mode, curves):
-    return table.law_margin(code, p, x, xd, mode, curves)
+    return table.law_margin(code, p, x, xd, mode, TIME, curves, REST)
 
 
 @numba.njit
 def _slopes(code, p, x, xd, mode, curves):
-    return table.law_margin_slopes(code, p, x, xd, mode, curves)
+    return table.law_margin_slopes(code, p, x, xd, mode, TIME, curves, REST)
 
 
 @numba.njit
 def _next(code, p, x, xd, xdd, mode, curves):
-    return table.law_next(code, p, x, xd, xdd, mode, curves)
+    return table.law_next(code, p, x, xd, xdd, mode, TIME, curves, REST)
 
 
 @numba.njit
 def _start(code, p, x, xd, xdd, curves):
-    return table.law_start(code, p, x, xd, xdd, curves)
+    return table.law_start(code, p, x, xd, xdd, TIME, curves, REST)
 
 
 @numba.njit
-def _grazes(code, p, mode):
-    return table.law_grazes(code, p, 0.0, mode)
+def _grazes(code, p, mode, curves):
+    return table.law_grazes(code, p, 0.0, mode, TIME, curves, REST)
 
 
 @numba.njit
-def _switches(code, p):
-    return table.law_switches(code, p)
+def _switches(code, p, curves):
+    return table.law_switches(code, p, curves)
 
 
 class Kernel:
@@ -127,7 +134,7 @@ class Kernel:
         return _start(self.code, self.p, float(x), float(xd), float(xdd), self.curves)
 
     def grazes(self, mode):
-        return int(_grazes(self.code, self.p, mode))
+        return int(_grazes(self.code, self.p, mode, self.curves))
 
     def jumps(self, before, after):
         """Whether the force may jump where the mode changes so: where damped contact begins or ends with a force."""
@@ -137,7 +144,7 @@ class Kernel:
 
     @property
     def switches(self):
-        return bool(_switches(self.code, self.p))
+        return bool(_switches(self.code, self.p, self.curves))
 
     @property
     def modes(self):

@@ -9,6 +9,7 @@ from mdstopo.case.laws.actuator import ActuatorLaw
 from mdstopo.case.laws.crush import CrushLaw
 from mdstopo.case.laws.cubic import CubicLaw
 from mdstopo.case.laws.curve import CurveLaw
+from mdstopo.case.laws.expression import ExpressionLaw
 from mdstopo.case.laws.gap import GapLaw
 from mdstopo.case.laws.inerter import InerterLaw
 from mdstopo.case.laws.law import Law, record_of
@@ -30,6 +31,7 @@ LAWS: dict[str, type[Law]] = {
         ActuatorLaw,
         CrushLaw,
         InerterLaw,
+        ExpressionLaw,
     )
 }
 
@@ -49,6 +51,7 @@ __all__ = [
     "CrushLaw",
     "CubicLaw",
     "CurveLaw",
+    "ExpressionLaw",
     "GapLaw",
     "InerterLaw",
     "Law",

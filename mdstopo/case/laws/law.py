@@ -15,6 +15,7 @@ import numpy as np
 
 from mdstopo.case.arrays import FloatArray
 from mdstopo.case.kinds import NOT_NEGATIVE, NUMBER, POSITIVE, Number, Word, explained
+from mdstopo.case.reading import Fields, Reading
 from mdstopo.case.records import Key, Record
 from mdstopo.case.value import Value, frozen, stated
 
@@ -36,6 +37,8 @@ class Law(Value):
     kind: ClassVar[str]
     doc: ClassVar[str]
     kernels: ClassVar[str]
+    #: whether there may be places at which a slope of the force is infinite or has no value
+    may_lack_slopes: ClassVar[bool] = False
 
     active_from: float | None = stated(
         NUMBER, "acts from this time on", unit="s", default=None, otherwise="always", varies=True, is_time=True
@@ -43,6 +46,12 @@ class Law(Value):
     active_until: float | None = stated(
         NUMBER, "acts until this time, not at it", unit="s", default=None, otherwise="always", varies=True, is_time=True
     )
+
+    @classmethod
+    def made(cls, fields: Fields, values: dict[str, Any], reading: Reading) -> Law | None:
+        """The law of the values that were read; None where they do not go together, which is noted."""
+        del fields, reading
+        return cls(**values)
 
     def row(self) -> list[float]:
         """Parameters for the kernels: the law's numbers in the order of `numbers`, then what a subclass adds."""

@@ -150,7 +150,7 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
         rate = bx * vx + by * vy + bt * vt
         scale = member_state[0, i]
         x = stretched(member, i, r, length) - member_state[2, i]
-        f, fd, fr, energy, pull = law(code, p, x, rate, int(member_state[1, i]), t, value, curves)
+        f, fd, fr, energy, pull = law(code, p, x, rate, int(member_state[1, i]), t, value, curves, member[4, i])
         f *= scale
         o[0] -= f * bx
         o[1] -= f * by
@@ -233,7 +233,7 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
         x = stretched(member, i, r, length) - member_state[2, i]
-        f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, curves)
+        f, _, _, energy, _ = law(code, p, x, rate, int(modes_of[i]), t, value, curves, member[4, i])
         out[i] += f * (bx * u[0] + by * u[1] + bt * u[2]) + weight * energy
 
 
@@ -280,7 +280,7 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
             continue
         rate = bx * r[4] + by * r[5] + bt * r[6]
         x = stretched(model.member, i, r, length) - member_state[2, i]
-        f, _, _, _, _ = law(code, p, x, rate, int(member_state[1, i]), t, value, model.curves)
+        f, _, _, _, _ = law(code, p, x, rate, int(member_state[1, i]), t, value, model.curves, model.member[4, i])
         seen[0, acting] = f
         seen[1, acting] = bx
         seen[2, acting] = by

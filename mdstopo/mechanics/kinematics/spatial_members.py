@@ -169,7 +169,9 @@ def member_sums(model, code, p, lo, count, counted, t, value, member_state, r, t
         rate = dot(e, speed)
         scale = member_state[0, i]
         stretch = stretched(model, i, r, x, length) - member_state[2, i]
-        f, fd, fr, energy, pull = law(code, p, stretch, rate, int(member_state[1, i]), t, value, model.curves)
+        f, fd, fr, energy, pull = law(
+            code, p, stretch, rate, int(member_state[1, i]), t, value, model.curves, model.member[6, i]
+        )
         f *= scale
         add(o, 0, times(-f, e))
         add(o, 3, times(-f, lever))
@@ -242,7 +244,7 @@ def member_designs(model, code, p, lo, count, t, value, member_state, modes_of, 
         if code != SPRING:
             stretch -= member_state[2, i]
         mode = int(modes_of[i]) if code != SPRING else 0
-        f, _, _, energy, _ = law(code, p, stretch, rate, mode, t, value, model.curves)
+        f, _, _, energy, _ = law(code, p, stretch, rate, mode, t, value, model.curves, model.member[6, i])
         out[i] += f * (y * dot(x, plus(move, cross(turn, arm)))) + weight * energy
 
 
@@ -296,7 +298,7 @@ def member_designs_of_rows(model, code, p, lo, count, t, value, member_state, r,
             continue
         rate = y * dot(x, plus(vector_at(r, D_RATE), cross(vector_at(r, W), arm)))
         stretch = stretched(model, i, r, x, length) - member_state[2, i]
-        f, _, _, _, _ = law(code, p, stretch, rate, int(member_state[1, i]), t, value, model.curves)
+        f, _, _, _, _ = law(code, p, stretch, rate, int(member_state[1, i]), t, value, model.curves, model.member[6, i])
         e = times(f * y, x)
         lever = cross(arm, e)
         for m in range(out.shape[0]):

@@ -9,6 +9,7 @@ A kernel is an `inline` function. It takes what it needs of the following, in an
     t                time in s
     value            the present value in N of a force that is given over time (`signal`)
     curves           numbers of all laws of the scene (`data`)
+    l0               the member's free length in m
     place            of a parameter in p (kernels that differentiate by it)
     old, new         modes (kernels of a permanent set)
 """
@@ -30,11 +31,15 @@ class Modes:
 
     margin: how far the mode is from its end, not negative as long as it holds. margin_slopes: of it by x and xd.
     margin_slope: of it by the parameter at a place; None where no parameter that may vary is in it.
+    margin_by_time: its slope by time; None where it does not depend on it.
+    margin_rest_slope: its slope by the free length at fixed elongation; None where there is none.
+    margins (p, curves), one_margin: of a law whose margin is the least of several, how many there are, and one of them
+    by its number `which`, with its slopes by x, xd and t; None where there is one.
     next_mode: where to go behind the end. first_mode: at the start of the motion.
-    switches (p): whether this law has several modes at all; None where it always has.
+    switches (p, curves): whether this law has several modes at all; None where it always has.
     idle (mode): whether nothing acts and nothing is stored in a mode; None where that is true of none.
-    grazes (p, x, mode): what a margin that is only just used up (or not) does to derivatives: nothing 0, the force 1,
-    the motion 2; None where it is always 0.
+    grazes (p, x, mode, t, curves, l0): what a margin that is only just used up (or not) does to derivatives: nothing 0,
+    the force 1, the motion 2; None where it is always 0.
     pieces: whether modes are pieces of one function that is smooth enough for motion and derivatives, so that only the
     accuracy of steps gains where they end at the end of a mode.
     """
@@ -44,6 +49,10 @@ class Modes:
     next_mode: Function
     first_mode: Function
     margin_slope: Function | None = None
+    margin_by_time: Function | None = None
+    margin_rest_slope: Function | None = None
+    margins: Function | None = None
+    one_margin: Function | None = None
     switches: Function | None = None
     idle: Function | None = None
     grazes: Function | None = None
@@ -74,7 +83,9 @@ class LawKernels:
 
     force: f, f_x, f_xd, V, V_x: force in N, its slopes by x and xd, stored energy in J and its slope by x.
     slopes: df/dp, dV/dp by the parameter at a place; None where no parameter may vary.
-    unstretched (p): the largest force that does not come from elongation; None where there is none, or it is given.
+    rest_slopes: df/dl0, dV/dl0 by the free length at fixed elongation; None where there are none.
+    unstretched (p, curves): the largest force that does not come from elongation; None where there is none, or it is
+    given.
     modes: of a law that switches. permanent_set: of one that remembers, which switches too.
     linear: the force is p[0] x + p[1] xd + p[2], for which there are vectors over many members.
     inertial: the force is p[0] d2Delta/dt2: part of the mass (`general.forces`), with no kernel here.
@@ -82,11 +93,12 @@ class LawKernels:
     breakpoints (record, fine): times at which steps have to end: kinks, jumps, narrow peaks; fine: see
     `pulse.breakpoints`.
     data (record, at): parameters and numbers for `curves`, of which the first will stand at place `at`; a law that has
-    it does not use `Law.row`, and its parameters do not vary.
+    it does not use `Law.row`; parameters that vary stand first in its row.
     """
 
     force: Function | None = None
     slopes: Function | None = None
+    rest_slopes: Function | None = None
     unstretched: Function | None = None
     modes: Modes | None = None
     permanent_set: PermanentSet | None = None

@@ -71,7 +71,7 @@ def _asks_for_time(each: LawKernels) -> bool:
 
 
 @chosen(LISTED, lambda each: each.force, inline)
-def law(code, p, x, xd, mode, t, value, curves):
+def law(code, p, x, xd, mode, t, value, curves, l0):
     """Force of a member by its law, its slopes, and the energy that it stores.
 
     code: of the law.
@@ -81,6 +81,7 @@ def law(code, p, x, xd, mode, t, value, curves):
     t: time (s).
     value: present force of a law whose force is given over time (N).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
 
     Returns f (N), f_x (N/m), f_xd (N s/m), V (J), V_x (N); NaN for inertial laws.
     """
@@ -88,7 +89,7 @@ def law(code, p, x, xd, mode, t, value, curves):
 
 
 @chosen(LISTED, lambda each: each.slopes, inline)
-def _own_slopes(code, p, place, x, xd, mode, t, value, curves):
+def _own_slopes(code, p, place, x, xd, mode, t, value, curves, l0):
     """Slopes of force and energy by a parameter in the row of a law.
 
     code: of the law.
@@ -99,14 +100,30 @@ def _own_slopes(code, p, place, x, xd, mode, t, value, curves):
     t: time (s).
     value: present force of a law whose force is given over time (N).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
 
     Returns df/dp, dV/dp; NaN where no parameter may vary.
     """
     return np.nan, np.nan
 
 
+@chosen(LISTED, lambda each: each.rest_slopes, inline)
+def _rest_slopes(code, p, x, xd, mode, t, curves, l0):
+    """Slopes of force and energy by the free length at fixed elongation.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
+    return 0.0, 0.0
+
+
 @inline
-def law_slopes(code, p, place, x, xd, mode, t, value, curves):
+def law_slopes(code, p, place, x, xd, mode, t, value, curves, l0):
     """Slopes of force and energy by a parameter of a law, or by the free length; not of inertial laws.
 
     code: of the law.
@@ -117,17 +134,19 @@ def law_slopes(code, p, place, x, xd, mode, t, value, curves):
     t: time (s).
     value: present force of a law whose force is given over time (N).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
 
     Returns df/dp, dV/dp.
     """
     if place == FREE_LENGTH:
-        _, f_x, _, _, pull = law(code, p, x, xd, mode, t, value, curves)
-        return -f_x, -pull
-    return _own_slopes(code, p, place, x, xd, mode, t, value, curves)
+        _, f_x, _, _, pull = law(code, p, x, xd, mode, t, value, curves, l0)
+        by_force, by_energy = _rest_slopes(code, p, x, xd, mode, t, curves, l0)
+        return by_force - f_x, by_energy - pull
+    return _own_slopes(code, p, place, x, xd, mode, t, value, curves, l0)
 
 
 @chosen(LISTED, lambda each: each.unstretched, inline)
-def law_unstretched(code, p):
+def law_unstretched(code, p, curves):
     """The largest force by the law's parameters that does not come from elongation, N."""
     return 0.0
 
@@ -148,7 +167,7 @@ def law_is_timed(code):
 
 
 @chosen(LISTED, lambda each: None if each.modes is None else each.modes.switches or True, inline)
-def law_switches(code, p):
+def law_switches(code, p, curves):
     """Whether the law has more than one mode."""
     return False
 
@@ -166,33 +185,76 @@ def law_has_pieces(code):
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin, inline)
-def law_margin(code, p, x, xd, mode, curves):
+def law_margin(code, p, x, xd, mode, t, curves, l0):
     """How far the mode is from its end; infinite where a law has one mode only.
 
     code: of the law.
     p (PARAMETERS,): its parameters.
     x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
     mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
     """
     return np.inf
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.margin_slopes, inline)
-def law_margin_slopes(code, p, x, xd, mode, curves):
+def law_margin_slopes(code, p, x, xd, mode, t, curves, l0):
     """Slopes of the margin by x and xd; zero where a law has one mode only.
 
     code: of the law.
     p (PARAMETERS,): its parameters.
     x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
     mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
     """
     return 0.0, 0.0
 
 
+@chosen(LISTED, lambda each: each.modes and each.modes.margin_by_time, inline)
+def law_margin_by_time(code, p, x, xd, mode, t, curves, l0):
+    """Slope of the margin by time; zero where it does not depend on it.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
+    return 0.0
+
+
+@chosen(LISTED, lambda each: each.modes and each.modes.margins, inline)
+def law_margins(code, p, curves):
+    """How many margins a law has of which `law_margin` is the least."""
+    return 1
+
+
+@chosen(LISTED, lambda each: each.modes and each.modes.one_margin, inline)
+def law_one_margin(code, p, which, x, xd, mode, t, curves, l0):
+    """One of the margins, and its slopes by x, xd and time.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    which: number of the margin.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
+    by_x, by_rate = law_margin_slopes(code, p, x, xd, mode, t, curves, l0)
+    by_time = law_margin_by_time(code, p, x, xd, mode, t, curves, l0)
+    return law_margin(code, p, x, xd, mode, t, curves, l0), by_x, by_rate, by_time
+
+
 @chosen(LISTED, lambda each: each.modes and each.modes.margin_slope, inline)
-def _own_margin_slope(code, p, place, x, xd, mode, curves):
+def _own_margin_slope(code, p, place, x, xd, mode, t, curves, l0):
     """Slope of the margin by a parameter in the row of a law; zero where it is in no margin.
 
     code: of the law.
@@ -200,13 +262,30 @@ def _own_margin_slope(code, p, place, x, xd, mode, curves):
     place: of the parameter in p.
     x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
     mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
+    return 0.0
+
+
+@chosen(LISTED, lambda each: each.modes and each.modes.margin_rest_slope, inline)
+def _margin_rest_slope(code, p, x, xd, mode, t, curves, l0):
+    """Slope of the margin by the free length at fixed elongation.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
     """
     return 0.0
 
 
 @inline
-def law_margin_slope(code, p, place, x, xd, mode, curves):
+def law_margin_slope(code, p, place, x, xd, mode, t, curves, l0):
     """Slope of the margin by a parameter of a law, or by the free length.
 
     code: of the law.
@@ -214,16 +293,18 @@ def law_margin_slope(code, p, place, x, xd, mode, curves):
     place: of the parameter in p, or FREE_LENGTH.
     x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
     mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
     """
     if place == FREE_LENGTH:
-        by_x, _ = law_margin_slopes(code, p, x, xd, mode, curves)
-        return -by_x
-    return _own_margin_slope(code, p, place, x, xd, mode, curves)
+        by_x, _ = law_margin_slopes(code, p, x, xd, mode, t, curves, l0)
+        return _margin_rest_slope(code, p, x, xd, mode, t, curves, l0) - by_x
+    return _own_margin_slope(code, p, place, x, xd, mode, t, curves, l0)
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.next_mode, inline)
-def law_next(code, p, x, xd, xdd, mode, curves):
+def law_next(code, p, x, xd, xdd, mode, t, curves, l0):
     """The mode to go to where the margin is used up; the same one where a law has no other.
 
     code: of the law.
@@ -231,27 +312,40 @@ def law_next(code, p, x, xd, xdd, mode, curves):
     x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
     xdd: d2Delta/dt2 (m/s^2).
     mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
     """
     return mode
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.first_mode, inline)
-def law_start(code, p, x, xd, xdd, curves):
+def law_start(code, p, x, xd, xdd, t, curves, l0):
     """The mode at the start of the motion; 0 for laws that do not switch.
 
     code: of the law.
     p (PARAMETERS,): its parameters.
     x, xd: elongation, less the permanent set where there is one (m), and its rate (m/s).
     xdd: d2Delta/dt2 (m/s^2).
+    t: time (s).
     curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
     """
     return 0
 
 
 @chosen(LISTED, lambda each: each.modes and each.modes.grazes, inline)
-def law_grazes(code, p, x, mode):
-    """What a margin that is only just used up (or not) at x does to derivatives: nothing 0, force 1, motion 2."""
+def law_grazes(code, p, x, mode, t, curves, l0):
+    """What a margin that is only just used up (or not) at x does to derivatives: nothing 0, force 1, motion 2.
+
+    code: of the law.
+    p (PARAMETERS,): its parameters.
+    x: elongation, less the permanent set where there is one (m).
+    mode: that the member is in; 0 for laws that do not switch.
+    t: time (s).
+    curves: numbers of all laws of the scene that have such (`LawKernels.data`).
+    l0: free length (m).
+    """
     return 0
 
 

@@ -1,0 +1,158 @@
+"""What kernels ask of a law's formulas: values and derivatives, in groups."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from mdstopo.formula.calculus import (
+    ONE,
+    ZERO,
+    add,
+    call,
+    choose,
+    derivative,
+    divide,
+    is_number,
+    negate,
+    simplified,
+    substituted,
+)
+from mdstopo.formula.modes import HALF, MOTION, Smooth, Switch, is_set, smooth, ways_to
+from mdstopo.formula.parser import parse
+from mdstopo.formula.tree import NUMBER, Expression, name, number, operation, parts
+
+#: groups that stand before those of parameters: the force, and the smallest margin
+FORCE, LOWEST, FIRST = 0, 1, 2
+#: operations of all groups at most
+MOST_OPERATIONS = 20_000
+#: a margin where no switch is looked at
+NONE = number(1e300)
+#: slopes that are smaller than the one are none, and those that are larger than the other infinite
+NOUGHT, LARGE = number(1e-300), number(1e100)
+#: operations that have no value for some operands
+LIMITED = ("sqrt", "^", "powlog", "log", "asin", "acos", "/")
+
+
+class Guard(NamedTuple):
+    """An operation that may have no value, and 1 where it is looked at, else 0."""
+
+    part: Expression
+    reached: Expression
+
+
+class Group(NamedTuple):
+    """Formulas that are computed together, and what has to have a value where they are."""
+
+    values: tuple[Expression, ...]
+    guards: tuple[Guard, ...] = ()
+
+
+class Program(NamedTuple):
+    """Groups of formulas, and how many parameters and switches they have."""
+
+    groups: tuple[Group, ...]
+    parameters: int
+    switches: int
+
+    @property
+    def has_timed_switches(self) -> bool:
+        """Whether the margin of a switch depends on time."""
+        first = FIRST + 1 + self.parameters
+        return any(not is_number(group.values[3], 0.0) for group in self.groups[first : first + self.switches])
+
+    @property
+    def operations(self) -> int:
+        """How many operations all groups have, equal ones of a group once."""
+        return sum(sum(1 for _ in parts(*group.values)) for group in self.groups)
+
+
+def _smooth(force: str | None, energy: str | None, damping: str | None, names: tuple[str, ...]) -> Smooth:
+    """Force and energy, or energy and damping, with bits for comparisons and "p 0" and so on for parameters."""
+    places = {name(word): name(f"p {place}") for place, word in enumerate(names)}
+    known = {**places, name("l"): add(name("x"), name("l0"))}
+
+    def read(text: str | None) -> Expression:
+        return ZERO if text is None else substituted(parse(text).root, known)
+
+    return smooth((read(energy), read(damping)) if force is None else (read(force), read(energy)), MOTION)
+
+
+@functools.lru_cache(maxsize=256)
+def program(force: str | None, energy: str | None, damping: str | None, names: tuple[str, ...]) -> Program:
+    """What kernels ask of a law's formulas.
+
+    Names in them are x, xd, t, l0, "p 0" and so on for parameters, "bit 0" and so on for switches. Groups are: f, f_x,
+    f_xd, V, V_x; the smallest margin; then for each parameter, and for the free length, f_p, V_p; then for each switch
+    its margin g, g_x, g_xd, g_t, and whether it is looked at; then g_p, by switches, for each parameter and the free
+    length. Margins and their slopes are divided by `_near`. Raises TooManySwitchesError.
+    """
+    found = _smooth(force, energy, damping, names)
+    if force is None:
+        v, damped = found.formulas
+        f = add(derivative(v, "x"), damped)
+    else:
+        f, v = found.formulas
+    words = [*(f"p {place}" for place in range(len(names))), "l0"]
+    near = [_near(switch.margin) for switch in found.switches]
+    margins = [divide(switch.margin, size) for switch, size in zip(found.switches, near, strict=True)]
+    looked_at = _limited([(f, ONE), (v, ONE), *((each.margin, each.relevant) for each in found.switches)])
+    groups = [
+        _group((f, derivative(f, "x"), derivative(f, "xd"), v, derivative(v, "x")), looked_at),
+        _group((_lowest(margins, found.switches),)),
+    ]
+    for word in words:
+        both = derivative(f, word), derivative(v, word)
+        groups.append(_group(both, _limited([(slope, ONE) for slope in both])))
+    for (margin, relevant), size, value in zip(found.switches, near, margins, strict=True):
+        slopes = tuple(divide(derivative(margin, word), size) for word in MOTION)
+        groups.append(_group((value, *slopes, relevant)))
+    for (margin, _), size in zip(found.switches, near, strict=True):
+        groups += [_group((divide(derivative(margin, word), size),)) for word in words]
+    return Program(tuple(groups), len(names), len(found.switches))
+
+
+def _group(values: tuple[Expression, ...], guards: Iterable[Guard] = ()) -> Group:
+    """A group, simplified."""
+    made = (Guard(simplified(each.part), simplified(each.reached)) for each in guards)
+    return Group(tuple(simplified(each) for each in values), tuple(each for each in made if _may_fail(each.part)))
+
+
+def _near(margin: Expression) -> Expression:
+    """By what a margin is divided to be about a distance in m, m/s or s: the sum of its slopes; 1 where it is one.
+
+    So a margin of any scale, and one that is a power, is found zero where it is, and not where its value is small.
+    """
+    slopes = [derivative(margin, word) for word in MOTION]
+    if all(slope.operator == NUMBER for slope in slopes):
+        return ONE
+    size = ZERO
+    for slope in slopes:
+        size = add(size, call("abs", slope))
+    return choose(operation("<", size, LARGE), call("max", size, NOUGHT), ONE)
+
+
+def _lowest(margins: list[Expression], switches: tuple[Switch, ...]) -> Expression:
+    """The smallest margin of the switches that are looked at, each with the sign that its mode makes positive."""
+    lowest = NONE
+    for place, (margin, switch) in enumerate(zip(margins, switches, strict=True)):
+        signed = choose(is_set(place), margin, negate(margin))
+        if not is_number(switch.relevant, 1.0):
+            signed = choose(operation(">", switch.relevant, HALF), signed, NONE)
+        lowest = signed if lowest is NONE else call("min", lowest, signed)
+    return lowest
+
+
+def _limited(roots: list[tuple[Expression, Expression]]) -> list[Guard]:
+    """The operations that may have no value, of formulas that are looked at where the other number is 1."""
+    ways = ways_to(*roots)
+    return [Guard(part, way) for part, way in ways.items() if _may_fail(part) and not is_number(way, 0.0)]
+
+
+def _may_fail(part: Expression) -> bool:
+    """Whether an operation has no value for some operands."""
+    if part.operator not in ("^", "/"):
+        return part.operator in LIMITED
+    last = part.operands[1]
+    return last.operator != NUMBER or (part.operator == "^" and last.value != round(last.value))
