@@ -76,11 +76,12 @@ def command(
     fitted_path = path.with_name(f"{case.name}.fitted.yaml")
     before = _places(path, fitted_path, picture_path, case, resume, overwrite)
     interrupts = Interrupts(quiet)
-    announce_compilation(output, case)
     from mdstopo.fit.fitted_case import fitted_text
+    from mdstopo.fit.prepared import prepared
     from mdstopo.fit.problem import FitProblem
     from mdstopo.fit.run_fit import run_fit
 
+    announce_compilation(output, prepared(case))
     problem = FitProblem(case)
     known = _before(problem, before, path)
     run = run_fit(problem, points, known, lambda each: write(each, path), interrupts.stop_requested)

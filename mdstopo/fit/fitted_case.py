@@ -7,10 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.extending import text_of_tree
+from mdstopo.case.extending import lead, text_of_tree
 from mdstopo.case.key_paths import led_to
 from mdstopo.case.model import Case
-from mdstopo.case.nodes import SCALAR, Node, parse
+from mdstopo.case.nodes import Node, parse
 from mdstopo.case.overrides import apply_overrides
 from mdstopo.case.reader import read_case
 
@@ -33,7 +33,7 @@ def fitted_text(case: Case, numbers: Mapping[str, float], place: Path) -> str:
     root = _tree(case.text)
     root, _ = apply_overrides(root, {**case.overrides, **numbers}, lambda _mistake: None)
     if moved:
-        _lead(root, folder, place.resolve().parent)
+        lead(root, Path(os.path.relpath(folder, place.resolve().parent)))
     return text_of_tree(root)
 
 
@@ -76,19 +76,3 @@ def _same(text: str, place: Path, meant: Case) -> bool:
         name: getattr(meant, name) for name in ("path", "name", "text", "sha256", "overrides", "marks", "warnings")
     }
     return replace(read, **aside) == meant
-
-
-def _lead(root: Node, folder: Path, place: Path) -> None:
-    """Have files that a tree includes from one folder found from another."""
-    waiting, seen = [root], set[int]()
-    while waiting:
-        node = waiting.pop()
-        if id(node) in seen:
-            continue
-        seen.add(id(node))
-        waiting += node.items
-        for word, (_, value) in node.entries.items():
-            if word == "file" and value.kind == SCALAR and isinstance(value.scalar(), str):
-                value.text, value.plain = os.path.relpath(folder / value.text, place), False
-            else:
-                waiting.append(value)

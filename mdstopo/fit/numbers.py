@@ -101,8 +101,12 @@ class Numbers:
         random = np.random.default_rng(0)
         for _ in range(3):
             x = random.uniform(self.lower, self.upper)
+            try:
+                found = self._read(x)
+            except CaseError:  # not all that is between the bounds goes together
+                return None
             size = np.abs(constant) + np.abs(matrix) @ np.abs(x)
-            if np.any(np.abs(constant + matrix @ x - self._read(x)) > STRAIGHT * size):
+            if np.any(np.abs(constant + matrix @ x - found) > STRAIGHT * size):
                 return None
         return constant, matrix
 

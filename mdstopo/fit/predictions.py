@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import cast
 
 import numpy as np
@@ -19,6 +20,13 @@ from mdstopo.general.observed import Observed, observe, slopes
 #: tolerance of motions that are differenced, relative to that of the case, and at most
 TIGHTER, TIGHT = 1e-2, 1e-10
 LEAST_TOLERANCE = 1e-12
+#: what arrays may miss a straight line by, relative
+STRAIGHT = 1e-11
+#: the arrays that the balance is differentiated by
+READ = ("mass", "force", "load_force", "load_arm", "v0")
+
+#: the arrays of all load cases with a larger and with a smaller number, and by how much the numbers differ
+Pair = tuple[dict[str, GeneralModel], dict[str, GeneralModel], float]
 
 
 @dataclass(frozen=True)
@@ -48,6 +56,8 @@ class Predictions:
         self._by_load_case: dict[str, list[int]] = {}
         for number, each in enumerate(measured):
             self._by_load_case.setdefault(each.series.load_case, []).append(number)
+        #: scenes by which the balance is differentiated wherever it is; none where that depends on where
+        self._anywhere: list[Pair] | None = None
         self._delayed = any(each.series.delay.is_free for each in measured)
         #: the evaluator that serves all x where numbers change parameters of laws alone, else that of the last x
         self._kept: tuple[bytes, Evaluator] | None = None
@@ -142,7 +152,7 @@ class Predictions:
         """
         chain = self.numbers.chain(x)
         balanced = [i for i in exact if self.numbers.effects[i] == "balance"]
-        shifted = [self._models(i, x) for i in balanced]
+        shifted = self._pairs(balanced, x) if balanced else []
         for name, members in self._by_load_case.items():
             _, places = self._times(name, delays)
             pairs = [(one[name], other[name], apart) for one, other, apart in shifted]
@@ -153,14 +163,38 @@ class Predictions:
                 for b, i in enumerate(balanced):
                     out[series][:, i] += found[j, place, chain.shape[0] + b]
 
-    def _models(self, i: int, x: FloatArray) -> tuple[dict[str, GeneralModel], dict[str, GeneralModel], float]:
-        """The scenes of all load cases with number i larger and smaller, and by how much they differ."""
+    def _pair(self, i: int, x: FloatArray) -> Pair:
+        """The scenes of all load cases with number i larger and smaller than at x, and by how much they differ."""
         one, other, apart = self.numbers.shifted(i, x)
-        both = [
-            {name: cast(GeneralModel, scene.model) for name, scene in Evaluator(each, beside=False).scenes.items()}
-            for each in (one, other)
-        ]
-        return both[0], both[1], apart
+        return _models(one), _models(other), apart
+
+    def _pairs(self, balanced: list[int], x: FloatArray) -> list[Pair]:
+        """Those of the numbers that the balance depends on, at x or, where that is the same, anywhere."""
+        if self._anywhere is None:
+            middle = 0.5 * (self.numbers.lower + self.numbers.upper)
+            pairs = [self._pair(i, middle) for i in balanced]
+            self._anywhere = pairs if self._is_straight(balanced, middle, pairs) else []
+        return self._anywhere or [self._pair(i, x) for i in balanced]
+
+    def _is_straight(self, balanced: list[int], middle: FloatArray, pairs: list[Pair]) -> bool:
+        """Whether masses, loads and velocities follow from all numbers in straight lines between the bounds."""
+        base = _models(self.numbers.case_at(middle))
+        random = np.random.default_rng(0)
+        for _ in range(3):
+            x = random.uniform(self.numbers.lower, self.numbers.upper)
+            try:
+                found = _models(self.numbers.case_at(x))
+            except CaseError:  # not all that is between the bounds goes together
+                return False
+            for name, key in product(base, READ):
+                expected = getattr(base[name], key).copy()
+                for (one, other, apart), i in zip(pairs, balanced, strict=True):
+                    change = getattr(one[name], key) - getattr(other[name], key)
+                    expected += change / apart * (x[i] - middle[i])
+                size = 1.0 + np.abs(expected).max(initial=0.0)
+                if np.abs(expected - getattr(found[name], key)).max(initial=0.0) > STRAIGHT * size:
+                    return False
+        return True
 
     def _differences(self, i: int, x: FloatArray, delays: FloatArray) -> list[FloatArray]:
         """Of each series its derivative (n,) by number i, by differences of motions of a smaller tolerance."""
@@ -180,6 +214,11 @@ class Predictions:
 
 class MotionError(Exception):
     """A motion that is needed cannot be computed."""
+
+
+def _models(case: Case) -> dict[str, GeneralModel]:
+    """The arrays of each load case."""
+    return {name: cast(GeneralModel, each.model) for name, each in Evaluator(case, beside=False).scenes.items()}
 
 
 def _driver(evaluator: Evaluator, load_case: str) -> GeneralDriver:

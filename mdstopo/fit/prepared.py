@@ -21,9 +21,13 @@ def case_at(case: Case, keys: Sequence[str], x: FloatArray) -> Case:
     except CaseError as error:
         told: list[Mistake] = []
         for mistake in error.mistakes:
-            key = mistake.origin.removeprefix("--set ")
-            place = inside("fit.estimate", key) if key in values else mistake.path_key
-            words = f"at {values[key]:.10g}: {mistake.message}" if key in values else mistake.message
+            stated = mistake.path_key
+            blamed = [key for key in values if key == stated or key.startswith((f"{stated}.", f"{stated}["))]
+            if stated and blamed:
+                at = ", ".join(f"{values[key]:.10g}" for key in blamed)
+                place, words = inside("fit.estimate", blamed[0]), f"at {at}: {mistake.message}"
+            else:
+                place, words = stated, mistake.message
             told.append(case.marks.mistake(place, words))
         raise CaseError(told, error.file) from None
     return prepared(changed)

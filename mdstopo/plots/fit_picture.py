@@ -26,8 +26,17 @@ def draw(module: Any, content: Mapping[str, Any]) -> Any:
     for k, (each, (values, rest)) in enumerate(zip(series, axes, strict=True)):
         t, y, found = (np.array(each[key], dtype=np.float64) for key in ("t", "measured", "predicted"))
         order = np.argsort(t, kind="stable")
-        values.plot(t[order], y[order], ".", color=ink("middle"), markersize=3.0, label="measured")
         values.plot(t[order], found[order], color=colour(k), label="fitted")
+        values.plot(
+            t[order],
+            y[order],
+            "o",
+            color=ink(),
+            markersize=2.5,
+            fillstyle="none",
+            markeredgewidth=0.6,
+            label="measured",
+        )
         values.set_title(each["name"], loc="left")
         values.set_ylabel(f"{each['response']}, {each['unit']}")
         values.legend()
