@@ -16,6 +16,7 @@ from mdstopo.fit.numbers import DIFFERENCES, SHIFT_OF_MOTIONS, Numbers
 from mdstopo.general.general_driver import GeneralDriver
 from mdstopo.general.model import GeneralModel
 from mdstopo.general.observed import Observed, observe, slopes
+from mdstopo.status import Status
 
 #: tolerance of motions that are differenced, relative to that of the case, and at most
 TIGHTER, TIGHT = 1e-2, 1e-10
@@ -68,9 +69,9 @@ class Predictions:
         """All series at numbers x (n,) and delays (S,)."""
         try:
             evaluator = self._evaluator(x)
-        except CaseError as error:
+            predicted, seen = self._observed(evaluator, x, delays, self._delayed)
+        except CaseError as error:  # joints that do not fit at the start, for instance
             return Predicted(str(error), [], [])
-        predicted, seen = self._observed(evaluator, x, delays, self._delayed)
         self._last = (x.copy(), delays.copy(), evaluator, seen) if not predicted.trouble else None
         return predicted
 
@@ -120,9 +121,10 @@ class Predictions:
         for name, members in self._by_load_case.items():
             times, places = self._times(name, delays)
             self.simulations += 1
-            found = seen[name] = observe(_driver(evaluator, name), design, times, rates)
-            if not found.status.ok:
-                return Predicted(f"load case {name}: {found.status.value}: {found.message}", [], []), {}
+            driver = _driver(evaluator, name)
+            found = seen[name] = observe(driver, design, times, rates)
+            if trouble := _trouble(driver, found):
+                return Predicted(f"load case {name}: {trouble}", [], []), {}
             for j, (series, place) in enumerate(zip(members, places, strict=True)):
                 values[series], speeds[series] = found.values[j, place], found.rates[j, place]
         return Predicted("", values, speeds), seen
@@ -219,6 +221,17 @@ class MotionError(Exception):
 def _models(case: Case) -> dict[str, GeneralModel]:
     """The arrays of each load case."""
     return {name: cast(GeneralModel, each.model) for name, each in Evaluator(case, beside=False).scenes.items()}
+
+
+def _trouble(driver: GeneralDriver, found: Observed) -> str:
+    """Why what was observed last cannot be trusted, or nothing."""
+    if not found.status.ok:
+        return f"{found.status.value}: {found.message}"
+    meeting = driver.met(found.count)
+    if meeting >= 0:
+        return f"{Status.ZERO_LENGTH.value}: {driver.member(meeting)}"
+    jump = driver._rotation_jump(found.count)
+    return f"{Status.ROTATION_JUMP.value}: {jump}" if jump else ""
 
 
 def _driver(evaluator: Evaluator, load_case: str) -> GeneralDriver:
