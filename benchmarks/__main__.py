@@ -26,6 +26,7 @@ SECTIONS = {
     "applications": "the applications: what a run finds, whether it holds, and a hand design beside it",
     "securing": "cargo on a ship's deck: the hand calculation of the Code beside the motion",
     "bound": "bounds over all members beside closed forms, and beside random designs of random scenes",
+    "fit": "fits of synthetic measurements: how often intervals hold the truth; work beside differences",
     "fronts": "fronts: hypervolume for how much work, beside a genetic algorithm; two processes (needs the extra ga)",
     "optimum": "does the optimiser find the optimum, is its last word true; beside other optimisers",
     "peers": "the paper's scene and others beside other programs, which the extra peers installs",

@@ -11,6 +11,7 @@ from mdstopo.case.mesh_files import MeshFaces, MeshFile
 from mdstopo.case.number_rows import FILE, FileName, Rows, Signals
 from mdstopo.case.records import ByDepth, ByName, ByShape, Direction, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.schema_case import FORMAT
+from mdstopo.case.schema_fit import ColumnOf
 from mdstopo.case.schema_space import SPACE_FORMAT
 from mdstopo.case.schema_uncertainty import Anything, ByKey
 from mdstopo.case.svg_path import SvgPath
@@ -202,6 +203,8 @@ def _simple(kind: Kind) -> str:
         return kind.allowed().removeprefix("a ")
     if isinstance(kind, Word):
         return ", ".join(f"`{word}`" for word in kind.words)
+    if isinstance(kind, ColumnOf):
+        return f"name of a column, or {_simple(kind.number) if kind.number is not None else 'its place from 0'}"
     if isinstance(kind, NumberOrWord):
         return f"{_simple(kind.number)}, or {_simple(kind.word)}"
     if isinstance(kind, Ref):

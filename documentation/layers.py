@@ -50,9 +50,10 @@ ROWS: tuple[tuple[str, tuple[Box, ...]], ...] = (
     (
         "many runs",
         (
-            Box(("finalize",), "few members, sized anew", 0.0, 0.3),
-            Box(("limiting",), "bounds over all members", 0.3, 0.3),
-            Box(("front",), "fronts and sweeps", 0.6, 0.4),
+            Box(("finalize",), "few members, sized anew", 0.0, 0.26),
+            Box(("limiting",), "bounds over all members", 0.26, 0.26),
+            Box(("fit",), "numbers from measurements", 0.52, 0.24),
+            Box(("front",), "fronts and sweeps", 0.76, 0.24),
         ),
     ),
     (

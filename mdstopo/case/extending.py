@@ -67,7 +67,7 @@ def _extended(root: Node, folder: Path, above: list[Path], way: Path, reading: R
     other = _tree(text, base, reading)
     on = way / Path(stated).parent
     if on != Path():
-        _lead(other, on)
+        lead(other, on)
     other = _extended(other, base.parent, chain, on, reading)
     own = root.at(root.line, root.column)
     own.entries = {word: pair for word, pair in root.entries.items() if word != KEY}
@@ -112,7 +112,7 @@ def _tree(text: str, base: Path, reading: Reading) -> Node:
     return root
 
 
-def _lead(root: Node, way: Path) -> None:
+def lead(root: Node, way: Path) -> None:
     """Have the files that a tree includes found from another folder, from which `way` leads to the tree's own."""
     seen: set[int] = set()
     waiting = [pair[1] for word, pair in root.entries.items() if word != "define"]

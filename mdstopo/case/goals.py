@@ -101,13 +101,14 @@ def build_objectives(top: Fields, frames: Frames, reading: Reading) -> tuple[Obj
         if fields is BAD:
             continue
         response = build_response(fields, frames, reading)
-        case = _load_case(fields, top, reading)
+        case = load_case_of(fields, top, reading)
         if response is not None and case is not None and fields.good():
             built.append(Objective(name, response, fields["over_time"], case, fields["sense"]))
     return tuple(built)
 
 
-def _load_case(fields: Fields, top: Fields, reading: Reading) -> str | None:
+def load_case_of(fields: Fields, top: Fields, reading: Reading) -> str | None:
+    """The load case that an aim, or a measurement, is about; None where that is a mistake, which is noted."""
     cases, stated = top["load_cases"], fields["load_case"]
     if cases is BAD or stated is BAD:
         return None
@@ -171,7 +172,7 @@ def _response_row(
     fields: Fields, sense: str | None, top: Fields, frames: Frames, reading: Reading
 ) -> ResponseRow | None:
     response = build_response(fields, frames, reading)
-    case = _load_case(fields, top, reading)
+    case = load_case_of(fields, top, reading)
     if response is None or case is None or sense is None or not fields.good() or sense == "fraction":
         return None
     return ResponseRow(response, fields["over_time"] or "max", case, fields[sense], sense)

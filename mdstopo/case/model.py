@@ -36,6 +36,7 @@ from mdstopo.case.arrays import (
 )
 from mdstopo.case.design_space import DesignSpace, slots_of
 from mdstopo.case.errors import Mistake
+from mdstopo.case.fitting import Fit
 from mdstopo.case.joints import JOINTS, DistanceJoint, FixedJoint, Joint, PrismaticJoint, RevoluteJoint
 from mdstopo.case.joints.spatial_joint import SpatialJoint
 from mdstopo.case.laws import (
@@ -91,6 +92,7 @@ __all__ = [
     "CubicLaw",
     "CurveLaw",
     "DistanceJoint",
+    "Fit",
     "FixedJoint",
     "FloatArray",
     "FrozenDict",
@@ -140,8 +142,8 @@ class Case(Value):
     files: paths of included files as written -> sha256 of their bytes. warnings: what the reader accepts but
     the user should know. uncertainty: None where all is certain; the other fields are the nominal case. shared: groups
     whose members have one alpha; mirrored: groups whose members k have one; variables: parameters of laws that are
-    varied. dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`, joints `SpatialJoint` and contacts
-    `SurfaceContact`.
+    varied. fit: what `mdstopo fit` estimates. dimension: 2 in the plane; 3 in space, where bodies are `SpatialBody`,
+    joints `SpatialJoint` and contacts `SurfaceContact`.
     """
 
     title: str
@@ -170,6 +172,7 @@ class Case(Value):
     variables: tuple[Variable, ...] = ()
     contacts: tuple[AnyContact, ...] = ()
     dimension: int = 2
+    fit: Fit | None = None
 
     def __repr__(self) -> str:
         parts = [counted(len(self.bodies), "body"), f"{counted(self.n_members, 'member')}, {self.n_design:,} designed"]

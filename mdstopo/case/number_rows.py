@@ -130,10 +130,10 @@ class Rows(Value):
         numbers: list[int] = []
         wrong, first = 0, True
         for number, line in enumerate(text.splitlines(), start=1):
-            cells = _cells(line)
+            cells = cells_of(line)
             if not cells:
                 continue
-            row = [_cell(cell) for cell in cells]
+            row = [number_in(cell) for cell in cells]
             header, first = first and all(cell is None for cell in row), False
             if header:
                 continue
@@ -206,7 +206,7 @@ def _number(node: Node) -> float:
     return to_float(value)
 
 
-def _cells(line: str) -> list[str]:
+def cells_of(line: str) -> list[str]:
     """The cells of a line: between commas, else semicolons, else blanks; none in a blank line."""
     if not line.strip():
         return []
@@ -216,7 +216,7 @@ def _cells(line: str) -> list[str]:
     return line.split()
 
 
-def _cell(text: str) -> float | None:
+def number_in(text: str) -> float | None:
     """The number in a cell, NaN or infinite where it says so, None where it is no number."""
     text = text.strip()
     value = resolve(text) if text else None
@@ -227,7 +227,7 @@ def _cell(text: str) -> float | None:
 
 def rows_in(text: str) -> list[list[float]]:
     """The rows of an included file that has been read without a mistake: its numbers, without the header line."""
-    rows = [[_cell(cell) for cell in _cells(line)] for line in text.removeprefix("\ufeff").splitlines()]
+    rows = [[number_in(cell) for cell in cells_of(line)] for line in text.removeprefix("\ufeff").splitlines()]
     return [[cell for cell in row if cell is not None] for row in rows if any(cell is not None for cell in row)]
 
 

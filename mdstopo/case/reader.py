@@ -18,6 +18,7 @@ from mdstopo.case.design_variables import build_shared, build_variables
 from mdstopo.case.errors import CaseError, Mistake
 from mdstopo.case.extending import KEY, CannotExtendError, extended, text_of_tree
 from mdstopo.case.file_text import FileTextError, text_in
+from mdstopo.case.fitting import Fit
 from mdstopo.case.geometry import Geometry, geometry_in
 from mdstopo.case.goals import apply_design, build_combine, build_constraints, build_objectives
 from mdstopo.case.groups import build_groups
@@ -95,7 +96,7 @@ def read_case(
     geometry = geometry_in(root, reading)
     top = geometry.format.read(root, "", reading)
     assert isinstance(top, Fields)
-    parts = _build(top, geometry, reading)
+    parts = _build(top, root, geometry, reading)
     if top["uncertainty"] is not None:
         from mdstopo.case.uncertainty import build_uncertainty  # most cases have none
 
@@ -141,7 +142,7 @@ def _parsed(text: str, reading: Reading, file: str) -> Node:
     return root
 
 
-def _build(top: Fields, geometry: Geometry, reading: Reading) -> dict[str, Any]:
+def _build(top: Fields, root: Node, geometry: Geometry, reading: Reading) -> dict[str, Any]:
     """The parts of the case, as far as they can be made; notes every mistake on the way."""
     declare_joints(top["joints"], reading)
     _check_references(top, reading)
@@ -173,8 +174,17 @@ def _build(top: Fields, geometry: Geometry, reading: Reading) -> dict[str, Any]:
         "solver": build_solver(top["solver"], times, reading),
         "variables": variables,
         "dimension": geometry.number,
+        "fit": _fit(top, root, frames, reading),
         **build_shared(top, groups, reading),
     }
+
+
+def _fit(top: Fields, root: Node, frames: Frames, reading: Reading) -> Fit | None:
+    if top["fit"] is None:
+        return None
+    from mdstopo.case.fit_section import build_fit  # most cases have none
+
+    return build_fit(top, root, frames, reading)
 
 
 def _section(top: Fields, key: str) -> dict[str, Any]:

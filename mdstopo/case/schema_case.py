@@ -31,6 +31,7 @@ from mdstopo.case.reading import Reading
 from mdstopo.case.records import ByName, ByShape, Key, ListOf, Named, Record
 from mdstopo.case.responses import OF_OTHERS, RESPONSES, key_of, unit_stated
 from mdstopo.case.schema_contact import CONTACT
+from mdstopo.case.schema_fit import fit_record
 from mdstopo.case.schema_scene import (
     BODY_KEYS,
     BUSHING,
@@ -177,7 +178,7 @@ _REDUCERS = explained(
     }
 )
 _OVER_TIME = Key("over_time", _REDUCERS, "how the response over time becomes a number", default="max")
-_LOAD_CASE = Key(
+LOAD_CASE_KEY = Key(
     "load_case",
     Ref("load case", also=("default",)),
     "in which load case",
@@ -189,7 +190,7 @@ OBJECTIVE = Record(
     (
         Key("response", _RESPONSE, "what is looked at over time", required=True),
         _OVER_TIME,
-        _LOAD_CASE,
+        LOAD_CASE_KEY,
         Key("sense", _SENSE, "which way is better", default="minimize"),
     ),
     doc="What is to be improved: a response, made a number.",
@@ -232,7 +233,7 @@ CONSTRAINT = Record(
         ),
         Key("response", _RESPONSE, "bounds what is looked at over time"),
         Key("over_time", _OVER_TIME.kind, "how the response becomes a number", otherwise="max"),
-        _LOAD_CASE,
+        LOAD_CASE_KEY,
         Key("limit", NUMBER, "at most this"),
         Key("fraction", Number(minimum=0, maximum=1), "of a volume: at most this share of sum V_i"),
         Key("equals", NUMBER, "exactly this"),
@@ -378,6 +379,7 @@ FORMAT = Record(
         Key("combine", COMBINE, "how objectives become one; needed where there is more than one"),
         Key("constraints", ListOf(CONSTRAINT, what="constraints"), "bounds on volumes and responses", default=()),
         Key("uncertainty", UNCERTAINTY, "what is not known for certain, and what becomes of objectives then"),
+        Key("fit", fit_record(_RESPONSE, LOAD_CASE_KEY), "numbers to estimate from measurements (`mdstopo fit`)"),
         Key("optimizer", OPTIMIZER, "how the design is improved", otherwise="that of each key"),
         Key("solver", SOLVER, "how motions and gradients are computed", otherwise="that of each key"),
     ),

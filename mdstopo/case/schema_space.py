@@ -12,8 +12,9 @@ from mdstopo.case.mesh_files import MeshFile
 from mdstopo.case.number_rows import Rows, Signals
 from mdstopo.case.records import ByDepth, ByShape, Key, ListOf, Named, Record, Tagged, Vector
 from mdstopo.case.responses import key_of
-from mdstopo.case.schema_case import CONSTRAINT, FORMAT, OBJECTIVE
+from mdstopo.case.schema_case import CONSTRAINT, FORMAT, LOAD_CASE_KEY, OBJECTIVE
 from mdstopo.case.schema_contact import CONTACT
+from mdstopo.case.schema_fit import fit_record
 from mdstopo.case.schema_frame import FRAME, FRAMES
 from mdstopo.case.schema_outline import OUTLINE_IN_SPACE
 from mdstopo.case.schema_scene import (
@@ -363,4 +364,5 @@ SPACE_FORMAT = with_keys(
     with_kind(FORMAT, "load_cases", Named(_CASE, "load case")),
     with_kind(FORMAT, "objectives", Named(_OBJECTIVE, "objective")),
     with_kind(FORMAT, "constraints", ListOf(_CONSTRAINT, what="constraints")),
+    with_kind(FORMAT, "fit", fit_record(_RESPONSE, LOAD_CASE_KEY)),
 )

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.key_paths import led_to, number_at, stands, varied_by
 from mdstopo.case.model import ResponseRow, VolumeRow
-from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.nodes import Node
 from mdstopo.case.overrides import WrongPathError, as_yaml, steps_of
 from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
-from mdstopo.case.scalars import to_float
 from mdstopo.case.uncertain import (
     Discrete,
     Distribution,
@@ -23,7 +23,7 @@ from mdstopo.case.uncertain import (
     Uncertainty,
     Uniform,
 )
-from mdstopo.case.words import did_you_mean, inside, listed, number_text, shown
+from mdstopo.case.words import inside, listed, number_text, shown
 
 #: by how much stated probabilities may miss the sum 1: thirds are written 0.333
 ROUNDED = 0.01
@@ -90,7 +90,7 @@ def _numbers(fields: Fields, root: Node, reading: Reading) -> list[UncertainNumb
         except WrongPathError as error:
             reading.mistake(here, error.message)
             continue
-        nominal = _number(node)
+        nominal = number_at(node)
         if not math.isfinite(nominal):
             reading.mistake(here, f"found {found(node)} at {key}; a distribution belongs to one number")
         elif key in built:
@@ -106,38 +106,10 @@ def _items(stated: Any) -> list[tuple[str, Any]]:
     return list(stated.items()) if isinstance(stated, dict) else []
 
 
-def _number(node: Node) -> float:
-    """The finite number at a node, else NaN."""
-    value = node.scalar() if node.kind == SCALAR else None
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return math.nan
-    number = to_float(value)
-    return number if math.isfinite(number) else math.nan
-
-
 def _led_to(stated: str, root: Node) -> tuple[str, Node]:
     """The key path as messages write it, and what stands there. Raises WrongPathError with the reason."""
-    steps = steps_of(stated)
-    node, path = root, ""
-    for step in steps:
-        before = path or "the case"
-        if node.kind == MAPPING:
-            name = str(step)
-            entry = node.entries.get(name)
-            if entry is None:
-                hint = did_you_mean(name, node.entries)
-                message = f"{before} states no {shown(name)}{hint or ';'} it states {listed(node.entries) or 'nothing'}"
-                raise WrongPathError(path, message)
-            node, path = entry[1], inside(path, name)
-        elif node.kind == SEQUENCE:
-            index = int(step) if isinstance(step, int) or (step.isascii() and step.isdigit()) else -1
-            if not 0 <= index < len(node.items):
-                message = f"{before} is a list of {len(node.items)}; {shown(str(step))} is none of its places"
-                raise WrongPathError(path, message)
-            node, path = node.items[index], f"{path}[{index}]"
-        else:
-            raise WrongPathError(path, f"{before} is a single value; {shown(str(step))} is not in it")
-    _refuse_fixed(path, [str(step) for step in steps], root)
+    path, node = led_to(stated, root)
+    _refuse_fixed(path, [str(step) for step in steps_of(stated)], root)
     return path, node
 
 
@@ -148,30 +120,15 @@ def _refuse_fixed(path: str, steps: list[str], root: Node) -> None:
     if section == "members" and len(steps) > 2 and steps[2] in _FILTERS:
         why = f"`{steps[2]}` decides {_FILTERS[steps[2]]}"
     elif section == "members" and len(steps) > 3 and steps[2] == "law":
-        why = _varied_by(steps, root)
+        why = varied_by(steps, root)
     elif section == "points" and "count" in steps:
         why = "`count` decides which members there are"
-    elif section == "constraints" and len(steps) > 1 and _stands([*steps[:2], "volume"], root):
+    elif section == "constraints" and len(steps) > 1 and stands([*steps[:2], "volume"], root):
         why = "a volume is as certain as the design"
     elif section in ("constraints", "objectives") and len(steps) < 3:
         why = f"only single numbers in `{section}` can be, not what they ask for"
     if why:
         raise WrongPathError(path, f"{path} cannot be uncertain: {why}")
-
-
-def _varied_by(steps: list[str], root: Node) -> str:
-    """Which design variable decides the parameter of a law that a key path leads to; nothing where none does."""
-    design = root.entries.get("design")
-    variables = design[1].entries.get("variables") if design is not None else None
-    for name, (_, node) in variables[1].entries.items() if variables is not None else ():
-        stated = {key: value for key, (_, value) in node.entries.items()}
-        if "group" not in stated or "parameter" not in stated or stated["parameter"].text != steps[-1]:
-            continue
-        groups = [each.text for each in stated["group"].items] or [stated["group"].text]
-        place = stated["law"].text if "law" in stated else ""
-        if steps[1] in groups and (len(steps) == 4 or place in ("", steps[3])):
-            return f"it is the design variable {name}"
-    return ""
 
 
 def _distribution(keys: Fields, nominal: float, reading: Reading) -> Distribution | None:
@@ -269,23 +226,10 @@ def _settled(key: str, root: Node) -> str:
         return _led_to(key, root)[0]
     except WrongPathError:
         steps = [str(step) for step in steps_of(key)]
-        if _stands(steps, root):
+        if stands(steps, root):
             raise
         _refuse_fixed(key, steps, root)
         return ".".join(steps)
-
-
-def _stands(steps: Sequence[str], root: Node) -> bool:
-    """Whether something stands at a key path."""
-    node = root
-    for step in steps:
-        if node.kind == MAPPING and step in node.entries:
-            node = node.entries[step][1]
-        elif node.kind == SEQUENCE and step.isdigit() and int(step) < len(node.items):
-            node = node.items[int(step)]
-        else:
-            return False
-    return True
 
 
 # Measures.

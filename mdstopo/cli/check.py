@@ -53,6 +53,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
     _say_contacts(output, case)
     _say_members(output, case)
     _say_variables(output, case)
+    _say_fit(output, case)
     stages = _say_stages(output, case)
     sums = totals(case)
     output.say("totals")
@@ -70,6 +71,7 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "design_variables": case.n_design,
         "variables": {each.name: {"values": each.count, "initial": each.initial} for each in case.variables},
         **({"stages": stages} if stages else {}),
+        **({"fit": [each.key for each in case.fit.numbers]} if case.fit is not None else {}),
         "totals": {name: {"value": value, "unit": unit} for name, value, unit in sums},
         "objectives": [objective.name for objective in case.objectives],
         "optimizable": case.is_optimizable and not refused,
@@ -241,6 +243,24 @@ def _say_variables(output: Output, case: "Case") -> None:
              number(each.cost)]
         )  # fmt: skip
     output.table(rows)
+
+
+def _say_fit(output: Output, case: "Case") -> None:
+    """What `mdstopo fit` estimates, and of which measurements."""
+    if case.fit is None:
+        return
+    from mdstopo.case.units import words
+
+    output.say(f"{len(case.fit.numbers)} numbers to fit")
+    rows = [["number", "initial", "lower", "upper"]]
+    for each in case.fit.numbers:
+        of = each.range
+        rows.append([each.key, number(of.initial), number(of.lower), number(of.upper)])
+    output.table(rows)
+    output.table(
+        [["series", "file", "what", "load case"]]
+        + [[each.name, each.file, words(each.response), each.load_case] for each in case.fit.series]
+    )
 
 
 def _say_frequencies(output: Output, case: "Case", found: list[dict[str, Any]]) -> None:

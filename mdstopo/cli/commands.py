@@ -5,6 +5,7 @@ COMMANDS: dict[str, str] = {
     "pareto": "Trace the front of several objectives.",
     "sweep": "Run a case over weights, or over values of any keys.",
     "check": "Read a case and say what is in it, without running it.",
+    "fit": "Estimate numbers of a case from measurements.",
     "bound": "Bound peaks of acceleration and travel over all members that could be.",
     "simulate": "Compute the motion of one design.",
     "gradient": "Compare sensitivity methods on one design.",

@@ -84,7 +84,7 @@ def final_content(
     members = _members(content, case, names, fixed, design)
     final: Plain = {}
     for key, value in content.items():
-        if key in ("design", "combine"):
+        if key in ("design", "combine", "fit"):
             continue
         if key == "members":
             final[key] = members

@@ -63,7 +63,7 @@ class _Lift:
         old = content_of(self.case)
         new: Plain = {"format": old.pop("format"), "dimension": 3}
         for key, value in old.items():
-            if key != "dimension" and value is not None:
+            if key not in ("dimension", "fit") and value is not None:
                 new[key] = self.sections().get(key, _as_it_is)(value, key)
         if new.get("uncertainty"):
             new["uncertainty"] = self.uncertainty(new["uncertainty"], content_of(self.case), new)

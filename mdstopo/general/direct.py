@@ -8,7 +8,7 @@ forces are each member's own. At events the derivatives jump by saltation. At th
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.general.accelerations import make_workspace
+from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.adjoint import event_drops, integral_cotangents, row_cotangents
 from mdstopo.general.forces import inerter_force
 from mdstopo.general.members import MODE, SCALE, SET, level_of, unscale_general
@@ -30,7 +30,7 @@ from mdstopo.general.parameters import event_slope, parameter_slopes, time_jump
 from mdstopo.general.permanent_sets import count_sets, sets_forward, through_sets, time_forward
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, STATE, carve_history, restore_modes
 from mdstopo.general.strides import pair_freedoms, place_in_pair
-from mdstopo.mechanics.kinematics.kinematics_interface import member_rows
+from mdstopo.mechanics.kinematics.kinematics_interface import add_loads, member_rows
 from mdstopo.mechanics.laws.table import FREE_LENGTH, law
 
 
@@ -204,7 +204,7 @@ def through_step(
             for d in range(4 * n):
                 column[i, d] = spare[d]
             column[i, 4 * n] += spare[4 * n]
-    if model.varied.shape[0] > 0:
+    if column.shape[0] > model.member.shape[1]:
         _parameters_through_step(model, member_state, history, w, column, sets, by_set, matrix, spare)
     return settled
 
@@ -452,34 +452,217 @@ def push(
     return -1
 
 
+@kernel
+def balance_slope(one, other, apart, segment, t, q, v, a, f, out):
+    """Derivative of M a - F by a number of the scene that only masses and loads depend on, at fixed motion.
+
+    Constant:
+      one, other: the scene with a larger and with a smaller number.
+      apart: by how much the numbers differ.
+    In:
+      segment, t: segment of the scene's times, and time in it (s).
+      q (n_q,), v, a (n,): coordinates, velocities, accelerations.
+    Out:
+      out (n,): the derivative (N, N m per unit of the number). f (n,): scratch.
+    """
+    f[:] = 0.0
+    add_loads(other, segment, t, q, v, f)
+    for d in range(out.shape[0]):
+        out[d] = (one.mass[d] - other.mass[d]) * a[d] + f[d]
+    f[:] = 0.0
+    add_loads(one, segment, t, q, v, f)
+    for d in range(out.shape[0]):
+        out[d] = (out[d] - f[d]) / apart
+
+
+@kernel
+def number_forces(model, ints, shifted, apart, member_state, history, w, c, force, f, slope):
+    """Forces at the stages of step w that do what a parameter of laws, or another number of the scene, does.
+
+    Constant:
+      model: the compiled scene. ints: of the packed scene.
+      shifted (B, 2, L), apart (B,): as of `follow`.
+      history, w: the history of steps, and the step.
+      c: which number: parameters of laws first, then the B numbers.
+    In:
+      member_state (3, columns): state of the members, with the modes and sets of the step.
+    Out:
+      force (s, n): the forces (N, N m per unit of the number). f, slope (n,): scratch.
+    """
+    n = slope.shape[0]
+    o = history.index[w, FIRST]
+    segment = history.index[w, SEGMENT]
+    row = np.empty(pair_freedoms(model))
+    row_rate = np.empty(pair_freedoms(model))
+    force[:] = 0.0
+    for e in range(model.varied.shape[0]):
+        k = model.varied[e, VARIED_BLOCK]
+        place = model.varied[e, VARIED_PLACE]
+        if model.varied[e, VARIED_VALUE] != c or place > FREE_LENGTH or model.active[segment, k] == 0:
+            continue
+        for j in range(force.shape[0]):
+            for i in range(model.block[k, START], model.block[k, START] + model.block[k, COUNT]):
+                by_value, _ = parameter_slopes(
+                    model, k, i, place, segment, history.when[o + j], member_state, history.stage_q[o + j],
+                    history.stage_v[o + j], history.stage_a[o + j], row, row_rate,
+                )  # fmt: skip
+                for r in range(pair_freedoms(model)):
+                    d = place_in_pair(model, model.block[k, PAIR], r)
+                    force[j, d] -= by_value * member_state[SCALE, i] * row[r]
+    b = c - values_of(model)
+    if b < 0:
+        return
+    one = unpack_general(ints, shifted[b, 0])
+    other = unpack_general(ints, shifted[b, 1])
+    for j in range(force.shape[0]):
+        balance_slope(
+            one, other, apart[b], segment, history.when[o + j], history.stage_q[o + j], history.stage_v[o + j],
+            history.stage_a[o + j], f, slope,
+        )  # fmt: skip
+        for d in range(n):
+            force[j, d] -= slope[d]
+
+
+@kernel
+def values_of(model):
+    """P, how many values of laws vary."""
+    last = model.varied.shape[0] - 1
+    return model.varied[last, VARIED_VALUE] + 1 if last >= 0 else 0
+
+
+@kernel
+def numbers_alone(
+    tag, model, ints, shifted, apart, tables, member_state, history, w, workspace, column, force, changes, rows, f,
+    slope,
+):  # fmt: skip
+    """Carry the derivatives by parameters of laws and other numbers through step w, without those by alpha.
+
+    What `through_step` does by the map of the step: this takes a push for each number, that one for each freedom.
+
+    Constant:
+      tag, tables: the integrator (`method_interface`) and its coefficients.
+      model: the compiled scene. ints: of the packed scene.
+      shifted (B, 2, L), apart (B,): as of `follow`.
+      history, w: the history of steps, and the step.
+    In and out:
+      member_state (3, columns): state of the members; modes and sets are put to those of the step.
+      column (M_padded + P + B, 4 n + 1): as of `through_step`; the rows behind the members change.
+    Out:
+      force (most, n), changes (most, 3, n), rows (most, n_row): scratch for the stages of a step.
+      f, slope (n,): scratch. workspace: workspace of a balance, overwritten.
+    """
+    n = slope.shape[0]
+    s = history.index[w + 1, FIRST] - history.index[w, FIRST]
+    members = model.member.shape[1]
+    dq = np.empty(n)
+    dv = np.empty(n)
+    dx = np.empty((2, n))
+    restore_modes(history, history.index[w, EVENTS], member_state)
+    for i in range(members, column.shape[0]):
+        number_forces(model, ints, shifted, apart, member_state, history, w, i - members, force[:s], f, slope)
+        for d in range(n):
+            dq[d] = column[i, d]
+            dv[d] = column[i, n + d]
+            for carried in range(2):
+                dx[carried, d] = column[i, (2 + carried) * n + d]
+        step_forward(tag, model, tables, history, w, 1.0, 0, dq, dv, dx, force[:s], changes[:s], rows[:s], workspace)
+        for d in range(n):
+            column[i, d] = dq[d]
+            column[i, n + d] = dv[d]
+            for carried in range(2):
+                column[i, (2 + carried) * n + d] = dx[carried, d]
+
+
+@kernel
+def numbers_through_step(model, ints, shifted, apart, member_state, history, w, matrix, column, force, f, slope):
+    """What the B numbers do in step w, added to the derivatives by them at its end that `through_step` has carried.
+
+    Constant:
+      model: the compiled scene. ints: of the packed scene.
+      shifted (B, 2, L), apart (B,): as of `follow`.
+      history, w: the history of steps, and the step.
+      matrix (4 n + s n or more, 4 n + 1): of `step_map`.
+    In:
+      member_state (3, columns): state of the members, with the modes and sets of the step.
+    In and out:
+      column (M_padded + P + B, 4 n + 1): as of `through_step`; its last B rows change.
+    Out:
+      force (most, n), f, slope (n,): scratch.
+    """
+    n = slope.shape[0]
+    s = history.index[w + 1, FIRST] - history.index[w, FIRST]
+    first = column.shape[0] - shifted.shape[0]
+    for c in range(first, column.shape[0]):
+        number_forces(
+            model, ints, shifted, apart, member_state, history, w, c - model.member.shape[1], force[:s], f, slope
+        )
+        for j in range(s):
+            for d in range(n):
+                for e in range(4 * n):
+                    column[c, e] += force[j, d] * matrix[(4 + j) * n + d, e]
+
+
 @entry
 def follow(
-    tag, ints, floats, tables, alpha, limits, count, j, who, room, room_ints, member_state, padded, out, first, work
+    tag,
+    ints,
+    floats,
+    tables,
+    alpha,
+    limits,
+    count,
+    looked,
+    at,
+    who,
+    shifted,
+    apart,
+    with_alpha,
+    room,
+    room_ints,
+    member_state,
+    padded,
+    out,
+    first,
+    work,
 ):
-    """dg_j/dalpha at the start and at the end of every step, the time held fixed; at events the values before them.
+    """dg/d(design) of responses at states, the time held fixed; at events the derivatives of the values before them.
 
     Constant:
       tag, tables: the integrator (`method_interface`) and its coefficients.
       ints, floats: the packed scene (`model.pack_general`).
       alpha (N,): the design.
       limits, room, room_ints: the history of steps, as of `carve_history`.
-      count, j: how many steps there are; the response.
-      who (count + 1,): the member whose force is meant at each of these times.
+      count: how many steps there are.
+      looked (R,): the responses. at (K,): the states, rising.
+      who (R, K): the member whose force is meant.
+      shifted (B, 2, L), apart (B,): for each of B numbers the floats of the packed scene with a larger and with a
+        smaller one, and by how much these differ; only masses, loads and velocities at the start may depend on it.
+      with_alpha: whether derivatives by alpha are wanted; else they may mean nothing, and it takes much less time.
       first (M_padded + P, n): derivatives of the start's positions; no rows where it is as stated.
     In and out:
       member_state (3, columns): state of the members; modes and sets are put to those of the steps that are looked at.
     Out:
-      out (count + 1, N + P): the derivatives by alpha, then by parameters. padded (M_padded + P,): scratch.
+      out (R, K, N + P + B): the derivatives by alpha, by parameters, by the B numbers. padded (M_padded + P + B,):
+        scratch.
       work (WORK,): counts of work, added to.
     """
     model = unpack_general(ints, floats)
     history = carve_history(model, limits, room, room_ints)
     workspace = make_workspace(model)
     n = model.mass.shape[0]
+    numbers = shifted.shape[0]
+    most = 17  # stages of a step, as of `step_map`
+    force = np.empty((most, n))
+    changes = np.empty((most, 3, n))
+    stage_rows = np.empty((most, model.size[0]))
     column = np.zeros((padded.shape[0], 4 * n + 1))
     matrix = np.empty((21 * n, 4 * n + 1))
     spare = np.empty(4 * n + 1)
     bars = np.zeros((3, n))
+    a = np.empty(n)
+    f = np.empty(n)
+    slope = np.empty(n)
+    lam = np.empty(model.size[0])
     nothing = np.zeros((0, 3, n))
     no_rows = np.zeros((0, model.size[0]))
     slots = count_sets(model)
@@ -487,38 +670,70 @@ def follow(
     bar_set = np.zeros(slots)
     no_sets = np.zeros((0, slots))
     begin(model, history, first, column, sets)
+    for b in range(numbers):
+        one = unpack_general(ints, shifted[b, 0])
+        other = unpack_general(ints, shifted[b, 1])
+        for d in range(n):
+            column[column.shape[0] - numbers + b, n + d] = (one.v0[d] - other.v0[d]) / apart[b]
     row = np.zeros(7)
+    place = 0
     for k in range(count + 1):
+        if place == at.shape[0]:
+            break
         row[2] = max(k - 1, 0)
         row[3] = 1.0 if k > 0 else 0.0
-        row[6] = who[k]
-        if k > 0:
+        if k > 0 and slots == 0 and not with_alpha:
+            numbers_alone(
+                tag, model, ints, shifted, apart, tables, member_state, history, k - 1, workspace, column, force,
+                changes, stage_rows, f, slope,
+            )  # fmt: skip
+        elif k > 0:
             through_step(
                 tag, model, tables, member_state, history, k - 1, 1.0, 0, nothing, no_rows, no_sets, workspace, column,
                 sets, matrix, spare,
             )  # fmt: skip
-        row_cotangents(
-            tag,
-            model,
-            tables,
-            member_state,
-            history,
-            count,
-            j,
-            row,
-            np.bool_(False),
-            workspace,
-            bars,
-            bar_set,
-            padded,
-            work,
-        )
-        for i in range(padded.shape[0]):
-            for d in range(n):
-                padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
-            for m in range(slots):
-                padded[i] += bar_set[m] * sets[m, i]
-        unscale_general(model.block, model.power, alpha, padded, out[k])
+            numbers_through_step(
+                model, ints, shifted, apart, member_state, history, k - 1, matrix, column, force, f, slope
+            )
+        while place < at.shape[0] and at[place] == k:
+            for r in range(looked.shape[0]):
+                row[6] = who[r, place]
+                row_cotangents(
+                    tag,
+                    model,
+                    tables,
+                    member_state,
+                    history,
+                    count,
+                    looked[r],
+                    row,
+                    np.bool_(False),
+                    workspace,
+                    bars,
+                    bar_set,
+                    padded,
+                    work,
+                )
+                for i in range(padded.shape[0]):
+                    for d in range(n):
+                        padded[i] += bars[0, d] * column[i, d] + bars[1, d] * column[i, n + d]
+                    for m in range(slots):
+                        padded[i] += bar_set[m] * sets[m, i]
+                if numbers > 0:
+                    segment = history.index[int(row[2]), SEGMENT]
+                    restore_modes(history, history.index[int(row[2]), EVENTS], member_state)
+                    q, v = history.q[k].copy(), history.v[k].copy()
+                    no = np.bool_(False)
+                    solve_accelerations(model, member_state, segment, history.t[k], q, v, no, workspace, a, lam)
+                for b in range(numbers):
+                    balance_slope(
+                        unpack_general(ints, shifted[b, 0]), unpack_general(ints, shifted[b, 1]), apart[b], segment,
+                        history.t[k], q, v, a, f, slope,
+                    )  # fmt: skip
+                    for d in range(n):
+                        padded[padded.shape[0] - numbers + b] -= bars[2, d] * slope[d]
+                unscale_general(model.block, model.power, alpha, padded, out[r, place])
+            place += 1
         if k == 0 and model.varied.shape[0] > 0:
             shift_times(model, history, member_state, count, k, np.int64(-1), np.bool_(False), column)
         if k > 0:

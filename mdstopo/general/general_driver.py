@@ -85,7 +85,7 @@ class GeneralDriver:
         #: coordinates and velocities at the start: as stated, or as assembled
         self._start = model.q0, model.v0
         self._model = model
-        self._packed = self.ints, self.floats = self._pack(model)
+        self._packed = self.ints, self.floats = self.pack(model)
         integrated = any(name in INTEGRALS for name in scene.reductions)
         self.settings = np.array([options.tolerance, NEWTON_TOLERANCE, options.step, CLOSENESS, float(integrated)])
         self.work = np.zeros(WORK, dtype=np.int64)
@@ -139,7 +139,8 @@ class GeneralDriver:
             self._entry = load_method(self.method.kind)
         return self._entry
 
-    def _pack(self, model: GeneralModel) -> tuple[IndexArray, FloatArray]:
+    def pack(self, model: GeneralModel) -> tuple[IndexArray, FloatArray]:
+        """The arrays of a scene of this driver's bodies, as entries take them."""
         return pack_general(model, self.scene.kinematics)
 
     @property
@@ -439,7 +440,7 @@ class GeneralDriver:
 
     def start_from(self, q: FloatArray) -> None:
         """Take other positions q (n,) at the start."""
-        self._packed = self.ints, self.floats = self._pack(self._model._replace(q0=q))
+        self._packed = self.ints, self.floats = self.pack(self._model._replace(q0=q))
 
     def start_slopes(self) -> FloatArray:
         """(M_padded + P, n): derivatives of the start's positions by alpha^mu and values; no rows where it is as
@@ -462,7 +463,7 @@ class GeneralDriver:
             self.room[0], self._message = self.scene.model.times[0], self.start.message
             return UNSETTLED, 0, float(self.room[0])
         self.ints, self.floats = (
-            self._pack(landed(self._with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
+            self.pack(landed(self.with_start(), quadrature_breakpoints)) if quadrature_breakpoints else self._packed
         )
         while True:
             self.work[:] = 0
@@ -558,9 +559,9 @@ class GeneralDriver:
         q0, v0 = self._start
         model = self.scene.model._replace(q0=q0, v0=v0)
         self._model = model if self._placing is None or not len(self._values) else self._placing.at(model, self._values)
-        self._packed = self.ints, self.floats = self._pack(self._model)
+        self._packed = self.ints, self.floats = self.pack(self._model)
 
-    def _with_start(self) -> GeneralModel:
+    def with_start(self) -> GeneralModel:
         """The model with the start as it was assembled or has settled."""
         q0, v0 = self.packed_start()
         return self._model._replace(q0=q0, v0=v0)

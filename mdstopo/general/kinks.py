@@ -80,12 +80,14 @@ def landed(model: GeneralModel, times: Sequence[float]) -> GeneralModel:
     """The model with further ends of segments; what acts in time is the same function as before."""
     old = model.times
     apart = 1e-10 * float(old[-1] - old[0])
-    new = list(old.tolist())
-    for time in sorted(times):
-        if min(abs(time - each) for each in new) > apart:
+    asked = np.sort(np.asarray(times, dtype=np.float64))
+    behind = np.clip(np.searchsorted(old, asked), 1, len(old) - 1)
+    far = np.minimum(np.abs(asked - old[behind - 1]), np.abs(old[behind] - asked)) > apart
+    new: list[float] = []
+    for time in asked[far].tolist():
+        if not new or time - new[-1] > apart:
             new.append(time)
-    new.sort()
-    whole = np.array(new)
+    whole = np.sort(np.concatenate([old, new]))
     parent = np.clip(np.searchsorted(old, whole[:-1], side="right") - 1, 0, len(old) - 2)
     tau = whole[:-1] - old[parent]
 

@@ -111,9 +111,10 @@ def histories(driver: "GeneralDriver", alpha: FloatArray, j: int) -> tuple[Statu
     places = np.stack([np.maximum(np.arange(count + 1.0) - 1.0, 0.0), np.ones(count + 1)], axis=1)
     places[0, 1] = 0.0
     who = driver.sample_response(j, places, True, count)[2][:, 2].copy()
-    lines = np.zeros((count + 1, len(alpha)))
+    lines = np.zeros((1, count + 1, len(alpha)))
     driver.entry.follow(
-        *driver.steps_arguments(count), j, who, driver.room, driver.room_ints, driver.member_state, driver.padded,
-        lines, driver.start_slopes(), driver.work,
+        *driver.steps_arguments(count), np.array([j]), np.arange(count + 1), who.reshape(1, -1), np.zeros((0, 2, 0)),
+        np.zeros(0), True, driver.room, driver.room_ints, driver.member_state, driver.padded, lines,
+        driver.start_slopes(), driver.work,
     )  # fmt: skip
-    return Status.OK, driver.states()[0][: count + 1].copy(), lines
+    return Status.OK, driver.states()[0][: count + 1].copy(), lines[0]

@@ -17,7 +17,7 @@ from mdstopo.case.model import Body, Case, LoadCase, MemberGroup
 
 # Where the case comes from, how it is written and how long it runs does not change what is computed.
 _IGNORED: dict[type, set[str]] = {
-    Case: {"path", "name", "text", "sha256", "files", "marks", "overrides", "warnings"},
+    Case: {"path", "name", "text", "sha256", "files", "marks", "overrides", "warnings", "fit"},
     Body: {"stated"},
     LoadCase: {"bodies"},  # follow from the case's bodies and the motions
 }

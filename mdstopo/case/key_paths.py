@@ -1,0 +1,73 @@
+"""Numbers of a case by their key path: where a path leads, and what stands there."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
+from mdstopo.case.overrides import WrongPathError, steps_of
+from mdstopo.case.scalars import to_float
+from mdstopo.case.words import did_you_mean, inside, listed, shown
+
+
+def led_to(stated: str, root: Node) -> tuple[str, Node]:
+    """The key path as messages write it, and what stands there. Raises WrongPathError with the reason."""
+    steps = steps_of(stated)
+    node, path = root, ""
+    for step in steps:
+        before = path or "the case"
+        if node.kind == MAPPING:
+            name = str(step)
+            entry = node.entries.get(name)
+            if entry is None:
+                hint = did_you_mean(name, node.entries)
+                message = f"{before} states no {shown(name)}{hint or ';'} it states {listed(node.entries) or 'nothing'}"
+                raise WrongPathError(path, message)
+            node, path = entry[1], inside(path, name)
+        elif node.kind == SEQUENCE:
+            index = int(step) if isinstance(step, int) or (step.isascii() and step.isdigit()) else -1
+            if not 0 <= index < len(node.items):
+                message = f"{before} is a list of {len(node.items)}; {shown(str(step))} is none of its places"
+                raise WrongPathError(path, message)
+            node, path = node.items[index], f"{path}[{index}]"
+        else:
+            raise WrongPathError(path, f"{before} is a single value; {shown(str(step))} is not in it")
+    return path, node
+
+
+def number_at(node: Node) -> float:
+    """The finite number at a node, else NaN."""
+    value = node.scalar() if node.kind == SCALAR else None
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return math.nan
+    number = to_float(value)
+    return number if math.isfinite(number) else math.nan
+
+
+def stands(steps: Sequence[str], root: Node) -> bool:
+    """Whether something stands at a key path."""
+    node = root
+    for step in steps:
+        if node.kind == MAPPING and step in node.entries:
+            node = node.entries[step][1]
+        elif node.kind == SEQUENCE and step.isdigit() and int(step) < len(node.items):
+            node = node.items[int(step)]
+        else:
+            return False
+    return True
+
+
+def varied_by(steps: list[str], root: Node) -> str:
+    """Which design variable decides the parameter of a law that a key path leads to; nothing where none does."""
+    design = root.entries.get("design")
+    variables = design[1].entries.get("variables") if design is not None else None
+    for name, (_, node) in variables[1].entries.items() if variables is not None else ():
+        stated = {key: value for key, (_, value) in node.entries.items()}
+        if "group" not in stated or "parameter" not in stated or stated["parameter"].text != steps[-1]:
+            continue
+        groups = [each.text for each in stated["group"].items] or [stated["group"].text]
+        place = stated["law"].text if "law" in stated else ""
+        if steps[1] in groups and (len(steps) == 4 or place in ("", steps[3])):
+            return f"it is the design variable {name}"
+    return ""

@@ -1,0 +1,70 @@
+"""The case that is simulated for a fit: what was measured is looked at, nothing is designed, numbers are put in."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from mdstopo.case.errors import CaseError, Mistake
+from mdstopo.case.model import Case, MemberGroup, Objective, Variable
+from mdstopo.case.reader import read_case
+from mdstopo.case.words import inside
+from mdstopo.scene.model import FloatArray
+
+#: a parameter of a law: group, place of the law, parameter
+LawPlace = tuple[str, int, str]
+
+
+def case_at(case: Case, keys: Sequence[str], x: FloatArray) -> Case:
+    """The case with other numbers at some keys, prepared. Raises CaseError at the key in `fit` that is to blame."""
+    values = {key: float(value) for key, value in zip(keys, x, strict=True)}
+    try:
+        changed = read_case(case.text, path=case.path, overrides={**case.overrides, **values})
+    except CaseError as error:
+        told: list[Mistake] = []
+        for mistake in error.mistakes:
+            stated = mistake.path_key
+            blamed = [key for key in values if key == stated or key.startswith((f"{stated}.", f"{stated}["))]
+            if stated and blamed:
+                at = ", ".join(f"{values[key]:.10g}" for key in blamed)
+                place, words = inside("fit.estimate", blamed[0]), f"at {at}: {mistake.message}"
+            else:
+                place, words = stated, mistake.message
+            told.append(case.marks.mistake(place, words))
+        raise CaseError(told, error.file) from None
+    return prepared(changed)
+
+
+def prepared(case: Case) -> Case:
+    """The case that looks at the measured responses alone, with its design variables at their initial values."""
+    assert case.fit is not None
+    # the reduction is never taken: one that only the general kernels know has the case be theirs
+    looked = tuple(Objective(each.name, each.response, "max_abs", each.load_case) for each in case.fit.series)
+    return replace(
+        case,
+        members=tuple(_settled(case, group) for group in case.members),
+        objectives=looked,
+        combine=None,
+        constraints=(),
+        uncertainty=None,
+        variables=(),
+    )
+
+
+def _settled(case: Case, group: MemberGroup) -> MemberGroup:
+    """A group whose laws have the initial values of the case's design variables."""
+    laws = list(group.laws)
+    for variable in case.variables:
+        for name, place in zip(variable.groups, variable.laws, strict=True):
+            if name == group.name:
+                laws[place] = replace(laws[place], **{variable.parameter: variable.initial})
+    return replace(group, laws=tuple(laws))
+
+
+def varying(case: Case, places: Sequence[LawPlace]) -> Case:
+    """A prepared case in which parameters of laws are variables, in this order."""
+    groups = {group.name: group for group in case.members}
+    variables = []
+    for number, (group, law, parameter) in enumerate(places):
+        value = float(getattr(groups[group].laws[law], parameter))
+        name = f"p{number}"
+        variables.append(Variable(name, (group,), (law,), parameter, "group", 1, value, value, value))
+    return replace(case, variables=tuple(variables))

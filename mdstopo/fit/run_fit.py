@@ -1,0 +1,156 @@
+"""A fit from start to end: starts, the best of them, its statistics, profiles; what is done is told as it comes.
+
+Whoever saves what is told can go on from there: starts and profiles that are done are not done again.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from mdstopo.case.arrays import FloatArray
+from mdstopo.fit.problem import FitProblem
+from mdstopo.fit.profile import Profile, profile
+from mdstopo.fit.solve import Minimum, StoppedError, fitted, minimum, starts
+from mdstopo.fit.statistics import Statistics, statistics
+
+#: fits whose levels differ by less than this, relative to the number of values, have found the same minimum
+SAME_LEVEL = 1e-6
+
+
+@dataclass(frozen=True)
+class Start:
+    """One start that has come to its end: x (p,) where, deviation (n,) of each value; the rest as of `Minimum`."""
+
+    begin: FloatArray
+    x: FloatArray
+    deviation: FloatArray
+    level: float
+    status: str
+    reason: str
+    evaluations: int
+
+
+@dataclass
+class FitRun:
+    """What is known of a fit so far.
+
+    starts: those that are done. found, told: the best, and its statistics; None where none has a motion. profiles: by
+    the name of the estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words.
+    simulations: motions that were computed.
+    """
+
+    problem: FitProblem
+    starts: list[Start] = field(default_factory=list)
+    found: Minimum | None = None
+    told: Statistics | None = None
+    profiles: dict[str, Profile] = field(default_factory=dict)
+    status: str = "running"
+    reason: str = ""
+    simulations: int = 0
+
+    @property
+    def best(self) -> int:
+        """Which start is the best; of equal ones the first."""
+        return int(np.argmin([each.level for each in self.starts]))
+
+    @property
+    def agreeing(self) -> int:
+        """How many starts have found the best minimum."""
+        least = min(each.level for each in self.starts)
+        return sum(each.level <= least + SAME_LEVEL * self.problem.count for each in self.starts)
+
+
+def run_fit(
+    problem: FitProblem,
+    points: int = 0,
+    before: FitRun | None = None,
+    save: Callable[[FitRun], None] = lambda _: None,
+    stop: Callable[[], bool] = lambda: False,
+) -> FitRun:
+    """Fit a case.
+
+    problem: what is fitted.
+    points: of profiles, on each side of an estimate; 0: none.
+    before: what is known from a run that was stopped.
+    save: is given what is known, whenever that has become more.
+    stop: whether to end, which is asked before each motion.
+    """
+    run = FitRun(problem) if before is None else before
+    earlier = run.simulations
+    run.status, run.found, run.told = "running", None, None
+
+    def keep() -> None:
+        run.simulations = earlier + problem.simulations
+        save(run)
+
+    try:
+        for begin in starts(problem)[len(run.starts) :]:
+            end = fitted(problem, begin, stop)
+            run.starts.append(Start(begin, end.x, end.deviation, end.level, end.status, end.reason, end.evaluations))
+            keep()
+        _look(run)
+        keep()
+        for name in _unprofiled(run) if points else ():
+            _profile(run, name, points, stop)
+            keep()
+        assert run.starts
+        run.status, run.reason = run.starts[run.best].status, run.starts[run.best].reason
+    except StoppedError:
+        if run.starts and run.found is None:
+            _look(run)
+        run.status, run.reason = "interrupted", "stopped on request; what is done is kept"
+    keep()
+    return run
+
+
+def _look(run: FitRun) -> None:
+    """The best minimum so far, with everything that is known there."""
+    best = run.starts[run.best]
+    if best.status == "failed":
+        return
+    problem = run.problem
+    at = minimum(problem, best.x, best.deviation, held=np.arange(len(best.x)))
+    run.found = at
+    run.told = statistics(problem, at)
+
+
+def _profile(run: FitRun, name: str, points: int, stop: Callable[[], bool]) -> None:
+    assert run.found is not None
+    assert run.told is not None
+    problem = run.problem
+    run.profiles[name] = profile(problem, run.found, run.told, problem.names.index(name), points, stop)
+
+
+def _unprofiled(run: FitRun) -> list[str]:
+    """Estimates that have a profile and do not have it yet."""
+    if run.told is None:
+        return []
+    known = np.isfinite(run.told.deviation)
+    return [name for name, has in zip(run.problem.names, known, strict=True) if has and name not in run.profiles]
+
+
+def restored(problem: FitProblem, content: Mapping[str, Any]) -> FitRun:
+    """What a run that was stopped had done, from what `record.content` made of it."""
+    run = FitRun(problem, simulations=int(content["simulations"]))
+    for each in content["starts"]:
+        level = float("inf") if each["level"] is None else float(each["level"])
+        deviation = _deviations(problem, each["deviations"])
+        end = each["status"], each["reason"], int(each["evaluations"])
+        run.starts.append(Start(np.array(each["begin"]), np.array(each["x"]), deviation, level, *end))
+    for each in content["estimates"]:
+        if each.get("profile") is not None:
+            own = {key: np.array(value, dtype=np.float64) for key, value in each["profile"].items()}
+            ends = float(own["low"]), float(own["high"])
+            run.profiles[each["name"]] = Profile(own["values"], own["t"], *ends)
+    return run
+
+
+def _deviations(problem: FitProblem, stated: list[float | None]) -> FloatArray:
+    """(n,) deviations of values, where those of series that are estimated are given and the others None."""
+    pieces = [
+        np.full(len(each.t), np.nan if value is None else value) if each.deviation is None else each.deviation
+        for each, value in zip(problem.measured, stated, strict=True)
+    ]
+    return np.concatenate(pieces)

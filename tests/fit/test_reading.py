@@ -1,0 +1,129 @@
+"""The section `fit` and the files that it names: what is read, and what is refused with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mdstopo.case.errors import CaseError
+from mdstopo.case.measurements import read_measured
+from mdstopo.case.reader import load_case, read_case
+
+from .scenes import DROP
+
+
+def mistakes(text: str) -> list[str]:
+    with pytest.raises(CaseError) as caught:
+        read_case(text)
+    return [f"{each.path_key}: {each.message}" for each in caught.value.mistakes]
+
+
+def test_a_fit_is_read() -> None:
+    fit = read_case(DROP).fit
+    assert fit is not None
+    assert [each.key for each in fit.numbers] == [
+        "members.foam.law.stiffness", "members.foam.law.damping", "members.foam.law.gap",
+    ]  # fmt: skip
+    assert fit.numbers[0].range.initial == 6000.0
+    (series,) = fit.series
+    assert (series.file, series.deviation, series.response.component, series.load_case) == (
+        "height.csv", 0.001, "y", "default",
+    )  # fmt: skip
+    assert not series.offset.is_free
+    assert fit.confidence == 0.95
+
+
+def test_the_case_says_where_a_fit_begins_else_the_middle() -> None:
+    text = DROP.replace(", initial: 6000", "").replace("upper: 200, initial: 40", "upper: 10")
+    fit = read_case(text).fit
+    assert fit is not None
+    assert [each.range.initial for each in fit.numbers[:2]] == [8000.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("law.damping: {", "law.dampin: {", "members.foam.law states no 'dampin', did you mean 'damping'?"),
+        ("members.foam.law.gap: {", "solver.tolerance: {", "states no 'solver'"),
+        ("members.foam.law.gap: {", "time.end: {", "time.end cannot be estimated: `time` says when"),
+        ("members.foam.law.gap: {", "bodies.block: {", "what is estimated is one number"),
+        ("lower: 0.02, upper: 0.08", "lower: 0.08, upper: 0.02", "found 0.08, allowed is a number below upper 0.02"),
+        ("initial: 0.045", "initial: 0.1", "found 0.1, allowed is 0.02 to 0.08"),
+        ("deviation: 0.001", "deviation: 0", "found 0, allowed is a number > 0"),
+        ("file: height.csv", "file: height.csv\n      value_scale: 0", "found 0, allowed is any other number"),
+        ("file: height.csv", "from: 2\n      to: 1\n      file: a.csv", "found 1, allowed is a number above from 2"),
+        ("file: height.csv", "file: height.csv\n      time: -1", "the name of a column, or its place, from 0"),
+        ("body: block, component: y", "body: blok, component: y", "no body is called 'blok'"),
+        ("file: height.csv", "file: height.csv\n      delay: {lower: 1, upper: 0}", "a number below upper 0"),
+        ("  measured:", "  los: huber\n  measured:", "did you mean 'loss'?"),
+    ],
+)  # fmt: skip
+def test_what_makes_no_sense_is_refused(old: str, new: str, told: str) -> None:
+    assert old in DROP
+    found = mistakes(DROP.replace(old, new))
+    assert any(told in each for each in found), found
+
+
+def test_a_number_that_a_design_variable_decides_is_refused() -> None:
+    text = DROP.replace(
+        "fit:", "design: {variables: {k: {group: foam, parameter: stiffness, lower: 1, upper: 1e5}}}\nfit:"
+    )
+    assert any("it is the design variable k" in each for each in mistakes(text))
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "drop.yaml").write_text(DROP, encoding="utf-8")
+    return tmp_path
+
+
+def read(folder: Path, table: str, **overrides: object) -> list[str]:
+    """What is wrong with a table."""
+    (folder / "height.csv").write_text(table, encoding="utf-8")
+    series = {f"fit.measured.height.{key}": value for key, value in overrides.items()}
+    with pytest.raises(CaseError) as caught:
+        read_measured(load_case(folder / "drop.yaml", series))
+    return [f"{each.path_key}: {each.message}" for each in caught.value.mistakes]
+
+
+def test_a_table_is_read_with_its_columns_scales_and_window(folder: Path) -> None:
+    (folder / "height.csv").write_text("# a drop\nms;mm;s\n0;0;1\n100;-5;2\n\n200;-10;2\n300;1;1\n400;2;1\n", "utf-8")
+    series = {"time": "ms", "value": "mm", "deviation": "s", "time_scale": 0.001, "value_scale": -0.001, "to": 0.35}
+    case = load_case(folder / "drop.yaml", {f"fit.measured.height.{key}": value for key, value in series.items()})
+    (found,) = read_measured(case)
+    np.testing.assert_allclose(found.t, [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(found.y, [0.0, 0.005, 0.01, -0.001])
+    np.testing.assert_allclose(found.deviation, [0.001, 0.002, 0.002, 0.001])
+
+
+@pytest.mark.parametrize(
+    ("table", "overrides", "told"),
+    [
+        ("t,y\n0,0\n0.1,0\n0.2,0\n0.3,0\n", {"file": "hight.csv"}, "height.file: there is no file"),
+        ("t,y\n0,0\n", {"value": "z"}, "height.value: found the column 'z', the file has t, y (height.csv)"),
+        ("t,height\n0,0\n", {"value": "heigt"}, "did you mean 'height'?"),
+        ("0,0\n0.1,1\n", {"value": "y"}, "the file has no header line"),
+        ("0,0\n0.1,1\n", {"value": 2}, "found the place 2, the file has 2 columns, from 0"),
+        ("t,y\n0,0\n0.1,nan\n", {}, "line 3: found 'nan', allowed is a finite number (column y)"),
+        ("t,y\n0,0\n0.1,\n", {}, "line 3: found nothing, allowed is a finite number (column y)"),
+        ("t,y\n0,0\n0.1,x\n", {}, "line 3: found 'x', allowed is a finite number (column y)"),
+        ("t,y\n0,0\n0.6,1\n0.7,1\n", {}, "line 3: found the time 0.6, and 1 more such times, allowed is 0 to 0.5 s"),
+        ("t,y\n0,0\n0.49,1\n", {"delay": "{lower: -0.02, upper: 0}"}, "allowed is 0 to 0.48 s"),
+        ("t,y\n", {}, "found no row in 'height.csv', needed is at least one"),
+        ("t,y\n0.1,0\n", {"from": 0.2}, "between `from` and `to`"),
+        ("t,y,s\n0,0,1\n0.1,0,0\n", {"deviation": "s"}, "line 3: found 0, allowed is a number > 0"),
+        ("t,y\n0,0\n0.1,0\n0.2,0\n", {}, "found 3 measured values for 3 estimates"),
+    ],
+)
+def test_a_bad_table_is_refused_with_its_line(
+    folder: Path, table: str, overrides: dict[str, object], told: str
+) -> None:
+    found = read(folder, table, **overrides)
+    assert any(told in each for each in found), found
+
+
+def test_other_commands_do_not_read_the_files(folder: Path) -> None:
+    case = load_case(folder / "drop.yaml")
+    assert dict(case.files) == {}
