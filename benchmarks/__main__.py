@@ -18,6 +18,7 @@ SECTIONS = {
     "process": "the whole process: start, 50 iterations, file; help; the first run",
     "bars": "what the optimiser reaches within how many evaluations",
     "orders": "orders of convergence, agreement of methods, drift",
+    "priced": "candidates that are priced beside all of them built: prices, optima, times; more than 1e8 of them",
     "chain": "cost of a step against the number of jointed bodies",
     "space": "objective and exact gradient of one scene in the plane and in space",
     "profile": "where the time of the applications goes: force sums by what they are for, and milliseconds",
@@ -53,7 +54,7 @@ PEERS_IN_SPACE = ("peers_space", "ring_space", "forward_space")
 CAMPAIGNS = ("damage", "hunt", "hunt_space")
 
 #: sections that take an hour, or measure nothing, are run where they are named
-NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts")
+NAMED = (*PEERS, *PEERS_IN_SPACE, *CAMPAIGNS, "optimum", "parts", "golden", "lifts", "priced")
 
 #: the page that holds the tables of each section which `--readme` writes
 PAGES = {
@@ -67,7 +68,7 @@ PAGES = {
     "fronts": "docs/performance.md",
 }
 #: the same of sections that `--pages` writes
-TOLD = {"bound": "docs/theory/bound.md", "securing": "docs/applications/cargo.md"}
+TOLD = {"bound": "docs/theory/bound.md", "priced": "docs/theory/pricing.md", "securing": "docs/applications/cargo.md"}
 
 
 def main() -> int:

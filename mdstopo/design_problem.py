@@ -25,6 +25,7 @@ from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.engine import Evaluator
+    from mdstopo.sensitivity.pricing import Asked
 
 #: by sense of a constraint on a response, the signs with which its excess must not be positive
 SIGNS = {"limit": (1.0,), "at_least": (-1.0,), "equals": (1.0, -1.0)}
@@ -88,7 +89,35 @@ class DesignProblem:
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         """The rows of U at x; a design that cannot be computed comes back with its status."""
-        evaluation = self._with_all_that_compete(self._design(x), gradient)
+        return self.sample_of(self.evaluation(x, gradient), gradient)
+
+    def evaluation(self, x: Floats, gradient: bool = True) -> Evaluation:
+        """What the engine finds at x, with as many rows as compete."""
+        return self._with_all_that_compete(self._design(x), gradient)
+
+    def asked_of_members(self, evaluation: Evaluation, rows: Floats) -> "Asked":
+        """What the rows of U, each times its factor (R,), ask of members, built or not, at the last evaluation.
+
+        Of springs between free bodies, where nothing is shared and no parameter varies.
+        """
+        places = {name: len(found) for name, found in evaluation.peaks.items()}
+        unit = iter(np.eye(sum(places.values())))
+        marked = {
+            name: tuple(peak._replace(gradient=next(unit)) for peak in found)
+            for name, found in evaluation.peaks.items()
+        }
+        # the same rows with one number a peak in the place of its gradient: how a row is made of peaks
+        other = copy(self)
+        other.space = DesignSpace(sum(places.values()), None, ())
+        other.initial = np.zeros(other.space.size)
+        other._factor = None
+        weights = rows @ other.sample_of(evaluation._replace(peaks=marked)).gradients
+        ends = np.cumsum(list(places.values()))
+        parts = zip(places, np.split(weights, ends[:-1]), strict=True)
+        return self._evaluator.asked_of_members({name: part.tolist() for name, part in parts})
+
+    def sample_of(self, evaluation: Evaluation, gradient: bool = True) -> Sample:
+        """The rows of U of an evaluation."""
         info = {name: np.full(self._count, np.nan) for name in ("objectives", "peak_time")}
         for place, objective in zip(self._places, self._objectives, strict=True):
             info["objectives"][place] = evaluation.objectives[objective.name]
@@ -116,7 +145,9 @@ class DesignProblem:
                 planes = len(self.scalarisation.planes)
                 groups = np.concatenate([groups, first + np.repeat(np.arange(planes), len(own) // planes)])
                 limits = np.concatenate([limits, own])
-                slopes = np.concatenate([slopes.reshape(-1, len(x)), own_slopes.reshape(-1, len(x))])
+                slopes = np.concatenate(
+                    [slopes.reshape(-1, len(self.initial)), own_slopes.reshape(-1, len(self.initial))]
+                )
                 own_cones = own_cones.extended(len(own))
         if not gradient:
             return Sample(float(rows[0]), rows, constraint_rows=limits, constraint_groups=groups, info=info)

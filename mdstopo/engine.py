@@ -14,7 +14,7 @@ import numpy as np
 
 from mdstopo.case.errors import CaseError
 from mdstopo.case.integrators import AUTO
-from mdstopo.case.model import Case, Objective, ResponseRow
+from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
 from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult, Scene, SceneDriver, SceneFamily
@@ -24,9 +24,9 @@ from mdstopo.scene.border import border_of
 from mdstopo.scene.design import Design, checked
 from mdstopo.scene.family import beyond_springs, collocates
 from mdstopo.scene.modes import Modes
-from mdstopo.scene.origin import extent_of, origin_of, seen_from
+from mdstopo.scene.origin import extent_of, origin_of, seen_from, starting_places
 from mdstopo.scene.refusals import BY_PARAMETERS, no_parameters, refusals
-from mdstopo.sensitivity.springs_driver import SPRINGS
+from mdstopo.sensitivity.springs_driver import SPRINGS, SpringsDriver
 from mdstopo.status import Status
 from mdstopo.warm import Beside
 
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from mdstopo.general.settle import Settled
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
+    from mdstopo.sensitivity.pricing import Asked, SpringCandidates
 
 #: the motion is computed to the tolerance of what is looked at; looser than this to half of it, because a gradient may
 #: else exceed ten tolerances on scenes whose members turn fast
@@ -186,6 +187,34 @@ class Evaluator:
         from mdstopo.error_estimate import Estimator
 
         return Estimator(self)
+
+    def asked_of_members(self, weights: Mapping[str, Sequence[float]]) -> "Asked":
+        """What a weighted sum of peaks of the last evaluation asks of members, whether they are built or not.
+
+        weights: of the peaks of each objective, in their order. Of springs between free bodies, and after an evaluation
+        with gradients.
+        """
+        from mdstopo.sensitivity.pricing import Asked
+
+        parts = []
+        for _, keys, driver in self._seen:
+            assert isinstance(driver, SpringsDriver)
+            factor = np.zeros(driver.rows.shape[:2])
+            for j, key in enumerate(keys):
+                factor[j, : len(weights[key])] = weights[key]
+            parts.append(driver.asked_of_members(factor))
+        return Asked.of_all(parts)
+
+    def candidates_of(self, group: MemberGroup, count: int | None = None) -> "SpringCandidates":
+        """The candidates of a priced group of springs between free bodies; count: about so many of them, None: all."""
+        from mdstopo.sensitivity.pricing import SpringCandidates
+
+        place = self.case.members.index(group)
+        own = self._near.members[place]
+        ends = (group.from_world, group.to_world)
+        if self._near is not self.case:
+            ends = starting_places(self._near.bodies, own)
+        return SpringCandidates(own, next(iter(self.scenes.values())).model.block[place], ends, count)
 
     def otherwise(self, sample: int = 0, **solver: Any) -> "Evaluator":
         """The evaluator of the same case with other solver settings, made once for each set of them.

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from mdstopo.case.arrays import FloatArray, FrozenDict
+from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.candidates import coefficients_of
 from mdstopo.case.design_variables import prices
 from mdstopo.case.loading import DEFAULT
 from mdstopo.case.model import Combine, MemberGroup, Objective, Response, ResponseRow, Variable, VolumeRow
@@ -218,21 +219,20 @@ def _volume_row(
     names = tuple(design | priced) if stated == "all" else tuple(named)
     if not all(name in design or name in priced for name in names):
         return None
-    coefficients = _coefficients(design, names)
+    coefficients = coefficients_of(tuple(design.values()), names)
     bound = fields[sense]
     if sense == "fraction":
+        unbuilt = [name for name in names if name in design and design[name].candidates is not None]
+        if unbuilt:
+            message = f"a share of all candidates of {listed(unbuilt)} is not known, which are priced; "
+            reading.mistake(inside(fields.path, sense), message + "allowed are limit, equals, at_least")
+            return None
         bound = bound * math.fsum(float(design[name].cost.sum()) for name in names if name in design)
         if not math.isfinite(bound):
             reading.mistake(inside(fields.path, sense), "times sum V_i it is too large for a number")
             return None
     own = prices(variables, names) if priced else np.zeros(0)
     return VolumeRow(names, coefficients, bound, "limit" if sense == "fraction" else sense, own)
-
-
-def _coefficients(design: dict[str, MemberGroup], names: tuple[str, ...]) -> FloatArray:
-    """(N,) V_i of the members of `names`, 0 of the others."""
-    pieces = [g.cost if name in names else np.zeros(len(g)) for name, g in design.items()]
-    return np.concatenate(pieces) if pieces else np.zeros(0)
 
 
 def build_combine(top: Fields, reading: Reading) -> Combine | None:

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import math
-from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from mdstopo.case.arrays import FloatArray, IndexArray, Table
+from mdstopo.case.candidates import ROUNDING, allowed_lengths, coincident, lengths_between
 from mdstopo.case.laws.law import numbers
 from mdstopo.case.memory import BYTES_PER_MEMBER, total_memory
-from mdstopo.case.model import GROUND, LAWS, Law, MemberGroup, PointGrid
+from mdstopo.case.model import GROUND, LAWS, Candidates, Law, MemberGroup, PointGrid
 from mdstopo.case.reading import BAD, Fields, Reading
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.value import Value, frozen
 from mdstopo.case.words import count_text, inside, number_text
 
-ROUNDING = 1e-12
-"""Lengths are compared up to this share of the coordinates they come from: 0.3 includes 0.1 + 0.2."""
 CHUNK = 1 << 18
 MOST_CANDIDATES = 10**10
-"""Pairs that filters may look at; more would take minutes."""
+"""Pairs that filters may look at, or that may be priced; more would take minutes."""
+PRICED = "priced"
 
 
 @frozen
@@ -115,19 +114,15 @@ def _build_group(
     if first.body == second.body:
         reading.mistake(path, f"both ends are on {first.body!r}; a member joins two bodies")
         return None
-    if not (limits_good and fields.good("connect")):
+    if not (limits_good and fields.good("connect", "candidates")):
         return None
+    if fields["candidates"] == PRICED:
+        return _priced_group(name, fields, laws, first, second, frames, reading)
     pairs = _connect(first, second, fields["connect"], low, high, path, reading, left)
     if pairs is None:
         return None
     if pairs.zero:
-        at = ", ".join(f"{value:g}" for value in first.world[pairs.first_zero[0]])
-        reading.mistake(
-            path,
-            f"{count_text(pairs.zero)} of the members would have zero length, the first from P "
-            f"{pairs.first_zero[0]} to Q {pairs.first_zero[1]} at [{at}]; "
-            "move the points or set min_length",
-        )
+        _note_zero(pairs.zero, pairs.first_zero, first, path, reading)
         return None
     if not len(pairs.length):
         reading.mistake(path, "the filters leave no member")
@@ -154,6 +149,81 @@ def _build_group(
         laws,
         cost,
         fields["design"],
+    )
+
+
+def _note_zero(count: int, first_zero: tuple[int, int], first: _End, path: str, reading: Reading) -> None:
+    """The mistake that ends of members coincide. first: the points P."""
+    at = ", ".join(f"{value:g}" for value in first.world[first_zero[0]])
+    reading.mistake(
+        path,
+        f"{count_text(count)} of the members would have zero length, the first from P "
+        f"{first_zero[0]} to Q {first_zero[1]} at [{at}]; move the points or set min_length",
+    )
+
+
+def _priced_group(
+    name: str,
+    fields: Fields,
+    laws: tuple[Law, ...] | None,
+    first: _End,
+    second: _End,
+    frames: Frames,
+    reading: Reading,
+) -> MemberGroup | None:
+    """A group whose members are priced, none of them built yet; None where it cannot be made, with the mistakes noted.
+
+    name: the group's.
+    fields: the group in the file.
+    laws: of its members; None where they could not be read.
+    first, second: the points at the two ends.
+    frames: where the bodies stand at the start.
+    reading: takes the mistakes.
+    """
+    path = fields.path
+    if fields["connect"] == "pairs":
+        reading.mistake(inside(path, "candidates"), "found priced, allowed with `connect: pairs` is enumerated")
+        return None
+    if fields["design"] is False:
+        reading.mistake(inside(path, "candidates"), "found priced, allowed with `design: false` is enumerated")
+        return None
+    count = len(first.world) * len(second.world)
+    if count > MOST_CANDIDATES:
+        most = count_text(MOST_CANDIDATES)
+        reading.mistake(path, f"{count_text(count)} candidates are more than can be priced; allowed are {most}")
+        return None
+    scale = float(max(np.abs(first.world).max(), np.abs(second.world).max()))
+    shortest, longest = allowed_lengths(fields["min_length"], fields["max_length"], scale)
+    if fields["min_length"] == 0.0:
+        zero, first_zero = coincident(first.world, second.world, ROUNDING * scale)
+        if zero:
+            _note_zero(zero, first_zero, first, path, reading)
+            return None
+    if laws is None or not fields.good("cost", "design"):
+        return None
+    size = float(np.linalg.norm(np.ptp(np.concatenate([first.world, second.world]), axis=0)))
+    if not _in_range(laws, np.array([size]), (first.body, second.body), frames, path, reading):
+        return None
+    cost = None if fields["cost"] == "length" else float(fields["cost"])
+    if not math.isfinite((size if cost is None else cost) * count):
+        reading.mistake(inside(path, "cost"), "the sum over the group is too large for a number")
+        return None
+    none = np.zeros(0, dtype=np.intp)
+    return MemberGroup(
+        name,
+        first.body,
+        second.body,
+        first.local,
+        second.local,
+        first.world,
+        second.world,
+        none,
+        none,
+        np.zeros(0),
+        laws,
+        np.zeros(0),
+        True,
+        candidates=Candidates(count, shortest, longest, cost),
     )
 
 
@@ -207,19 +277,18 @@ def _connect(
         # The common case without temporaries of the candidates' size.
         length = np.empty(candidates)
         for start, stop, i, j in _chunks(n_p, n_q, connect):
-            length[start:stop] = _lengths(first.world[i], second.world[j])
+            length[start:stop] = lengths_between(first.world[i], second.world[j])
         from_index = np.repeat(np.arange(n_p, dtype=np.intp), n_q)
         to_index = np.tile(np.arange(n_q, dtype=np.intp), n_p)
         return _checked(from_index, to_index, length, scale)
     kept: list[tuple[IndexArray, IndexArray, FloatArray]] = []
     count = 0
+    shortest, longest = allowed_lengths(low, high, scale)
     for _, _, i, j in _chunks(n_p, n_q, connect):
-        lengths = _lengths(first.world[i], second.world[j])
-        keep = lengths >= low - ROUNDING * max(low, scale) if low > 0.0 else np.ones(len(lengths), bool)
+        lengths = lengths_between(first.world[i], second.world[j])
+        keep = (lengths >= shortest) & (lengths <= longest)
         if low > 0.0:
             keep &= lengths > 0.0
-        if high is not None:
-            keep &= lengths <= high + ROUNDING * max(high, scale)
         kept.append((i[keep], j[keep], lengths[keep]))
         count += int(keep.sum())
         if count > left:
@@ -237,11 +306,6 @@ def _chunks(n_p: int, n_q: int, connect: str) -> Any:
         stop = min(start + CHUNK, total)
         member = np.arange(start, stop, dtype=np.intp)
         yield (start, stop, member, member) if connect == "pairs" else (start, stop, *np.divmod(member, n_q))
-
-
-def _lengths(p: FloatArray, q: FloatArray) -> FloatArray:
-    lengths: FloatArray = reduce(np.hypot, (q - p).T)
-    return lengths
 
 
 def _checked(i: IndexArray, j: IndexArray, length: FloatArray, scale: float) -> _Pairs:

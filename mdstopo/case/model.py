@@ -58,6 +58,7 @@ from mdstopo.case.parts import (
     AnyContact,
     Body,
     Bushing,
+    Candidates,
     Contact,
     Load,
     LoadCase,
@@ -84,6 +85,7 @@ __all__ = [
     "AnyContact",
     "Body",
     "Bushing",
+    "Candidates",
     "Case",
     "Combine",
     "Components",
@@ -198,6 +200,11 @@ class Case(Value):
     def n_members(self) -> int:
         """Members of all groups."""
         return sum(len(group) for group in self.members)
+
+    @property
+    def priced_groups(self) -> tuple[MemberGroup, ...]:
+        """The groups whose members are priced, of which only some are built."""
+        return tuple(group for group in self.members if group.candidates is not None)
 
     @property
     def group_slices(self) -> dict[str, slice]:

@@ -102,6 +102,25 @@ class PointGrid(Value):
 
 
 @frozen
+class Candidates(Value):
+    """Members that are priced instead of built: every P with every Q, of an initial length between two limits.
+
+    count: how many there are before these; shortest, longest: the limits (m), with their rounding; longest may be
+    infinite. cost: V_i of each; None: its initial length.
+    """
+
+    count: int
+    shortest: float
+    longest: float
+    cost: float | None
+
+    @property
+    def filtered(self) -> bool:
+        """Whether some of them may be left out by their length."""
+        return self.shortest > 0.0 or self.longest < float("inf")
+
+
+@frozen
 class MemberGroup(Value):
     """A group of M candidate members between two bodies, filters applied, P slow and Q fast.
 
@@ -111,6 +130,7 @@ class MemberGroup(Value):
     laws: forces that add. cost (M,): V_i. design: whether members are design variables; where not, alpha = 1.
     initial, lower, upper, power: the design's numbers for this group (power is mu of Eq. 12).
     powers: where an optimisation goes from one power to the next: all of them, the last one being `power`.
+    candidates: of a priced group all that could be members, of which the M are those that have been built; else None.
     """
 
     name: str
@@ -131,6 +151,7 @@ class MemberGroup(Value):
     upper: float = 1.0
     power: float = 1.0
     powers: tuple[float, ...] = ()
+    candidates: Candidates | None = None
 
     def __post_init__(self) -> None:
         for name in ("from_local", "to_local", "from_world", "to_world", "length", "cost"):

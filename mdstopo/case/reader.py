@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
+from mdstopo.case.candidates import with_start_set
 from mdstopo.case.contacts import build_contacts
 from mdstopo.case.definitions import MARK, SECTION, with_numbers
 from mdstopo.case.design_variables import build_shared, build_variables
@@ -103,7 +104,7 @@ def read_case(
         parts["uncertainty"] = build_uncertainty(top, parts["constraints"], root, reading)
     if reading.mistakes:
         raise CaseError(reading.mistakes, file)
-    return Case(
+    case = Case(
         title=top["title"],
         path=place,
         name="case" if place is None else place.stem,
@@ -115,6 +116,7 @@ def read_case(
         warnings=tuple(reading.warnings),
         **parts,
     )
+    return with_start_set(case) if case.priced_groups else case
 
 
 def measured(root: Node) -> dict[str, float]:

@@ -255,6 +255,12 @@ _CONNECT = explained(
         "pairs": "the first P with the first Q, the second with the second; needs equal counts",
     }
 )
+_CANDIDATES = explained(
+    {
+        "enumerated": "each is a member from the start",
+        "priced": "none is built until its price says that it would lower the objective",
+    }
+)
 _COST = explained({"length": "the member's initial length in m"}, " | a number >= 0")
 GROUP_KEYS = Record(
     "a member group",
@@ -270,6 +276,7 @@ GROUP_KEYS = Record(
             "how force follows from motion and time: one law, or a list whose forces add",
             required=True,
         ),
+        Key("candidates", _CANDIDATES, "whether all are built, or only those that pay", default="enumerated"),
         Key("cost", NumberOrWord(NOT_NEGATIVE, _COST), "V_i, what a whole member adds to the volume", default=1.0),
         Key(
             "design",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mdstopo.case.candidates import most_cost
 from mdstopo.case.model import MemberGroup, Variable, VolumeRow
 from mdstopo.case.reading import Reading
 from mdstopo.case.words import listed, number_text
@@ -20,7 +21,7 @@ def check_feasible(
     The sum over a group can be anything between those at its bounds, whatever other groups do: so a row, and
     a pair of rows, can be judged from the groups' sums alone. What variables cost counts as a group of its own.
     """
-    low = {g.name: _sum(g, g.lower) for g in design}
+    low = {g.name: _sum(g, g.lower) if g.candidates is None else 0.0 for g in design}
     high = {g.name: _sum(g, g.upper) for g in design}
     priced = [each for each in variables if each.cost > 0.0]
     for each in priced:  # no group has a name with a blank
@@ -56,6 +57,8 @@ def check_feasible(
 
 
 def _sum(group: MemberGroup, value: float) -> float:
+    if group.candidates is not None:  # at most: how many of them the lengths leave is not known yet
+        return value * group.candidates.count * most_cost(group)
     return value * math.fsum(group.cost.tolist()) if len(group) <= 10**5 else value * float(group.cost.sum())
 
 

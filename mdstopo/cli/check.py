@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from mdstopo.case.words import count_text
 from mdstopo.cli.options import announce_compilation, case_argument, output_options, set_option
 from mdstopo.cli.output import Output, number
 from mdstopo.cli.uncertain_numbers import say_sample
@@ -69,6 +70,11 @@ def command(case_path: Path, overrides: dict[str, str], as_json: bool, quiet: bo
         "joints": [joint.name for joint in case.joints],
         "members": case.n_members,
         "design_variables": case.n_design,
+        **(
+            {"candidates": {each.name: each.candidates.count for each in case.priced_groups if each.candidates}}
+            if case.priced_groups
+            else {}
+        ),
         "variables": {each.name: {"values": each.count, "initial": each.initial} for each in case.variables},
         **({"stages": stages} if stages else {}),
         **({"fit": [each.key for each in case.fit.numbers]} if case.fit is not None else {}),
@@ -194,6 +200,13 @@ def _say_members(output: Output, case: "Case") -> None:
     output.say(f"{case.n_members} members, {case.n_design} of them design variables")
     if not case.members:
         return
+    for group in case.priced_groups:
+        assert group.candidates is not None
+        most = "at most " if group.candidates.filtered else ""
+        output.say(
+            f"{group.name}: {most}{count_text(group.candidates.count)} candidates, priced; "
+            f"{count_text(len(group))} of them are members to begin with"
+        )
     rows = [["group", "members", "between", "laws", "length, m", "cost", "alpha"]]
     for group in case.members:
         lengths = f"{number(group.length.min(), 4)} to {number(group.length.max(), 4)}" if len(group) else "-"

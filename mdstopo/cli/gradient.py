@@ -105,7 +105,7 @@ def command(
 
     output = Output(json=as_json, quiet=quiet)
     methods = tuple(dict.fromkeys(methods or ("adjoint", "direct")))
-    case = _prepared(output, open_case(case_path, overrides), case_path, methods, history)
+    case = _prepared(output, open_case(case_path, overrides, alpha_path), case_path, methods, history)
     alpha = open_design(alpha_path, case)
     path = result_path(out, case, "gradient")
     line = shlex.join(["mdstopo", *sys.argv[1:]])

@@ -85,8 +85,11 @@ def _pairs(_context: click.Context, _parameter: click.Parameter, values: tuple[s
     return pairs
 
 
-def open_case(path: Path, overrides: dict[str, str]) -> "Case":
-    """Read a case and refuse what the engine cannot compute. Raises CaseError with every mistake."""
+def open_case(path: Path, overrides: dict[str, str], alpha_path: Path | None = None) -> "Case":
+    """Read a case and refuse what the engine cannot compute. Raises CaseError with every mistake.
+
+    alpha_path: of a design; where that is a run's result and candidates are priced, they are members that are there.
+    """
     from mdstopo.case.errors import CaseError
     from mdstopo.case.reader import load_case
     from mdstopo.scene.refusals import refusals
@@ -95,6 +98,11 @@ def open_case(path: Path, overrides: dict[str, str]) -> "Case":
     refused = refusals(case)
     if refused:
         raise CaseError(refused, str(path))
+    if case.priced_groups and alpha_path is not None and alpha_path.suffix.lower() in (".h5", ".hdf5"):
+        from mdstopo.store.result_reader import read_result
+        from mdstopo.store.stored_case import built_case
+
+        return built_case(read_result(alpha_path, leave_out=("optimizer", "trajectories")), case)
     return case
 
 

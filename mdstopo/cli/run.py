@@ -3,6 +3,7 @@
 import math
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,7 +77,7 @@ def command(
         raise click.UsageError("--resume and --overwrite exclude each other")
     output = Output(json=as_json, quiet=quiet)
     interrupts = Interrupts(quiet)
-    case = open_case(case_path, overrides)
+    case = open_case(case_path, overrides, alpha_path)
     initial = open_design(alpha_path, case) if alpha_path is not None else None
     path = result_path(out, case)
     from mdstopo.session.run_session import run_session
@@ -222,6 +223,7 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
 
     from mdstopo.case.model import VolumeRow
     from mdstopo.case.units import words
+    from mdstopo.case.words import count_text
     from mdstopo.cli.show import values_text
 
     case, lines = outcome.case, []
@@ -244,6 +246,10 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
     if case.n_design:
         gone = case.n_design - full - grey
         lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}"))
+    if outcome.pricing is not None:
+        rounds = f"{outcome.pricing.rounds} round{'s' if outcome.pricing.rounds != 1 else ''}"
+        gain = f"one gains {number(outcome.pricing.best, 2)} at most, all {number(outcome.pricing.together, 2)}"
+        lines.append(("candidates", f"{count_text(outcome.pricing.candidates)}, {rounds}; to first order {gain}"))
     lines += [(each.name, f"{values_text(outcome.variables[each.name])} {each.unit}") for each in case.variables]
     return lines
 
@@ -283,6 +289,7 @@ def _document(outcome: "Outcome", path: Path, again: str) -> dict[str, Any]:
         "seconds": outcome.seconds,
         "compile_seconds": outcome.compile_seconds,
         "uncertainty": document_of(outcome.conclusion),
+        **({"pricing": asdict(outcome.pricing)} if outcome.pricing is not None else {}),
         "warnings": outcome.warnings,
         "path": str(path),
         "resume": again if outcome.status == "interrupted" else None,

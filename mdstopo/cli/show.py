@@ -107,7 +107,7 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
     names = objective_names(view)
     total = len(columns["combined"])
     stages = _stages(columns)
-    within = f" in {stages} stages" if stages > 1 else ""
+    within = f" in {stages} {'rounds' if 'round' in columns else 'stages'}" if stages > 1 else ""
     output.say(f"{total - stages} iterations{within}, {int(columns['evaluations'][-1])} evaluations")
     rows = [["iterate", *names, "constraint", "change", "KKT", "evaluations", "time"]]
     for k in condensed(total):
@@ -127,8 +127,8 @@ def _say_iterations(output: Output, view: "ResultView") -> None:
 
 
 def _stages(columns: "Mapping[str, NDArray[Any]]") -> int:
-    """How many stages there are so far: each begins with a row that is no iteration."""
-    return int(columns["stage"][-1]) + 1 if "stage" in columns else 1
+    """How many stages, or rounds, there are so far: each begins with a row that is no iteration."""
+    return next((int(columns[name][-1]) + 1 for name in ("stage", "round") if name in columns), 1)
 
 
 def _say_starts(output: Output, view: "ResultView") -> None:

@@ -60,7 +60,7 @@ def command(
     as_json, quiet: print one JSON object; say nothing but mistakes.
     """
     output = Output(json=as_json, quiet=quiet)
-    case = open_case(case_path, overrides)
+    case = open_case(case_path, overrides, alpha_path)
     alpha = open_design(alpha_path, case)
     chosen = _load_cases(case, names)
     path = result_path(out, case, "simulate")

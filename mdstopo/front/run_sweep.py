@@ -174,6 +174,9 @@ def _cases(
             new = [mistake for mistake in error.mistakes if str(mistake) not in seen]
             seen |= {str(mistake) for mistake in new}
             mistakes += new
+    words = "found priced, allowed in a sweep is enumerated: its designs are to have the same members"
+    for case in cases:
+        mistakes += [case.marks.mistake(f"members.{group.name}.candidates", words) for group in case.priced_groups]
     if mistakes:
         raise CaseError(mistakes, str(case_path))
     return cases

@@ -70,6 +70,8 @@ class Driver:
         self.shapes: tuple[Shape, ...] = tuple("plain" for _ in reductions)
         self.strength = aligned((ROOMY, padded))
         self.found = np.zeros(count, dtype=np.int64)
+        #: steps of the last evaluation
+        self.count = 0
         self.meeting = np.full(3, -1, dtype=np.int64)
         self._width = padded
         self._make_rows(ROWS)
@@ -133,6 +135,7 @@ class Driver:
         if self.rows.shape[1] != (rows.most or ROWS):
             self._make_rows(rows.most or ROWS)
         code, count, time = self.run(alpha, gradient)
+        self.count = count
         if code == OK:
             self._evaluate_responses(count, gradient)
         meeting, unresolved = self.meeting.item(0), self.meeting.item(2)

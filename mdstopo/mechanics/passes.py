@@ -400,7 +400,7 @@ def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
     """
     i = taken(counter)
     while i < chunk.shape[0]:
-        _design(
+        design_of_members(
             chunk[i, CHUNK_BLOCK],
             chunk[i, CHUNK_START],
             chunk[i, CHUNK_STOP],
@@ -416,7 +416,7 @@ def _design_chunks(counter, chunk, block, near, member, rel, u, weight, out):
 
 
 @kernel
-def _design(k, start, stop, block, near, member, rel, u, weight, out):
+def design_of_members(k, start, stop, block, near, member, rel, u, weight, out):
     """Add f (b . u) at the first poses and weight V at the others for the members in places start to stop of block k.
 
     In:

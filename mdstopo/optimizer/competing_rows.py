@@ -262,24 +262,37 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepe
     of: what a step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
     the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
     """
-    if steepest == 0.0:
-        return 0.0
+    return 0.0 if steepest == 0.0 else multipliers(own, x, space, penalty, steepest)[0]
+
+
+def multipliers(
+    own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float
+) -> tuple[float, Floats, Floats]:
+    """The residual as `residual` has it, with its multipliers: of the iterate's rows (K,), of the linear rows (m,)."""
     lines = Bundle(
         np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
         np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,
     )  # fmt: skip
-    found = _residual_with(lines, x, space, penalty, steepest)
+    found = _multipliers_of(lines, x, space, penalty, steepest)
     near = _gaps(lines) <= NEAR * steepest
     if near.all() or not (near & (lines.group == 0)).any():
         return found
-    return min(found, _residual_with(lines.subset(near), x, space, penalty, steepest))
+    among = _multipliers_of(lines.subset(near), x, space, penalty, steepest)
+    if not among[0] < found[0]:
+        return found
+    of_all = np.zeros(len(lines))
+    of_all[near] = among[1]
+    return among[0], of_all, among[2]
 
 
-def _residual_with(lines: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float) -> float:
-    """The residual with the multipliers of the proximal step of these lines, as `residual` has it."""
+def _multipliers_of(
+    lines: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float
+) -> tuple[float, Floats, Floats]:
+    """The multipliers of the proximal step of these lines, and the residual with them, as `multipliers` has them."""
     flat = Curvature.diagonal_of(np.full(len(x), steepest))
     trial = subproblem(lines, x, space, (space.lower, space.upper), penalty, flat)
-    return residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
+    found = residual_of(lines, trial.multipliers, trial.linear, x, space, steepest)
+    return found, trial.multipliers, trial.linear
 
 
 def _gaps(lines: Bundle) -> Floats:

@@ -10,7 +10,7 @@ stay where they are to the last bit, and a scene that is moved by such a multipl
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, TypeVar
 
@@ -117,11 +117,10 @@ def seen_from(case: Case, origin: Point) -> Case:
     if not any(origin):
         return case
     bodies = _bodies(case.bodies, origin)
-    stands = {body.name: body for body in bodies}
     return replace(
         case,
         bodies=bodies,
-        members=tuple(_group(group, stands, origin) for group in case.members),
+        members=tuple(_group(group, bodies, origin) for group in case.members),
         contacts=tuple(_contact(contact, origin) for contact in case.contacts),
         load_cases=tuple(_load_case(load_case, origin) for load_case in case.load_cases),
         objectives=tuple(_looked(objective, origin) for objective in case.objectives),
@@ -149,19 +148,24 @@ def _tie(tie: _Tie, origin: Point) -> _Tie:
     return tie
 
 
-def _group(group: MemberGroup, stands: dict[str, Body], origin: Point) -> MemberGroup:
+def _group(group: MemberGroup, bodies: Sequence[Body], origin: Point) -> MemberGroup:
     """A group with ends on ground from `origin`, and with lengths that its own coordinates have."""
-    ends: dict[str, Any] = {}
-    places = []
-    for side, name in (("from", group.body_from), ("to", group.body_to)):
-        local = getattr(group, f"{side}_local")
-        if name == GROUND:
-            ends[f"{side}_local"] = place = local - np.array(origin)
-        else:
-            place = placed(stands[name], local)
-        places.append(place)
-    d = places[1][group.to_index] - places[0][group.from_index]
-    return replace(group, **ends, length=distances(d))
+    ends = {
+        f"{side}_local": getattr(group, f"{side}_local") - np.array(origin)
+        for side, name in (("from", group.body_from), ("to", group.body_to))
+        if name == GROUND
+    }
+    moved = replace(group, **ends)
+    first, second = starting_places(bodies, moved)
+    return replace(moved, length=distances(second[group.to_index] - first[group.from_index]))
+
+
+def starting_places(bodies: Sequence[Body], group: MemberGroup) -> tuple[FloatArray, FloatArray]:
+    """Where the points P and Q of a group are at the start, (n, d) each, in the coordinates of the bodies."""
+    stands = {body.name: body for body in bodies}
+    ends = ((group.body_from, group.from_local), (group.body_to, group.to_local))
+    first, second = (local if name == GROUND else placed(stands[name], local) for name, local in ends)
+    return first, second
 
 
 def _contact(contact: AnyContact, origin: Point) -> AnyContact:

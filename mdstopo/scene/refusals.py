@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from mdstopo.case.errors import Mistake
 from mdstopo.case.integrators import INTEGRATORS
-from mdstopo.case.model import Case, VolumeRow
+from mdstopo.case.model import Case, MemberGroup, VolumeRow
+from mdstopo.case.words import number_text
 from mdstopo.scene.family import beyond_collocation, beyond_springs
 from mdstopo.settings.optimizers import OPTIMIZERS
 
@@ -47,3 +48,39 @@ def _refused(case: Case) -> Iterator[tuple[str, str]]:
             yield f"constraints[{i}]", f"the optimiser {optimizer.name} takes no limits on {what}; gsao does"
     if case.variables and solver.sensitivity not in BY_PARAMETERS:
         yield "solver.sensitivity", no_parameters(solver.sensitivity)
+    for group in case.priced_groups:
+        yield from _unpriced(case, group)
+
+
+def _unpriced(case: Case, group: MemberGroup) -> Iterator[tuple[str, str]]:
+    """What does not go with candidates that are priced."""
+    name = group.name
+    if group.lower != 0.0:
+        yield (
+            "design.lower",
+            f"found {number_text(group.lower)} for {name!r}, allowed is 0 where candidates are priced: "
+            "one that is not built is one with alpha = 0",
+        )
+    if group.power != 1.0 or group.powers:
+        yield (
+            "design.power",
+            f"found {number_text(group.power)} for {name!r}, allowed is 1 where candidates are priced: "
+            "with another power the first order says nothing at alpha = 0",
+        )
+    if not len(group):
+        yield f"members.{name}", "the filters leave no member of a coarse subset of the points, with which a run begins"
+    where = f"members.{name}.candidates"
+    for key in ("shared", "mirrored", "variables"):
+        if getattr(case, key):
+            yield where, f"priced does not go with design.{key}"
+    beyond = beyond_springs(case)
+    if beyond and not case.variables:
+        yield where, f"priced is for springs between free bodies in the plane, looked at by energy, not for {beyond}"
+    if case.uncertainty is not None:
+        yield where, "priced does not go with uncertain values"
+    if case.solver.sensitivity not in ("auto", "adjoint"):
+        yield where, f"priced needs sensitivity: adjoint, not {case.solver.sensitivity}"
+    if len(case.objectives) > 1:
+        yield where, "priced does not go with several objectives"
+    if case.optimizer.starts > 1:
+        yield where, f"priced goes with one start, not {case.optimizer.starts}"

@@ -18,6 +18,7 @@ from mdstopo.status import Status
 
 if TYPE_CHECKING:
     from mdstopo.general.settle import Settled
+    from mdstopo.sensitivity.pricing import Asked
 
 
 class SpringsDriver(Driver):
@@ -68,6 +69,12 @@ class SpringsDriver(Driver):
     ) -> tuple[Status, str]:
         """The status of a run that ended at `time` in a state (2, n), and who is to blame, in words."""
         return self._diagnosis.explain(alpha, status, time, q, v)
+
+    def asked_of_members(self, factor: FloatArray) -> "Asked":
+        """What rows of the last evaluation, each times its factor (n_obj, R), ask of any member; with gradients."""
+        from mdstopo.sensitivity.pricing import asked_of
+
+        return asked_of(self, factor)
 
     def start_modes(self, alpha: FloatArray) -> Modes:
         """Small motion about the start."""

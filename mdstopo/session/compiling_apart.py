@@ -21,9 +21,13 @@ from mdstopo.optimizer.wide import MANY
 from mdstopo.optimizer.wide_numbers import WIDE
 from mdstopo.scene.family import beyond_springs
 from mdstopo.scene.other_kernels import include_kernels
+from mdstopo.session.pricing import price
 from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, meet
 from mdstopo.warm import compiling, tiny
+
+#: candidates that are priced to have the kernels compiled
+FEW_CANDIDATES = 1000
 
 
 def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
@@ -74,6 +78,7 @@ def _marker(case: Case) -> Path:
     """An empty file that says that the kernels for such cases are cached."""
     include_kernels(case)
     family = "general" if beyond_springs(case) else "springs"
+    family += "-priced" if case.priced_groups else ""
     family += "".join(f"-{many}" for many in (MANY, WIDE) if case.space.size >= many)
     return cache_folder() / f"ready-{family}-{case.solver.integrator}-{case.solver.sensitivity}"
 
@@ -90,6 +95,8 @@ def _main() -> None:
     problem = problem_of(engine, even(case))
     _, begin, _ = get_ready(case, engine, problem, None)
     engine.evaluate(case.space.expand(begin), gradient=True)
+    if case.priced_groups:
+        price(case, engine, begin, FEW_CANDIDATES)
     with contextlib.suppress(OSError):  # a full disk
         _marker(case).touch()
     gc.freeze()  # it would be looked through at the end as well

@@ -57,6 +57,21 @@ class Progress:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class Pricing:
+    """What the last round has found of candidates that are priced.
+
+    candidates: how many there are. rounds: so far. best: by how much one of them would lower the objective (or raise
+    it, where it is maximised) with alpha at its upper bound, together: by how much all of them at most; relative to the
+    objective, and to first order. NaN before the first round has ended.
+    """
+
+    candidates: int
+    rounds: int
+    best: float
+    together: float
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class Outcome:
     """A run that has ended, or was stopped.
@@ -68,7 +83,8 @@ class Outcome:
     `iterations/...`, K + 1 rows. states: each start's last state, None where it has not begun; best_start: whose result
     this is. evaluations, iterations: of all starts. seconds: wall time of the iterations in this process;
     compile_seconds: of getting ready, loading or compiling kernels. conclusion: nominal and robust values and the fresh
-    sample's, of an uncertain case. variables: the best design's values, by name, in the parameters' units.
+    sample's, of an uncertain case. variables: the best design's values, by name, in the parameters' units. pricing:
+    what is known of candidates that are priced; case: then with the members that were built in the end.
     """
 
     case: Case
@@ -95,6 +111,7 @@ class Outcome:
     integrator_reason: str
     conclusion: "Conclusion | None" = None
     variables: Mapping[str, Floats] = field(default_factory=dict)
+    pricing: "Pricing | None" = None
 
     def __repr__(self) -> str:
         parts = [f"{self.status.value}: {self.reason}"]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mdstopo.case.model import Case
 from mdstopo.optimizer.start_families import best_run
 from mdstopo.optimizer.state import State
-from mdstopo.session.start_in_stages import first_row, furthest, is_done
+from mdstopo.session.start_in_stages import ROUND, STAGE, first_row, furthest, is_done
 from mdstopo.starts.constraint_columns import constraint_values
 from mdstopo.store.contents import Datasets, design_part
 from mdstopo.store.result_reader import ResultView
@@ -38,7 +38,8 @@ def iteration_columns(case: Case, state: State, before: int = 0, final: Floats |
     objectives = np.array(columns.get("info/objectives", unknown), dtype=np.float64).reshape(rows, -1)
     for row, values in zip((best_row(state), rows - 1), final if final is not None else (), strict=False):
         objectives[row] = np.where(np.isnan(objectives[row]), values, objectives[row])
-    stages = {"stage": columns["info/stage"].astype(np.int64)} if "info/stage" in columns else {}
+    parts = (STAGE, ROUND)
+    stages = {name: columns[f"info/{name}"].astype(np.int64) for name in parts if f"info/{name}" in columns}
     return stages | {
         "objectives": objectives,
         "peak_time": columns.get("info/peak_time", unknown).reshape(rows, -1),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from mdstopo.case.errors import CaseError
 from mdstopo.case.model import Case
 from mdstopo.case.stages import stage_count
+from mdstopo.case.words import count_text
 from mdstopo.evaluators import make_engine
 from mdstopo.optimizer.problem import Problem
 from mdstopo.optimizer.scalarisation import Scalarisation
@@ -23,15 +24,25 @@ from mdstopo.session.coarse_steps import coarse_steps
 from mdstopo.session.combining import Combining
 from mdstopo.session.compiling_apart import compile_apart
 from mdstopo.session.outcome import Outcome, Progress
+from mdstopo.session.pricing_rounds import Rounds
 from mdstopo.session.record import best_of, best_row, iteration_columns, restore, run_part
 from mdstopo.session.shortfall import of_run
-from mdstopo.session.start_in_stages import first_row, is_done, iterations_of, run_stages, stage_of
+from mdstopo.session.start_in_stages import (
+    ROUND,
+    Marked,
+    continued,
+    first_row,
+    is_done,
+    iterations_of,
+    run_stages,
+    stage_of,
+)
 from mdstopo.session.starts_in_workers import open_starts, run_in_workers
 from mdstopo.starts.callbacks import ignore, never
 from mdstopo.starts.evaluator_interface import Engine, MakeEngine, even, problem_of
 from mdstopo.starts.getting_ready import get_ready, motions
 from mdstopo.starts.quotas import carried_over, rounds
-from mdstopo.starts.single_start import NOTHING_VARIES, StartTask, is_moved, replaced, unshared
+from mdstopo.starts.single_start import NOTHING_VARIES, StartTask, is_moved, make_optimizer, replaced, unshared
 from mdstopo.status import RunStatus
 from mdstopo.store.admit import admit, admit_resume, prepare_place
 from mdstopo.store.atomic import remove_leftovers
@@ -45,7 +56,9 @@ from mdstopo.store.contents import (
 from mdstopo.store.lock import Lock
 from mdstopo.store.provenance import Provenance
 from mdstopo.store.result_reader import ResultView
+from mdstopo.store.same_case import describe
 from mdstopo.store.store_errors import DifferentCaseError, WriteError
+from mdstopo.store.stored_case import built_case
 from mdstopo.store.writing import write_result
 from mdstopo.workers.worker_pool import StoppedError, WorkerError, WorkerPool
 
@@ -122,6 +135,7 @@ def run_session(
         remove_leftovers(place)
         if resume:
             previous = admit_resume(place, case, tell)
+            run.begin_with(previous)
         else:
             previous = None
             admit(place, case, "run", overwrite, tell)
@@ -163,10 +177,19 @@ class _Run:
         self.final_objectives: Floats | None = None
         self.constraints: Floats | None = None
         self.combining = Combining(case)
+        #: the rounds in which candidates are priced; the case as it was read, whose members are where they begin
+        self.rounds = Rounds(case)
+        self.stated = case
         self.peaks: dict[str, tuple[tuple[float, float], ...]] = {}
         self.conclusion: Conclusion | None = None
         #: what is to be closed in the end
         self.helpers = ExitStack()
+
+    def begin_with(self, previous: ResultView | None) -> None:
+        """Take the members that an earlier process has built, where candidates are priced."""
+        if previous is not None and self.case.priced_groups and "iterations/round" in previous.arrays:
+            self.case = self.rounds.case = built_case(previous, self.case)
+            self.rounds.restore(previous)
 
     def go(self, make: MakeEngine, path: Path | None, previous: ResultView | None, workers: int) -> Outcome:
         """Go through the whole run."""
@@ -183,7 +206,8 @@ class _Run:
                 compile_apart(kind, self.notify)
             workers = spread(engine, self.case, workers, self.helpers, self.notify)
         problem = problem_of(engine, even(self.case))
-        stated, begin, self.before = get_ready(self.case, engine, problem, self.initial)
+        first = None if self.rounds.count else self.initial
+        stated, begin, self.before = get_ready(self.case, engine, problem, first)
         self.compare(stated, begin)
         compiled = time.perf_counter()
         if path is not None:
@@ -193,7 +217,12 @@ class _Run:
         if scalarisation is not None:
             problem = problem_of(engine, scalarisation)
         with self.saved_without_worker(path):
-            self.iterate(make, problem, path, workers, scalarisation)
+            self.iterate(make, self.marked(problem), path, workers, scalarisation)
+            while self.case.priced_groups and self.has_ended and self.price(engine):
+                engine = make(self.case)
+                problem = self.marked(engine.problem())
+                self.open_round(problem)
+                self.iterate(make, problem, path, workers, None)
         ended = time.perf_counter()
         best = best_of(self.case, self.states)
         if best is None:
@@ -211,6 +240,34 @@ class _Run:
         if path is not None:
             self.save(path, status, reason)
         return self.outcome(engine, path, best, status, reason, ended - opened, compiled - began)
+
+    def marked(self, problem: Problem) -> Problem:
+        """The problem, which says which round of pricing it is of, if it is of one."""
+        return Marked(problem, ROUND, self.rounds.count) if self.case.priced_groups else problem
+
+    def price(self, engine: Engine) -> bool:
+        """Price all candidates at the optimum of the members; whether some of them enter, which then are built."""
+        state = self.states[0]
+        if state is None or self.stop_requested():
+            self.has_ended = False
+            return False
+        self.notify(f"round {self.rounds.count + 1}: pricing {count_text(self.rounds.candidates)} candidates")
+        goes_on = self.rounds.go_on(engine, state)
+        self.case = self.rounds.case
+        return goes_on
+
+    def open_round(self, problem: Problem) -> None:
+        """Go on with the members that a round of pricing has built, from the design before."""
+        before = self.states[0]
+        assert before is not None
+        if hasattr(self, "fixed"):
+            self.fixed |= self.members_part()
+        self.states = [continued(before, make_optimizer(self.case, problem).start(self.rounds.design))]
+        self.has_ended = False
+
+    def members_part(self) -> Datasets:
+        """The members of the file; a run is resumed with the case as it was read."""
+        return case_part(self.case) | {"resume/case": describe(self.stated)} | self.rounds.part()
 
     @contextmanager
     def saved_without_worker(self, path: Path | None) -> Iterator[None]:
@@ -268,7 +325,7 @@ class _Run:
     def open(self, path: Path, engine: Engine) -> None:
         """Collect what every checkpoint repeats."""
         chosen = self.case.optimizer
-        self.fixed = case_part(self.case)
+        self.fixed = self.members_part()
         if self.initial is not None:
             self.fixed["design/initial"] = self.initial
         self.provenance = Provenance.collect(self.command)
@@ -302,7 +359,10 @@ class _Run:
         size = 8.0 * self.case.space.size * _STATE_ARRAYS * chosen.starts
         saver = None if path is None else Checkpointer(lambda: self.checkpoint(path), size / _DISK_SPEED)
 
+        known = self.states[0]
         most = chosen.max_iterations * stage_count(self.case)
+        if self.case.priced_groups and known is not None:
+            most += iterations_of(known)
 
         def keep(index: int, state: State) -> None:
             self.states[index] = state
@@ -347,6 +407,8 @@ class _Run:
             return RunStatus.INTERRUPTED, "stopped on request; the last iteration is saved"
         state = self.states[best]
         assert state is not None
+        if self.case.priced_groups:
+            return self.rounds.conclude(state)
         stage, count = stage_of(state) + 1, stage_count(self.case)
         return state.status, state.reason if stage == count else f"stage {stage} of {count}: {state.reason}"
 
@@ -422,7 +484,7 @@ class _Run:
 
     def save(self, path: Path, status: RunStatus, reason: str) -> None:
         """Write the file as a whole."""
-        datasets = self.fixed | self.finals
+        datasets = self.fixed | self.finals | self.rounds.part()
         visited = np.zeros((0, len(self.case.objectives)))
         if best_of(self.case, self.states) is not None:
             part = run_part(self.case, self.states, self.combining.evaluations, self.final_objectives)
@@ -486,6 +548,7 @@ class _Run:
             integrator=engine.integrator,
             integrator_reason=engine.integrator_reason,
             conclusion=self.conclusion,
+            pricing=self.rounds.outcome,
         )
 
 

@@ -21,21 +21,27 @@ from mdstopo.status import RunStatus
 
 Floats = NDArray[np.float64]
 
+#: the columns that say which stage, and which round of pricing, an iterate belongs to
+STAGE, ROUND = "stage", "round"
+
 
 def stage_of(state: State) -> int:
     """The stage that a state is in, from 0."""
-    column = state.history.info.get("stage")
+    column = state.history.info.get(STAGE)
     return int(column[-1]) if column else 0
 
 
 def first_row(state: State) -> int:
     """The row of the history with which the state's stage begins."""
-    column = state.history.info.get("stage")
+    column = state.history.info.get(STAGE)
     return int(np.searchsorted(np.array(column), column[-1])) if column else 0
 
 
 def iterations_of(state: State) -> int:
-    """Iterations of all stages; `State.iteration` counts those of the last one."""
+    """Iterations of all stages, or rounds of pricing; `State.iteration` counts those of the last one."""
+    column = state.history.info.get(ROUND)
+    if column:
+        return state.iteration + int(np.searchsorted(np.array(column), column[-1])) - int(column[-1])
     return state.iteration + first_row(state) - stage_of(state)
 
 
@@ -83,7 +89,7 @@ def run_stages(
         return run_start(case, problem, task, state, initial, keep, stop)
 
     def problem_at(stage: int) -> Problem:
-        return _Marked(problem if stage == count - 1 else make(stage_case(case, stage)).problem(), stage)
+        return Marked(problem if stage == count - 1 else make(stage_case(case, stage)).problem(), STAGE, stage)
 
     here = problem_at(0 if state is None else stage_of(state))
     while True:
@@ -91,12 +97,12 @@ def run_stages(
         if state is None or state.running or is_done(case, state) or stop():
             return state
         here = problem_at(stage_of(state) + 1)
-        state = _next(state, make_optimizer(case, here).start(state.best_alpha))
+        state = continued(state, make_optimizer(case, here).start(state.best_alpha))
         keep(task.index, state)
 
 
-def _next(before: State, fresh: State) -> State:
-    """The first state of a stage, with the history of all that came before it."""
+def continued(before: State, fresh: State) -> State:
+    """The first state of a stage, or of a round of pricing, with the history of all that came before it."""
     old, new = before.history, fresh.history
     info = {name: [*rows, *_like(rows[0], new.info.get(name, [None]))] for name, rows in old.info.items()}
     history = History(
@@ -120,14 +126,14 @@ def _like(pattern: Floats, rows: "list[Any]") -> list[Floats]:
             for row in rows]  # fmt: skip
 
 
-class _Marked:
-    """A problem whose samples say which stage they belong to."""
+class Marked:
+    """A problem whose samples say which stage they belong to, or which round."""
 
-    def __init__(self, problem: Problem, stage: int) -> None:
+    def __init__(self, problem: Problem, column: str, number: int) -> None:
         self.initial, self.linear = problem.initial, problem.linear
         self.lower, self.upper = problem.lower, problem.upper
         self._problem = problem
-        self._stage = float(stage)
+        self._column, self._number = column, float(number)
 
     def __getattr__(self, name: str) -> Any:
         """What only some problems have."""
@@ -137,4 +143,4 @@ class _Marked:
 
     def evaluate(self, x: Floats, gradient: bool = True) -> Sample:
         sample = self._problem.evaluate(x, gradient)
-        return replace(sample, info={**sample.info, "stage": self._stage})
+        return replace(sample, info={**sample.info, self._column: self._number})

@@ -18,6 +18,9 @@ from mdstopo.store.same_case import describe
 
 FORMAT = 1
 
+#: where a file keeps what is known of candidates that are priced
+CANDIDATES = "candidates"
+
 Floats = NDArray[np.float64]
 Datasets = dict[str, Value]
 

@@ -22,7 +22,7 @@ _IGNORED: dict[type, set[str]] = {
     LoadCase: {"bodies"},  # follow from the case's bodies and the motions
 }
 # What later versions added, and left out by most: files from before know nothing of it.
-_ADDED = {"shared", "mirrored", "variables", "prices", "powers"}
+_ADDED = {"shared", "mirrored", "variables", "prices", "powers", "candidates"}
 _DESIGN = {"initial", "lower", "upper", "power"}
 _MAY_DIFFER = {"optimizer.max_iterations", "optimizer.tolerance", "optimizer.starts"}
 
@@ -53,7 +53,7 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, str]]:
         if isinstance(value, Case) and value.uncertainty is None:
             ignored = ignored | {"uncertainty"}  # as before there was such a section
         for f in fields(value):
-            if f.name in _ADDED and not len(getattr(value, f.name)):
+            if f.name in _ADDED and _is_nothing(getattr(value, f.name)):
                 continue
             if f.name not in ignored and hasattr(value, f.name):
                 yield from _leaves(_key(path, f.name, value), getattr(value, f.name))
@@ -71,6 +71,10 @@ def _leaves(path: str, value: Any) -> Iterator[tuple[str, str]]:
                 yield from _leaves(path if path.endswith(".law") else f"{path}[{index}]", item)
     else:
         yield path, _text(value)
+
+
+def _is_nothing(value: Any) -> bool:
+    return value is None or (not is_dataclass(value) and not len(value))
 
 
 def _text(value: Any) -> str:

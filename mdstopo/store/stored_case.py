@@ -3,9 +3,14 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+
+from mdstopo.case.candidates import with_members
 from mdstopo.case.model import Case
 from mdstopo.case.reader import read_case
+from mdstopo.store.contents import CANDIDATES
 from mdstopo.store.result_reader import ResultView
+from mdstopo.store.store_errors import DamagedError
 
 
 def case_of(view: ResultView, changes: Mapping[str, str] | None = None) -> Case:
@@ -16,4 +21,22 @@ def case_of(view: ResultView, changes: Mapping[str, str] | None = None) -> Case:
     path = Path(view.case_path) if view.case_path else None
     settings = view.settings.items()
     overrides = {key.removeprefix("set "): str(value) for key, value in settings if key.startswith("set ")}
-    return read_case(view.case_text, path=path, overrides=overrides | dict(changes or {}))
+    case = read_case(view.case_text, path=path, overrides=overrides | dict(changes or {}))
+    return built_case(view, case) if view.kind == "run" else case
+
+
+def built_case(view: ResultView, case: Case) -> Case:
+    """The case with the members that the file of a run holds, where candidates are priced. Raises DamagedError."""
+    pairs = {}
+    for group in case.priced_groups:
+        ends = []
+        for side, points in (("from", group.from_local), ("to", group.to_local)):
+            kept = view.array(f"{CANDIDATES}/members/{group.name}/{side}")
+            index = np.asarray(kept, dtype=np.intp) if kept.ndim == 1 and kept.dtype.kind == "i" else np.array([-1])
+            if not np.all((index >= 0) & (index < len(points))):
+                raise DamagedError(f"{view.path}: damaged: members of {group.name} have no such points")
+            ends.append(index)
+        if len(ends[0]) != len(ends[1]):
+            raise DamagedError(f"{view.path}: damaged: members of {group.name} lack points")
+        pairs[group.name] = (ends[0], ends[1])
+    return with_members(case, pairs) if pairs else case

@@ -20,7 +20,19 @@ Texts = dict[str, str | tuple[str, ...]]
 
 #: what stands at the top of a file; others are none of ours and are not looked at
 _KNOWN = frozenset(
-    {"case", "combine", "design", "differences", "files", "iterations", "members", "objectives", "optimizer", "pareto"}
+    {
+        "candidates",
+        "case",
+        "combine",
+        "design",
+        "differences",
+        "files",
+        "iterations",
+        "members",
+        "objectives",
+        "optimizer",
+        "pareto",
+    }
     | {"provenance", "resume", "sensitivities", "settings", "starts", "sweep", "trajectories", "uncertainty"}
     | {"warnings"}
 )

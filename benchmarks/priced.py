@@ -1,0 +1,213 @@
+"""Candidates that are priced beside candidates that are built: prices, optima, times and memory.
+
+The engine is pushed and turned so slowly, on struts so stiff, that its energy is all but that at rest: one basin. The
+plate is the paper's scene with stiff members, on grids of which each has all points of the one before.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mdstopo import Case
+from mdstopo.bench.tables import Table
+from mdstopo.case.candidates import with_members
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.session.outcome import Outcome
+from mdstopo.session.pricing import price
+from mdstopo.session.run_session import run_session
+
+#: points of the mounts and of the frame, for 1e3 to 1e6 candidates
+ENGINES = ((20, 50), (80, 125), (200, 500), (800, 1250))
+#: on the sides of the torso and on each of three sides of the frame, the last with more than 1e8 candidates
+PLATES = ((20, 17), (160, 129), (1280, 1025), (10240, 4097))
+#: candidates whose prices are compared with the gradient
+CHECKED = 100_000
+#: candidates from which on a run of all of them ends after so many iterations
+MANY, SHORT = 500_000, 20
+#: the run that a process of its own makes, whose memory is its own
+PROGRAM = "from benchmarks.priced import nested; import sys; nested(int(sys.argv[1]), int(sys.argv[2]))"
+
+
+def engine(mounts: int, frame: int, candidates: str = "priced", **optimizer: Any) -> Case:
+    """The engine on its struts."""
+    times = np.linspace(0.0, 0.5, 41)
+    turn = np.pi * times / 0.5
+    force = np.stack([times, 300 * np.sin(2 * turn), 200 * np.sin(turn) ** 2], axis=1)
+    moment = np.stack([times, 60 * np.sin(3 * turn)], axis=1)
+    grids = {
+        "mounts": ("engine", {"center": [0, 0], "size": [0.5, 0.5], "count": mounts}),
+        "frame": ("ground", {"center": [0.1, 0.05], "size": [2, 1.6], "count": frame}),
+    }
+    scene = {
+        "format": 1,
+        "time": {"end": 0.5},
+        "bodies": {"engine": {"mass": 10, "inertia": 0.5, "position": [0, 0]}},
+        "points": {name: {"body": body, "grid": {"rectangle": grid}} for name, (body, grid) in grids.items()},
+        "members": {
+            "struts": {
+                "from": "mounts", "to": "frame", "law": {"type": "spring", "stiffness": 20000},
+                "candidates": candidates,
+            },
+        },
+        "loads": [{"body": "engine", "force": {"table": force.tolist()}, "moment": {"table": moment.tolist()}}],
+        "design": {"initial": 0.1, "lower": 0, "upper": 1},
+        "objectives": {"G": {"response": "energy", "over_time": "mean"}},
+        "constraints": [{"volume": "all", "limit": 30}],
+        "solver": {"tolerance": 1e-6},
+        "optimizer": optimizer,
+    }  # fmt: skip
+    return read_case(json.dumps(scene))
+
+
+def plate(torso: int, side: int) -> Case:
+    """The paper's two bodies with stiff members between them."""
+    lines = (([-1, -0.8], [-1, 0.8]), ([-0.8, -1], [0.8, -1]), ([1, -0.8], [1, 0.8]))
+    scene = {
+        "format": 1,
+        "gravity": [0, -9.8],
+        "time": {"end": 0.2},
+        "bodies": {
+            "torso": {"mass": 60, "inertia": 10, "position": [0, 0]},
+            "vehicle": {"mass": 2000, "inertia": 6000, "position": [0, -1]},
+        },
+        "points": {
+            "torso": {
+                "body": "torso", "grid": {"rectangle": {"center": [0, 0], "size": [0.5, 0.5], "count": torso}},
+            },
+            "frame": {
+                "body": "vehicle",
+                "grid": [{"line": {"from": first, "to": last, "count": side}} for first, last in lines],
+            },
+        },
+        "members": {
+            "belts": {
+                "from": "torso", "to": "frame", "law": {"type": "spring", "stiffness": 2250}, "candidates": "priced",
+            },
+        },
+        "loads": [{"body": "vehicle", "acceleration": [9.8, 0], "angular_acceleration": 20}],
+        "design": {"initial": 0.1, "lower": 0},
+        "objectives": {"G": {"response": "energy"}},
+        "constraints": [{"volume": "all", "limit": 102}],
+    }  # fmt: skip
+    return read_case(json.dumps(scene))
+
+
+def whole_of(outcome: Outcome, case: Case) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """The design of a priced run as one of all candidates."""
+    (group,), (every,) = outcome.case.members, case.members
+    alpha = np.zeros(case.n_design)
+    alpha[group.from_index * len(every.to_local) + group.to_index] = outcome.alpha
+    return alpha
+
+
+def priced() -> Iterator[Table]:
+    """Prices beside the gradient; optima and times beside those of all candidates; nested grids."""
+    yield prices()
+    yield optima()
+    yield grids()
+
+
+def prices() -> Table:
+    """The prices of candidates drawn at random, beside the gradient of a case in which they are built."""
+    rows = []
+    for torso, side in PLATES[1:]:
+        case = plate(torso, side)
+        (group,) = case.members
+        width, rng = len(group.to_local), np.random.default_rng(1)
+        own = group.from_index * width + group.to_index
+        assert group.candidates is not None
+        every = np.unique(np.concatenate([own, rng.integers(0, group.candidates.count, CHECKED)]))
+        built = with_members(case, {"belts": (every // width, every % width)})
+        evaluator = Evaluator(case)
+        problem = evaluator.problem()
+        evaluation = problem.evaluation(case.initial)  # type: ignore[attr-defined]
+        first = np.eye(len(problem.sample_of(evaluation).rows))[0]  # type: ignore[attr-defined]
+        asked = problem.asked_of_members(evaluation, first)  # type: ignore[attr-defined]
+        found = evaluator.candidates_of(group).prices(asked, every // width, every % width)
+        gradient = Evaluator(built).evaluate(np.where(np.isin(every, own), 0.1, 0.0)).gradients["G"]
+        worst = np.abs(found - gradient).max() / np.abs(gradient).max()
+        rows.append([f"{group.candidates.count:,}", f"{len(every):,}", f"{worst:.1e}"])
+    return Table(
+        "Prices beside the gradient, the largest difference relative to the largest entry",
+        ["candidates", "compared", "difference"],
+        rows,
+    )
+
+
+def optima() -> Table:
+    """Runs with prices beside runs of all candidates, from the stated design and from what the first have found."""
+    rows = []
+    for mounts, frame in ENGINES:
+        count = mounts * frame
+        began = time.perf_counter()
+        found = run_session(engine(mounts, frame))
+        seconds = time.perf_counter() - began
+        assert found.pricing is not None
+        limit = {"max_iterations": SHORT} if count > MANY else {}
+        every = engine(mounts, frame, "enumerated", **limit)
+        began = time.perf_counter()
+        whole = run_session(every)
+        beside = time.perf_counter() - began
+        again = run_session(every, initial=whole_of(found, every))
+        value = found.objectives["G"]
+        rows.append([
+            f"{count:,}", f"{value:.9g}", f"{again.objectives['G'] / value - 1:+.1e}", f"{again.kkt:.1e}",
+            f"{whole.objectives['G'] / value - 1:+.1e}", f"{found.pricing.rounds}", f"{seconds:.1f} s",
+            f"{beside:.1f} s, {whole.iterations} iterations",
+        ])  # fmt: skip
+    return Table(
+        "Optima with prices, beside runs of all candidates that begin there and that begin at the stated design",
+        ["candidates", "G", "all, from there", "KKT residual", "all, from the start", "rounds", "time", "time of all"],
+        rows,
+    )
+
+
+def grids() -> Table:
+    """Nested grids up to more than 1e8 candidates, each in a process of its own."""
+    rows = []
+    for torso, side in PLATES:
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM, str(torso), str(side)],
+            capture_output=True, text=True, check=True, cwd=Path(__file__).parents[1],
+        )  # fmt: skip
+        told = json.loads(done.stdout.splitlines()[-1])
+        rows.append([
+            f"{told['candidates']:,}", f"{told['G']:.6f}", str(told["rounds"]), str(told["members"]),
+            f"{told['pass']:.2f} s", f"{told['seconds']:.0f} s", f"{told['megabytes']:.0f} MB", f"{told['best']:.1e}",
+        ])  # fmt: skip
+    columns = ["candidates", "G", "rounds", "members", "one pass", "time", "memory", "one gains at most"]
+    return Table("Nested grids", columns, rows)
+
+
+def nested(torso: int, side: int) -> None:
+    """Optimise one plate and print what is told of it."""
+    import resource
+
+    began = time.perf_counter()
+    found = run_session(plate(torso, side))
+    seconds = time.perf_counter() - began
+    evaluator = Evaluator(found.case)
+    price(found.case, evaluator, found.alpha)
+    began = time.perf_counter()
+    price(found.case, evaluator, found.alpha)
+    assert found.pricing is not None
+    told = {
+        "candidates": found.pricing.candidates,
+        "G": found.objectives["G"],
+        "rounds": found.pricing.rounds,
+        "members": int(np.count_nonzero(found.alpha)),
+        "pass": time.perf_counter() - began,
+        "seconds": seconds,
+        "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e6,
+        "best": found.pricing.best,
+        "threads": os.environ.get("MDSTOPO_THREADS", ""),
+    }
+    print(json.dumps(told))

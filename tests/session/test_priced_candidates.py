@@ -1,0 +1,246 @@
+"""Candidates that are priced: the optimum of all of them, with few of them built; files, stops and refusals."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mdstopo.case import candidates
+from mdstopo.case.candidates import coincident, with_members
+from mdstopo.case.errors import CaseError
+from mdstopo.case.model import Case
+from mdstopo.case.reader import read_case
+from mdstopo.cli.group import run_group
+from mdstopo.engine import Evaluator
+from mdstopo.scene.refusals import refusals
+from mdstopo.session import pricing
+from mdstopo.session.outcome import Outcome
+from mdstopo.session.pricing_rounds import COLUMNS
+from mdstopo.session.run_session import run_session
+from mdstopo.status import RunStatus
+from mdstopo.store.result_reader import read_result
+from mdstopo.store.stored_case import case_of
+from tests.session.test_runs_and_files import assert_same_files, stop_after
+
+MOUNTS, FRAME = 16, 40
+
+
+def engine(candidates: str = "priced", **changes: Any) -> dict[str, Any]:
+    """An engine that is pushed and turned, on struts to a frame."""
+    times = np.linspace(0.0, 0.1, 9)
+    force = np.stack([times, 300 * np.sin(np.pi * times / 0.1), 200 * np.sin(0.5 * np.pi * times / 0.1)], axis=1)
+    moment = np.stack([times, 60 * np.sin(1.5 * np.pi * times / 0.1)], axis=1)
+    scene = {
+        "format": 1,
+        "time": {"end": 0.1},
+        "bodies": {"engine": {"mass": 10, "inertia": 0.5, "position": [0, 0]}},
+        "points": {
+            "mounts": {
+                "body": "engine",
+                "grid": {"rectangle": {"center": [0, 0], "size": [0.5, 0.5], "count": MOUNTS}},
+            },
+            "frame": {
+                "body": "ground",
+                "grid": {"rectangle": {"center": [0.1, 0.05], "size": [2, 1.6], "count": FRAME}},
+            },
+        },
+        "members": {
+            "struts": {
+                "from": "mounts", "to": "frame", "law": {"type": "spring", "stiffness": 2000},
+                "candidates": candidates,
+            },
+        },
+        "loads": [{"body": "engine", "force": {"table": force.tolist()}, "moment": {"table": moment.tolist()}}],
+        "design": {"initial": 0.1, "lower": 0, "upper": 1},
+        "objectives": {"G": {"response": "energy", "over_time": "max"}},
+        "constraints": [{"volume": "all", "limit": 40}],
+    }  # fmt: skip
+    return scene | changes
+
+
+def stiff(candidates: str = "priced") -> dict[str, Any]:
+    """The same on stiff struts, which it deforms slowly: one basin."""
+    scene = engine(candidates, objectives={"G": {"response": "energy", "over_time": "mean"}})
+    scene["members"]["struts"]["law"]["stiffness"] = 20000
+    return scene
+
+
+def case_from(scene: dict[str, Any]) -> Case:
+    return read_case(json.dumps(scene))
+
+
+@pytest.fixture
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs begin with some 40 of the 640 candidates, and a few enter at once."""
+    monkeypatch.setattr(candidates, "START_SET", 40)
+    monkeypatch.setattr(pricing, "MOST", 20)
+
+
+def by_points(outcome: Outcome) -> dict[tuple[int, int], float]:
+    (group,) = outcome.case.members
+    pairs = zip(group.from_index.tolist(), group.to_index.tolist(), strict=True)
+    return {pair: value for pair, value in zip(pairs, outcome.alpha.tolist(), strict=True) if value > 0.0}
+
+
+def test_the_optimum_is_that_of_all_candidates(few: None) -> None:
+    priced, whole = run_session(case_from(stiff())), run_session(case_from(stiff("enumerated")))
+    assert priced.status is whole.status is RunStatus.CONVERGED
+    assert priced.pricing is not None
+    assert priced.pricing.candidates == MOUNTS * FRAME == whole.case.n_design
+    assert priced.pricing.rounds > 1
+    assert priced.case.n_design < 200
+    assert abs(priced.objectives["G"] / whole.objectives["G"] - 1.0) <= 1e-6
+    assert priced.pricing.best <= 1e-6
+    assert "no one of 640 candidates would lower G by more than 1e-06 of it" in priced.reason
+    assert "to first order" in priced.reason
+    mine, theirs = by_points(priced), by_points(whole)
+    assert max(abs(mine.get(pair, 0.0) - theirs.get(pair, 0.0)) for pair in mine | theirs) < 0.02
+
+
+def test_no_round_ends_higher_and_members_leave(few: None, tmp_path: Path) -> None:
+    run_session(case_from(stiff()), path=tmp_path / "a.h5")
+    table = read_result(tmp_path / "a.h5").under("candidates/rounds")
+    assert set(table) == set(COLUMNS)
+    assert np.all(np.diff(table["objective"]) <= 1e-9 * table["objective"][0])
+    assert table["left"].sum() > 0
+    assert np.array_equal(np.diff(table["members"]), (table["entered"] - table["left"])[:-1])
+    assert np.all(table["best"][:-1] > 0)
+    assert table["best"][-1] <= 1e-6
+
+
+def test_gains_foretell_what_a_little_of_a_candidate_changes(few: None) -> None:
+    case = case_from(engine())
+    evaluator = Evaluator(case)
+    x = np.full(case.n_design, 0.25)
+    found = pricing.price(case, evaluator, x)
+    assert found is not None
+    i, j = (each[:1] for each in found.pairs["struts"])
+    (group,) = case.members
+    larger = with_members(case, {"struts": (np.append(group.from_index, i), np.append(group.to_index, j))})
+    alpha, step = np.append(x, 0.0), 1e-4
+    values = [Evaluator(larger).evaluate(alpha + step * k * (np.arange(len(alpha)) == len(x)), False).objectives["G"]
+              for k in (0, 1, 2)]  # fmt: skip
+    slope = (-1.5 * values[0] + 2.0 * values[1] - 0.5 * values[2]) / step
+    _, rows, linear = pricing._multipliers(evaluator.problem(), evaluator.problem().evaluate(x), x)
+    assert rows[0] == pytest.approx(1.0)
+    assert found.best * values[0] == pytest.approx(-(slope + linear[0]), rel=1e-6)
+
+
+def test_with_all_candidates_built_none_gains(few: None) -> None:
+    candidates.START_SET = 10**6
+    outcome = run_session(case_from(engine()))
+    assert outcome.case.n_design == MOUNTS * FRAME
+    assert outcome.pricing is not None
+    assert (outcome.pricing.rounds, outcome.pricing.best, outcome.pricing.together) == (1, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("first", [1, 20, 45])
+def test_a_stopped_run_resumes_to_the_bit(first: int, few: None, tmp_path: Path) -> None:
+    case = case_from(engine())
+    straight = run_session(case, path=tmp_path / "straight.h5")
+    assert straight.iterations > 45
+    stopped = run_session(case, path=tmp_path / "resumed.h5", stop_requested=stop_after(first))
+    assert stopped.status is RunStatus.INTERRUPTED
+    resumed = run_session(case, path=tmp_path / "resumed.h5", resume=True)
+    assert resumed.alpha.tobytes() == straight.alpha.tobytes()
+    assert resumed.reason == straight.reason
+    assert_same_files(tmp_path / "straight.h5", tmp_path / "resumed.h5")
+    again = run_session(case, path=tmp_path / "resumed.h5", resume=True)
+    assert again.pricing == straight.pricing
+    assert_same_files(tmp_path / "straight.h5", tmp_path / "resumed.h5")
+
+
+def test_the_file_holds_the_members_that_entered(few: None, tmp_path: Path) -> None:
+    outcome = run_session(case_from(engine()), path=tmp_path / "a.h5")
+    view = read_result(tmp_path / "a.h5")
+    case = case_of(view)
+    assert case.n_design == outcome.case.n_design == len(view.alpha) == len(view.array("members/p"))
+    assert np.array_equal(case.members[0].p_world, view.array("members/p"))
+    found = Evaluator(case).evaluate(view.alpha)
+    assert found.objectives["G"] == outcome.objectives["G"]
+    assert np.array_equal(view.array("sensitivities/G"), found.gradients["G"])
+
+
+def test_commands_take_the_file_of_a_run(few: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "e.json").write_text(json.dumps(engine()))
+    case, result = str(tmp_path / "e.json"), str(tmp_path / "e.h5")
+
+    def call(*words: str) -> str:
+        status, said = run_group(list(words)), capsys.readouterr()
+        assert status == 0, said.err
+        return said.out
+
+    assert "struts: 640 candidates, priced; 40 of them" in call("check", case)
+    assert re.search("candidates +640, [0-9]+ rounds", call("run", case, "--out", result))
+    assert "rounds" in call("show", result)
+    call("gradient", case, "--alpha", result, "--out", str(tmp_path / "g.h5"))
+    call("plot", result, "design", "--out", str(tmp_path / "d.svg"))
+    call("report", result, "--out", str(tmp_path / "r.html"))
+    call("finalize", result, "--threshold", "0.01", "--out", str(tmp_path / "f.yaml"))
+    told = json.loads(call("run", case, "--out", result, "--json", "--quiet"))
+    assert told["pricing"]["candidates"] == 640
+    assert told["pricing"]["best"] <= 1e-6
+
+
+REFUSED = [
+    ({"design": {"initial": 0.1}}, "design.lower", "found 0.001 for 'struts', allowed is 0"),
+    ({"design": {"lower": 0, "power": 2}}, "design.power", "found 2 for 'struts', allowed is 1"),
+    ({"design": {"lower": 0, "shared": ["struts"]}}, "members.struts.candidates", "design.shared"),
+    ({"optimizer": {"starts": 3}}, "members.struts.candidates", "one start, not 3"),
+    ({"solver": {"sensitivity": "direct"}}, "members.struts.candidates", "adjoint, not direct"),
+    ({"solver": {"settle": True}}, "members.struts.candidates", "not for static settling"),
+    (
+        {"objectives": {"G": {"response": "energy"}, "H": {"response": "energy", "over_time": "min"}},
+         "combine": {"weights": {"G": 1, "H": 1}}},
+        "members.struts.candidates", "several objectives",
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "key", "words"), REFUSED, ids=[words for _, _, words in REFUSED])
+def test_what_does_not_go_with_prices_is_refused(changes: dict[str, Any], key: str, words: str) -> None:
+    case = case_from(engine(**changes))
+    (mistake,) = refusals(case)
+    assert mistake.path_key == key
+    assert words in mistake.message
+    with pytest.raises(CaseError, match=words):
+        run_session(case)
+
+
+@pytest.mark.parametrize(
+    ("group", "words"),
+    [
+        ({"connect": "pairs"}, "members.struts.candidates: found priced, allowed with `connect: pairs`"),
+        ({"design": False}, "members.struts.candidates: found priced, allowed with `design: false`"),
+        ({"candidates": "listed"}, "members.struts.candidates: found the text 'listed'"),
+    ],
+)
+def test_groups_that_cannot_be_priced_are_mistakes(group: dict[str, Any], words: str) -> None:
+    scene = engine()
+    scene["members"]["struts"] |= group
+    with pytest.raises(CaseError, match="candidates") as told:
+        case_from(scene)
+    assert words in str(told.value)
+
+
+def test_a_share_of_candidates_that_are_priced_is_a_mistake() -> None:
+    with pytest.raises(CaseError, match="a share of all candidates of struts is not known"):
+        case_from(engine(constraints=[{"volume": "all", "fraction": 0.1}]))
+
+
+def test_a_start_set_suffices_for_what_is_to_be_spent() -> None:
+    case = case_from(engine(constraints=[{"volume": "all", "equals": 300}]))
+    assert case.constraints[0].coefficients.sum() >= 600
+
+
+def test_ends_that_meet_are_found_among_all_candidates() -> None:
+    rng = np.random.default_rng(3)
+    first, second = rng.uniform(-1, 1, (3000, 2)), rng.uniform(-1, 1, (2500, 2))
+    assert coincident(first, second, 1e-12) == (0, (0, 0))
+    second[1000], second[7] = first[2999] + 1e-14, first[2000]
+    assert coincident(first, second, 1e-12) == (2, (2000, 7))
+    lattice = np.stack(np.meshgrid(np.arange(50.0), np.arange(40.0)), axis=-1).reshape(-1, 2)
+    assert coincident(lattice, lattice, 1e-12) == (2000, (0, 0))
