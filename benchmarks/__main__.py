@@ -68,7 +68,12 @@ PAGES = {
     "fronts": "docs/performance.md",
 }
 #: the same of sections that `--pages` writes
-TOLD = {"bound": "docs/theory/bound.md", "priced": "docs/theory/pricing.md", "securing": "docs/applications/cargo.md"}
+TOLD = {
+    "fit": "docs/fitting.md",
+    "bound": "docs/theory/bound.md",
+    "priced": "docs/theory/pricing.md",
+    "securing": "docs/applications/cargo.md",
+}
 
 
 def main() -> int:

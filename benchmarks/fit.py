@@ -12,7 +12,7 @@ from mdstopo.bench.tables import Table, verdict
 from mdstopo.case.measurements import Measured
 from mdstopo.case.reader import read_case
 from mdstopo.fit.problem import FitProblem
-from mdstopo.fit.solve import COST, SLOPE, STEP, Minimum, fitted
+from mdstopo.fit.solve import COST, SLOPE, STEP, Minimum, fitted, minimum
 from mdstopo.fit.statistics import statistics
 
 Floats = NDArray[np.float64]
@@ -114,22 +114,28 @@ def fit() -> Iterator[Table]:
     counted, compared = [], []
     for scene in SCENES:
         problem, truth = _problem(scene)
-        rows, first, seconds, motions = _repeats(scene, problem, truth)
+        rows, first, seconds = _repeats(scene, problem, truth)
         counted += rows
-        compared.append(_beside(scene, first, seconds, motions))
+        compared.append(_beside(scene, first, seconds))
+    held = sum(int(row[3]) for row in counted)
+    share = f"{held} of {REPEATS * len(counted)}, {100.0 * held / (REPEATS * len(counted)):.1f} %"
     yield Table(
         f"How often intervals of 95 % hold the truth, of {REPEATS} fits",
         ("scene", "estimate", "truth", "held", f"{FEWEST} to {MOST}"),
         counted,
-        ("The same predictions with other noise each time.",),
+        (
+            f"The same predictions with other noise each time. Together {share}. Of counts of what happens in 95 % of "
+            "all cases a tenth are below 92 or above 98.",
+        ),
     )
     yield Table(
         "A fit beside SciPy's least_squares with differences",
         ("scene", "estimates", "motions", "with differences", "ratio", "minima differ by", "time of a fit"),
         compared,
         (
-            "Differences are forward ones, started at the same place, to the same tolerances. Minima differ by the "
-            "largest difference of any estimate, relative to it.",
+            "Both with the same deviations, from the same place, to the same tolerances; differences are forward ones. "
+            "Minima differ by the largest difference of any estimate, relative to it. The time is that of a whole fit, "
+            "with deviations that are estimated and statistics.",
         ),
     )
 
@@ -167,18 +173,17 @@ def _noisy(scene: Scene, problem: FitProblem, seed: int) -> FitProblem:
 
 def _repeats(
     scene: Scene, problem: FitProblem, truth: Floats
-) -> tuple[list[tuple[str, ...]], tuple[FitProblem, Minimum], float, int]:
-    """Rows of the first table; the first fit; seconds and motions of a fit."""
+) -> tuple[list[tuple[str, ...]], tuple[FitProblem, Minimum], float]:
+    """Rows of the first table; the first fit; seconds of a fit."""
     held = np.zeros(len(truth), dtype=np.int64)
     first = None
-    began, before = time.perf_counter(), problem.simulations
+    began = time.perf_counter()
     for seed in range(REPEATS):
         noisy = _noisy(scene, problem, seed)
         found = fitted(noisy, noisy.initial)
         told = statistics(noisy, found)
         held += (told.low <= truth) & (truth <= told.high)
         if first is None:
-            motions = noisy.simulations - before
             first = noisy, found
     seconds = (time.perf_counter() - began) / REPEATS
     assert first is not None
@@ -186,13 +191,16 @@ def _repeats(
         (scene.name, name, f"{value:g}", str(count), verdict(FEWEST <= count <= MOST))
         for name, value, count in zip(problem.names, truth.tolist(), held.tolist(), strict=True)
     ]
-    return rows, first, seconds, motions
+    return rows, first, seconds
 
 
-def _beside(scene: Scene, first: tuple[FitProblem, Minimum], seconds: float, motions: int) -> tuple[str, ...]:
+def _beside(scene: Scene, first: tuple[FitProblem, Minimum], seconds: float) -> tuple[str, ...]:
     """A row of the second table: the first fit again, with differences."""
     problem, found = first
     width = problem.upper - problem.lower
+    before = problem.simulations
+    own = minimum(problem, problem.initial, found.deviation)
+    motions = problem.simulations - before
     before = problem.simulations
 
     def residuals(u: Floats) -> Floats:
@@ -206,7 +214,7 @@ def _beside(scene: Scene, first: tuple[FitProblem, Minimum], seconds: float, mot
     )  # fmt: skip
     theirs = problem.simulations - before
     x = problem.lower + width * other.x
-    apart = float(np.max(np.abs(x - found.x) / np.abs(found.x)))
+    apart = float(np.max(np.abs(x - own.x) / np.abs(own.x)))
     return (
         scene.name, str(len(problem.names)), str(motions), str(theirs), f"{theirs / motions:.1f}", f"{apart:.1e}",
         f"{1e3 * seconds:.0f} ms",

@@ -149,6 +149,9 @@ def test_a_file_that_is_no_result_is_not_gone_on_with(folder: Path, capsys: pyte
         assert "own.json: " in capsys.readouterr().err
 
 
-def test_other_commands_take_a_case_with_a_fit(folder: Path) -> None:
+def test_other_commands_take_a_case_with_a_fit(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "fall.csv").unlink()
-    assert run_group(["check", "fall.yaml", "--quiet"]) == 0
+    assert run_group(["check", "fall.yaml"]) == 0
+    said = capsys.readouterr().out
+    assert "2 numbers to fit" in said
+    assert "displacement y of stone" in said
