@@ -85,6 +85,8 @@ class Rounds:
                level)  # fmt: skip
         small = WORTH_A_ROUND * tolerance * abs(state.best_objective)
         enough = count is None and found.best <= tolerance and (found.together <= tolerance or fallen <= small)
+        # a round that has not come to its optimum is followed by another
+        enough = enough and (state.status is RunStatus.CONVERGED or fallen <= small)
         falls = -np.diff([*(row[3] for row in self.rows[-PATIENCE:]), state.best_objective])
         in_vain = len(falls) >= PATIENCE and bool(np.all(falls <= small))
         self._ended = enough or not entered or in_vain or self.count + 1 >= MOST_ROUNDS

@@ -36,6 +36,20 @@ optimizer: {starts: 2, max_iterations: 1}
 """
 STAGED = VARIED.replace("  X: ", "#").replace("combine:", "#").replace("design: {", "design: {power: [1, 2], ")
 
+PRICED = """\
+format: 1
+time: {end: 0.1}
+bodies: {cart: {mass: 1, inertia: 1, position: [1, 0], velocity: [1, 0]}}
+points:
+  wall: {body: ground, grid: {line: {from: [0, -1], to: [0, 1], count: 3}}}
+  front: {body: cart, grid: {line: {from: [0.9, -0.1], to: [0.9, 0.1], count: 3}}}
+members: {ties: {from: wall, to: front, law: {type: spring, stiffness: 9}, candidates: priced}}
+design: {lower: 0}
+objectives: {E: {response: energy, over_time: mean}}
+constraints: [{volume: all, equals: 1}]
+optimizer: {max_iterations: 1}
+"""
+
 UNCERTAIN = """\
 uncertainty: {parameters: {bodies.cargo.mass: {normal: {deviation: 5}}}, sample: 4, validation: 30}
 """
@@ -66,6 +80,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
     (folder / "jointed.yaml").write_text(JOINTED, encoding="utf-8")
     (folder / "varied.yaml").write_text(VARIED, encoding="utf-8")
     (folder / "staged.yaml").write_text(STAGED, encoding="utf-8")
+    (folder / "priced.yaml").write_text(PRICED, encoding="utf-8")
     (folder / "turn.csv").write_text("0, 1\n1, 2\n", encoding="utf-8")
     for command in (
         "simulate jointed.yaml",
@@ -77,6 +92,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "pareto boat.yaml --points 3 --starts 1",
         "run varied.yaml",
         "run staged.yaml",
+        "run priced.yaml",
         "gradient varied.yaml --history --differences",
         "pareto varied.yaml --points 4 --starts 1",
         "sweep set varied.yaml members.spring.law.stiffness=8,9 optimizer.starts=1",
