@@ -71,6 +71,15 @@ LAWS = {
         {"stiffness": (200, 10, 1000), "force": (6, 1, 20), "gap": (-0.1, -0.3, 0.1), "free_length": (0.9, 0.5, 1)},
     ),
     "inerter": ("{type: inerter, inertance: 1.5}", {"inertance": (1.5, 0, 3)}),
+    "expression": (
+        '{type: expression, energy: "k*l0*log(l/l0)^2/2", damping: "c*xd/l", parameters: {k: 60, c: 2}}',
+        {"free_length": (0.8, 0.5, 1)},
+    ),
+    "formula": (  # "gap", but that its damping grows with l0
+        '{type: expression, force: "if(x < -g, k*(x + g) + c*l0*xd, 0)", energy: "k*min(x + g, 0)^2/2",'
+        " parameters: {k: 300, c: 4, g: 0.1}}",
+        {"k": (300, 10, 1000), "c": (4, 0, 9), "g": (0.1, 0, 0.3), "free_length": (0.9, 0.5, 1)},
+    ),
 }
 TIMES = {"active_from": (0.15, 0, 0.5), "active_until": (0.4, 0, 0.6)}
 TIMED = {
@@ -78,12 +87,13 @@ TIMED = {
     "gap": GAP.replace("gap: 0.1", "gap: 0.05, active_from: 0.15, active_until: 0.3"),
     "table": "{type: table, table: [[0, 10], [0.6, -20]], active_from: 0.15, active_until: 0.4}",
     "inerter": "{type: inerter, inertance: 1.5, active_from: 0.15, active_until: 0.4}",
+    "formula": '{type: expression, force: "90*x + 2*xd + 2*sin(9*t)", active_from: 0.15, active_until: 0.4}',
     # elastic, as a force that stands at its plateau does not feel when; beyond it: `test_crush`
     "crush": "{type: crush, stiffness: 300, force: 40, gap: 0.05, active_from: 0.15, active_until: 0.4}",
 }
 SLIDE = "joints: [{type: prismatic, bodies: [ground, m], at: [0, 0], axis: [0.8, 0.3]}]"
 #: laws that switch: generalized_alpha differentiates the time of that as the motion does, not as its steps do
-SWITCHING = {"gap", "clipped", "actuator", "crush", "drawn"}
+SWITCHING = {"gap", "clipped", "actuator", "crush", "drawn", "formula"}
 
 
 def scene_of(law, parameters, jointed=False, **solver):
