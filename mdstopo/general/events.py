@@ -127,6 +127,7 @@ def watch_near(model, segment, member_state, rel0, rel1, h, watched):
 def margin_of_member(model, k, i, member_state, r, h):
     """Margin of member i of block k, its change at its present rate within h (s), and whether no rate is in it.
 
+    model: the compiled scene.
     member_state (3, columns): state of the members: scale, mode, permanent set (`members`).
     r (POSE,): relative pose of its pair. The change is 0 where rates are in the margin.
     """
@@ -210,7 +211,13 @@ def first_dip(model, member_state, rel0, rel1, h, parts, watched):
 
 @part
 def margins_of_contact(model, j, mode, rel0, rel1, h):
-    """Margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin."""
+    """Margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin.
+
+    model: the compiled scene.
+    j, mode: the contact, and the mode that it is in.
+    rel0, rel1 (n_pair, POSE): relative poses.
+    h: a time (s).
+    """
     row = model.contact[j]
     p = model.contact_pair[j]
     height, rise, room, room_rate, end = contact_seen(model, j, rel0[p])
