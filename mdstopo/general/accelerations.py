@@ -462,7 +462,14 @@ def matrices_vjp(model, k, z, bar):
 
 @part
 def body_matrix_vjp(model, p, side, m, z, bar):
-    """bar (n,) -= M^T z, of M (2 D, 2 D) of pair p the part of one of its bodies alone: the other one is held."""
+    """bar (n,) -= M^T z, of M of a pair the part of one of its bodies alone: the other one is held.
+
+    model: the compiled scene.
+    p, side: the pair, and which of its bodies moves (0, 1).
+    m (2 D, 2 D): M.
+    z (n,): what is multiplied.
+    bar (n,): subtracted from.
+    """
     at = first_freedom(model, model.pair[p, side])
     own = freedoms(model) * side
     for j in range(freedoms(model)):

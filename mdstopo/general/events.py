@@ -223,7 +223,13 @@ def first_dip(model, t, member_state, rel0, rel1, h, parts, watched):
 
 @part
 def margins_of_contact(model, j, mode, rel0, rel1, h):
-    """Margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin."""
+    """Margin of contact j and its change at its rate within h (s), at both poses; whether no rate is in the margin.
+
+    model: the compiled scene.
+    j, mode: the contact, and the mode that it is in.
+    rel0, rel1 (n_pair, POSE): relative poses.
+    h: a time (s).
+    """
     row = model.contact[j]
     p = model.contact_pair[j]
     height, rise, room, room_rate, end = contact_seen(model, j, rel0[p])

@@ -12,6 +12,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel, part
 from mdstopo.general.accelerations import solve_accelerations
+from mdstopo.general.adjoint import at_stage
 from mdstopo.general.dense_output import evaluate_here, finished, go_to, time_at
 from mdstopo.general.extremes import (
     COLUMNS,
@@ -29,9 +30,9 @@ from mdstopo.general.extremes import (
     WHO,
 )
 from mdstopo.general.method_interface import is_continuous
-from mdstopo.general.model import unpack_general
-from mdstopo.general.responses import follows_state, kinked
-from mdstopo.general.step_history import EVENTS, SEGMENT, carve_history, copy_vector, restore_modes
+from mdstopo.general.model import KIND, ORDER, unpack_general
+from mdstopo.general.responses import follows_state, kinked, needs_accelerations
+from mdstopo.general.step_history import EVENTS, FIRST, SEGMENT, carve_history, copy_vector, restore_modes
 from mdstopo.integrators.steps import FORCES, OF_POINTS, OF_SAMPLES
 from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, quintic
 
@@ -49,6 +50,9 @@ RIPPLE_TIME, RIPPLE = 1e-3, 1e-9
 JUMP = 1e-9
 #: how often a bracket of a peak is narrowed at most
 TRIALS = 60
+#: in place of 1 where samples are left out at the ends of a step, too; stages of a step that say so, at least; and what
+#: they may be off by beside what they differ by, relative to the largest value
+LOW, MANY, APART = 2, 12, 0.02
 #: a change of the fraction at which a peak has settled: secants square it, or nearly
 SETTLED = 1e-8
 #: a step has no peak inside if its ends stay below the limit by so many times what it may rise by; or if it rises (or
@@ -70,10 +74,11 @@ def evaluate_exactly(tag, motion, j, k, c, who):
 
 
 @kernel
-def sample_ends(tag, motion, j, seen, accelerations):
-    """Evaluate a response at both ends of every step, on the step's own side.
+def sample_ends(tag, motion, j, plain, seen, accelerations):
+    """Evaluate a response at both ends of every step that is not LOW, on the step's own side.
 
     tag: the method of integration (`method_interface`). motion: the finished motion. j: the response.
+    plain (count,): which steps are LOW (`mark_low`).
     seen (count, SAMPLES, 3): the first and the last sample of each step are written.
     accelerations (count, 2, n): those at both ends of each step are written, NaN where the response needs no balance.
 
@@ -82,12 +87,16 @@ def sample_ends(tag, motion, j, seen, accelerations):
     history = motion.history
     shared = follows_state(tag, motion.model, j)
     for k in range(motion.count):
+        if plain[k] == LOW:
+            seen[k] = np.nan
+            continue
         restore_modes(history, history.index[k, EVENTS], motion.member_state)
         for e in range(2):
             if (
                 e == 0
                 and shared
                 and k > 0
+                and plain[k - 1] != LOW
                 and history.index[k, SEGMENT] == history.index[k - 1, SEGMENT]
                 and history.index[k, EVENTS] == history.index[k - 1, EVENTS]
             ):
@@ -166,6 +175,54 @@ def has_no_peak(h, left, right, sign, limit):
 
 
 @kernel
+def mark_low(motion, j, both, closeness, plain):
+    """Set `plain` to LOW for steps that are out of the question by what the response is at their stages.
+
+    These are at hand, and need no balance. They lie beside the motion by less than the response changes by within the
+    step; stages beyond the end of a step that ends at a switch are left out. Nothing is set where steps have few
+    stages, where these have no velocities of their own, and for responses that need no balance at the ends of steps.
+
+    motion: the finished motion. j: the response. both: whether peaks of -g are wanted, too.
+    closeness: how far below the highest a peak may be, relative to it.
+    plain (count,): zeros before.
+    """
+    model, history = motion.model, motion.history
+    if model.size[2] == 0 or (model.response[j, ORDER] == 0 and not needs_accelerations(model.response[j, KIND])):
+        return
+    most = np.empty(motion.count)
+    least = np.empty(motion.count)
+    top = -np.inf
+    bottom = np.inf
+    for k in range(motion.count):
+        o = history.index[k, FIRST]
+        stop = history.index[k + 1, FIRST]
+        most[k] = -np.inf
+        least[k] = np.inf
+        if stop - o < MANY:
+            return
+        restore_modes(history, history.index[k, EVENTS], motion.member_state)
+        for at in range(o, stop):
+            if history.when[at] > history.t[k + 1]:
+                continue
+            value, _ = at_stage(
+                model, motion.member_state, history.index[k, SEGMENT], history, at, j, -1, motion.workspace,
+                motion.bars, motion.row_bar,
+            )  # fmt: skip
+            if not np.isfinite(value):
+                return
+            most[k] = max(most[k], value)
+            least[k] = min(least[k], value)
+        top = max(top, most[k])
+        bottom = min(bottom, least[k])
+    size = max(abs(top), abs(bottom))
+    for k in range(motion.count):
+        change = most[k] - least[k] + APART * size
+        up = most[k] + change < top - closeness * abs(top)
+        down = not both or -least[k] + change < -bottom - closeness * abs(bottom)
+        plain[k] = LOW if up and down else 0
+
+
+@kernel
 def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
     """Sample a response on every step of a motion.
 
@@ -177,20 +234,26 @@ def sample_steps(tag, motion, j, both, fine, closeness, seen, plain):
       fine: whether no step is as long as a vibration, so that not all have to be sampled inside.
       closeness: how far below the highest a peak may be, relative to it.
     Out:
-      seen (count, SAMPLES, 3): values, rates, members; NaN inside steps that are plain.
-      plain (count,): 1 where the samples inside a step are left out.
+      seen (count, SAMPLES, 3): values, rates, members; NaN inside steps that are plain, and all over low ones.
+      plain (count,): 1 where the samples inside a step are left out, LOW where all of it is.
     """
     accelerations = np.empty((motion.count, 2, motion.v.shape[0]))
-    sample_ends(tag, motion, j, seen, accelerations)
+    # an absolute value or a norm turns round at its minima alone
+    sparing = fine and not (both and kinked(motion.model, j))
+    plain[:] = 0
+    if sparing:
+        mark_low(motion, j, both, closeness, plain)
+    sample_ends(tag, motion, j, plain, seen, accelerations)
     top = -np.inf
     low = np.inf
     for k in range(motion.count):
         for e in range(2):
-            top = max(top, seen[k, e * LAST, G])
-            low = min(low, seen[k, e * LAST, G])
-    # an absolute value or a norm turns round at its minima alone
-    sparing = fine and not (both and kinked(motion.model, j))
+            if plain[k] != LOW:
+                top = max(top, seen[k, e * LAST, G])
+                low = min(low, seen[k, e * LAST, G])
     for k in range(motion.count):
+        if plain[k] == LOW:
+            continue
         h = motion.history.t[k + 1] - motion.history.t[k]
         plain[k] = 0
         if sparing:
@@ -382,7 +445,7 @@ def moves_off(seen, plain, sign, size):
     first = sign * seen[0, 0, G]
     for w in range(seen.shape[0]):
         for i in range(SAMPLES):
-            if plain[w] != 0 and 0 < i < LAST:
+            if plain[w] == LOW or (plain[w] != 0 and 0 < i < LAST):
                 continue
             g = sign * seen[w, i, G]
             if abs(g - first) > ROUNDING * size:
@@ -407,19 +470,21 @@ def peaks_between(t, seen, plain, sign, limit, rows, found):
     steepest = 0.0
     for w in range(m):
         for i in range(SAMPLES):
-            if plain[w] == 0 or i == 0 or i == LAST:
+            if plain[w] == 0 or (plain[w] != LOW and (i == 0 or i == LAST)):
                 size = max(size, abs(seen[w, i, G]))
                 steepest = max(steepest, abs(seen[w, i, DG]))
     flat = FLAT * steepest
     behind = np.zeros(m + 1, np.int8)  # 1: the peak is on the side behind the boundary
     for b in range(m + 1):
-        left = sign * seen[b - 1, LAST, G] if b > 0 else -np.inf
-        d_left = sign * seen[b - 1, LAST, DG] if b > 0 else 1.0
-        right = sign * seen[b, 0, G] if b < m else -np.inf
-        d_right = sign * seen[b, 0, DG] if b < m else -1.0
+        before = b > 0 and plain[b - 1] != LOW
+        after = b < m and plain[b] != LOW
+        left = sign * seen[b - 1, LAST, G] if before else -np.inf
+        d_left = sign * seen[b - 1, LAST, DG] if before else 1.0
+        right = sign * seen[b, 0, G] if after else -np.inf
+        d_right = sign * seen[b, 0, DG] if after else -1.0
         if b == 0 and d_right == 0.0:
             d_right = moves_off(seen, plain, sign, size)
-        if 0 < b < m and d_left == 0.0 and d_right == 0.0:
+        if before and after and d_left == 0.0 and d_right == 0.0:
             # as where something sticks: what the samples beside it rise and fall by tells
             d_left = sign * seen[b - 1, 0 if plain[b - 1] != 0 else LAST - 1, DG]
             d_right = sign * seen[b, LAST if plain[b] != 0 else 1, DG]
@@ -429,13 +494,13 @@ def peaks_between(t, seen, plain, sign, limit, rows, found):
         level_right = d_left > flat and d_right <= flat
         level_left = d_right < -flat and d_left >= -flat
         from_left = (
-            b > 0
+            before
             and left >= limit
             and d_left > 0.0
             and (b == m or d_right <= 0.0 or level_right or (jump and right < left))
         )
         from_right = (
-            b < m
+            after
             and right >= limit
             and d_right < 0.0
             and (b == 0 or d_left >= 0.0 or level_left or (jump and left < right))
@@ -476,7 +541,7 @@ def search(tag, motion, j, who, pieces, t, seen, plain, sign, closeness, rows, f
     i = 0
     for k in range(seen.shape[0]):
         for s in range(SAMPLES):
-            if plain[k] == 0 or s == 0 or s == LAST:
+            if plain[k] == 0 or (plain[k] != LOW and (s == 0 or s == LAST)):
                 g = sign * seen[k, s, G]
                 if g > highest or (np.isnan(g) and not np.isnan(highest)):
                     highest = g
