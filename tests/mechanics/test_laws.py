@@ -10,7 +10,6 @@ import math
 from pathlib import Path
 from types import SimpleNamespace
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -36,6 +35,7 @@ from mdstopo.mechanics.laws import actuator, gap, table
 from mdstopo.mechanics.laws.table import CODES, PARAMETERS, parameters
 from mdstopo.mechanics.laws.table import breakpoints as law_breakpoints
 from mdstopo.scene.signals import breakpoints
+from tests.compiled import compiled
 
 ROOT = Path(__file__).resolve().parents[2]
 OPEN, CLOSED, CLIPPED = gap.OPEN, gap.CLOSED, gap.CLIPPED
@@ -55,47 +55,47 @@ many = settings(max_examples=60, deadline=None, derandomize=True)
 
 
 # Kernels have no Python wrapper: these are their callers.
-@numba.njit
+@compiled
 def _law(code, p, x, xd, mode, t, value, curves):
     return table.law(code, p, x, xd, mode, t, value, curves, REST)
 
 
-@numba.njit
+@compiled
 def _by_parameter(code, p, place, x, xd, mode, t, value, curves):
     return table.law_slopes(code, p, place, x, xd, mode, t, value, curves, REST)
 
 
-@numba.njit
+@compiled
 def _margin_by_parameter(code, p, place, x, xd, mode, curves):
     return table.law_margin_slope(code, p, place, x, xd, mode, TIME, curves, REST)
 
 
-@numba.njit
+@compiled
 def _margin(code, p, x, xd, mode, curves):
     return table.law_margin(code, p, x, xd, mode, TIME, curves, REST)
 
 
-@numba.njit
+@compiled
 def _slopes(code, p, x, xd, mode, curves):
     return table.law_margin_slopes(code, p, x, xd, mode, TIME, curves, REST)
 
 
-@numba.njit
+@compiled
 def _next(code, p, x, xd, xdd, mode, curves):
     return table.law_next(code, p, x, xd, xdd, mode, TIME, curves, REST)
 
 
-@numba.njit
+@compiled
 def _start(code, p, x, xd, xdd, curves):
     return table.law_start(code, p, x, xd, xdd, TIME, curves, REST)
 
 
-@numba.njit
+@compiled
 def _grazes(code, p, mode, curves):
     return table.law_grazes(code, p, 0.0, mode, TIME, curves, REST)
 
 
-@numba.njit
+@compiled
 def _switches(code, p, curves):
     return table.law_switches(code, p, curves)
 
