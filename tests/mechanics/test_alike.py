@@ -1,6 +1,5 @@
 """Springs that share a law, in vectors, against sums written with NumPy and differences of these."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -8,6 +7,7 @@ from mdstopo.compiler.kernel import numba as with_vectors
 from mdstopo.mechanics.kinematics.planar_poses import POSE
 from mdstopo.mechanics.laws import alike
 from mdstopo.mechanics.passes import SUMS
+from tests.compiled import compiled
 
 with_vectors()
 COUNT, START, STOP = 48, 16, 40
@@ -15,7 +15,7 @@ COUNT, START, STOP = 48, 16, 40
 LAWS = {"elastic": (3.0, 0.0, 0.0), "preloaded": (2.0, 0.0, -0.7), "damped": (1.5, 0.4, 0.3), "damper": (0.0, 0.8, 0.0)}
 
 
-@numba.njit
+@compiled
 def _sums(member, scale, start, stop, p, r, counted, o):
     rows = member.reshape(member.size)
     width = member.shape[1]
@@ -24,17 +24,17 @@ def _sums(member, scale, start, stop, p, r, counted, o):
     alike.alike_damping(rows, width, scale, start, stop, p, r, o)
 
 
-@numba.njit
+@compiled
 def _design(member, start, stop, p, r, u, weight, out):
     alike.alike_design(member.reshape(member.size), member.shape[1], start, stop, p, r, u, weight, out)
 
 
-@numba.njit
+@compiled
 def _designs(member, start, stop, k, rel, u, pair, out):
     alike.elastic_designs(member.reshape(member.size), member.shape[1], start, stop, k, rel, u, pair, out)
 
 
-@numba.njit
+@compiled
 def _far(member, before, after):
     return alike.far(member.reshape(member.size), member.shape[1], START, STOP, before, after)
 

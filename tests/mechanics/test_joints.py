@@ -6,7 +6,6 @@ those, so no kernel is tested against a kernel except where two of them must agr
 
 import dataclasses
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -17,6 +16,7 @@ from mdstopo.mechanics.joints import table
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.mechanics.joints.table import CODES, WIDTH, describe, kernels_of, parameters
 from mdstopo.scene.model import HOME
+from tests.compiled import compiled
 
 #: how many rows each has
 ROWS = {"revolute": 2, "prismatic": 2, "fixed": 3, "distance": 1}
@@ -31,7 +31,7 @@ many = settings(max_examples=25, deadline=None, derandomize=True)
 
 
 # Kernels have no Python wrapper: these are their callers.
-@numba.njit
+@compiled
 def turned(w, par):
     """The places of two bodies that are at w (6,); behind the parameters par there is where they are at home."""
     home = par[WIDTH:].reshape((2, HOME))
@@ -43,37 +43,37 @@ def turned(w, par):
     return places
 
 
-@numba.njit
+@compiled
 def _rows(code, par, w, phi, jac):
     table.joint_rows(code, par, turned(w, par), phi, jac)
 
 
-@numba.njit
+@compiled
 def _gamma(code, par, w, wd, gamma):
     table.joint_gamma(code, par, turned(w, par), wd, gamma)
 
 
-@numba.njit
+@compiled
 def _velocity_slope(code, par, w, wd, out):
     table.joint_velocity_slope(code, par, turned(w, par), wd, out)
 
 
-@numba.njit
+@compiled
 def _acceleration_slopes(code, par, w, wd, wdd, by_q, by_v):
     table.joint_acceleration_slopes(code, par, turned(w, par), wd, wdd, by_q, by_v)
 
 
-@numba.njit
+@compiled
 def _stiffness(code, par, w, lam, k):
     table.joint_stiffness(code, par, turned(w, par), lam, k)
 
 
-@numba.njit
+@compiled
 def _reaction(code, rows, par, w, lam, out):
     table.joint_reaction(code, rows, par, turned(w, par), lam, out)
 
 
-@numba.njit
+@compiled
 def _transmitted(code, par, w, lam, which, by_lam, by_q):
     return table.joint_transmitted(code, par, turned(w, par), lam, which, by_lam, by_q)
 

@@ -1,6 +1,5 @@
 """Kernels that go through a grid row by row: strengths, gradients, lengths, and a member without one."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -14,6 +13,7 @@ from mdstopo.mechanics.passes import SUMS, _scale_chunks, _unscale_chunks, membe
 from mdstopo.scene.grids import places_of
 from mdstopo.scene.model import EXCESS, L0, START, STIFFNESS, STOP, WIDTH, Springs
 from mdstopo.scene.packing import chunks_of
+from tests.compiled import compiled
 from tests.engine.scenes import read
 from tests.mechanics.test_grids import grids
 
@@ -21,23 +21,23 @@ GUARD = 16
 with_vectors()
 
 
-@numba.njit
+@compiled
 def _scaled(threads, chunk, block, power, member, alpha, strength):
     shared(_scale_chunks, threads, (np.zeros(1, np.int64), chunk, block, power, member, alpha, strength))
 
 
-@numba.njit
+@compiled
 def _unscaled(threads, chunk, block, power, alpha, padded, out):
     shared(_unscale_chunks, threads, (np.zeros(1, np.int64), chunk, block, power, alpha, padded, out))
 
 
-@numba.njit
+@compiled
 def _sums(block, member, near, strength, rel, sums):
     springs = Springs(block, member, np.zeros((0, 3), np.int64), 0, np.full((block.shape[0], 2), near))
     member_sums(springs, strength, rel, rel.shape[0], True, sums)
 
 
-@numba.njit
+@compiled
 def _shortest(px, py, qx, qy, width, r):
     whole = px.shape[0] // width * width
     return (

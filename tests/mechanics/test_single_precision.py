@@ -1,6 +1,5 @@
 """Sums in single precision: near the exact ones, and no result is worse for a first correction made with them."""
 
-import numba
 import numpy as np
 import pytest
 
@@ -12,13 +11,14 @@ from mdstopo.mechanics.single_precision import may_use_single_precision, single_
 from mdstopo.scene import compile as scenes
 from mdstopo.scene.grids import STRIDE
 from mdstopo.scene.model import STIFFNESS, Springs
+from tests.compiled import compiled
 from tests.engine.scenes import read
 from tests.mechanics.test_grids import grids
 
 with_vectors()
 
 
-@numba.njit
+@compiled
 def _sums(block, member, chunk, strength, rel, exact, single_precision):
     springs = Springs(block, member, chunk, 0, np.zeros((block.shape[0], 2)))
     member_sums(springs, strength, rel, rel.shape[0], True, exact)
