@@ -7,7 +7,6 @@ the entries: `unit-*.kept` the intermediate code, `apart-*.code` the machine cod
 
 import functools
 import hashlib
-import pickle
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -105,6 +104,8 @@ def _known(_folder: str) -> dict[str, Unit]:
 
 def keep(unit: Unit) -> None:
     """Keep a unit and all that it reaches, where that is possible."""
+    import pickle
+
     folder = cache_folder()
     known = _known(str(folder))
     for each in all_of([unit]):
@@ -116,6 +117,8 @@ def keep(unit: Unit) -> None:
 
 def kept(key: str) -> Unit:
     """A unit that was kept, with all that it reaches. Raises LookupError where something of it is missing."""
+    import pickle
+
     folder = cache_folder()
     known = _known(str(folder))
     if key not in known:
