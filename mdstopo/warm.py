@@ -50,7 +50,7 @@ def mark_compiled(integrator: str) -> None:
 
 def compiling(case: Case) -> str:
     """What is said before the kernels for such a case are compiled for the first time."""
-    how_long = "some two minutes" if beyond_springs(case) else "up to half a minute"
+    how_long = "about a minute" if beyond_springs(case) else "up to half a minute"
     return f"compiling the kernels, once for this version: {how_long}"
 
 

@@ -21,6 +21,8 @@ from mdstopo.case.shipped import names
 from mdstopo.cli.new import templates
 from mdstopo.compiler.store import MANIFEST, PROCESSORS, SETTINGS, digest_of_sources, layout
 
+#: small problems, one of each kind (`make gallery`)
+GALLERY = Path(__file__).resolve().parent.parent / "gallery"
 #: options that keep every run short
 SHORT = ("--set", "optimizer.max_iterations=1", "--overwrite", "--quiet")
 #: members of a scene whose kernels are those of many variables
@@ -29,7 +31,7 @@ MANY = ("--set", "points.torso_edge.grid.rectangle.count=200")
 
 def commands(folder: Path) -> list[list[str]]:
     """Commands that between them call every kernel that cases need: of each a list of words."""
-    found = [["run", name, *SHORT] for name in names()]
+    found = [["run", name, *SHORT] for name in (*names(), *map(str, sorted(GALLERY.glob("*.yaml"))))]
     for name in templates():
         found += [["new", name, "--template", name, "--quiet"], ["run", f"{name}.yaml", *SHORT]]
         found += [[verb, f"{name}.yaml", "--quiet"] for verb in ("check", "gradient")]

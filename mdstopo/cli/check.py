@@ -276,28 +276,43 @@ def _say_fit(output: Output, case: "Case") -> None:
     )
 
 
+def _frequency_rows(entry: dict[str, Any]) -> list[list[str]]:
+    """The table of the natural frequencies of one load case."""
+    rows = [["design", "omega, rad/s", "omega t1"]]
+    for design in ("initial", "lower"):
+        values = entry[design]
+        rows.append(
+            [
+                design,
+                ", ".join(number(value, 4) for value in values) or "none",
+                ", ".join(number(value * entry["duration"], 4) for value in values) or "-",
+            ]
+        )
+    return rows
+
+
+def _alike(found: list[dict[str, Any]]) -> list[tuple[dict[str, Any], list[str]]]:
+    """The first of the load cases with the same table and duration, with the names of all of them."""
+    groups: dict[str, tuple[dict[str, Any], list[str]]] = {}
+    for entry in found:
+        told = f"{number(entry['duration'])} {_frequency_rows(entry)}"
+        groups.setdefault(told, (entry, []))[1].append(entry["load_case"])
+    return list(groups.values())
+
+
 def _say_frequencies(output: Output, case: "Case", found: list[dict[str, Any]]) -> None:
     # on which side of the criterion a case stands is a question of stored energy alone
     from mdstopo.case.responses import kind_of
 
     energetic = {objective.load_case for objective in case.objectives if kind_of(objective.response).is_energy}
-    for entry in found:
+    for entry, names in _alike(found):
+        cases = "load case" if len(names) == 1 else "load cases"
         output.say(
-            f"natural frequencies at the start, load case {entry['load_case']}, "
+            f"natural frequencies at the start, {cases} {', '.join(names)}, "
             f"times the duration {number(entry['duration'])} s"
         )
-        rows = [["design", "omega, rad/s", "omega t1"]]
-        for design in ("initial", "lower"):
-            values = entry[design]
-            rows.append(
-                [
-                    design,
-                    ", ".join(number(value, 4) for value in values) or "none",
-                    ", ".join(number(value * entry["duration"], 4) for value in values) or "-",
-                ]
-            )
-        output.table(rows)
-        if entry["criterion"] is not None and entry["load_case"] in energetic:
+        output.table(_frequency_rows(entry))
+        if entry["criterion"] is not None and not energetic.isdisjoint(names):
             verdict = "> 4: more stiffness lowers the energy" if entry["criterion"] > 4.0 else "<= 4"
             output.say(f"  omega(initial) omega(lower bounds) t1^2 = {number(entry['criterion'], 4)} {verdict}")
             if entry["criterion"] <= 4.0:

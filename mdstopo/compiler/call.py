@@ -12,7 +12,8 @@ import llvmlite.binding as llvm
 import numpy as np
 
 from mdstopo.compiler.entry import DIMENSIONS, DTYPES, EXCUSE, LENGTHS, NUMBERS, PLAIN
-from mdstopo.compiler.store import CALL, PREPARED, Code
+from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder
+from mdstopo.compiler.units import Provided
 
 #: a call: status, 0 where all went well, of the block of numbers
 _CALL = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
@@ -28,6 +29,21 @@ def target() -> Any:
         with contextlib.suppress(RuntimeError):  # done by LLVM itself in later versions
             getattr(llvm, start)()
     return llvm.Target.from_default_triple()
+
+
+def _engine() -> Any:
+    """What holds machine code in memory; it owns its target machine, so each has one."""
+    return llvm.create_mcjit_compiler(llvm.parse_assembly(""), target().create_target_machine(jit=True))
+
+
+@functools.cache
+def _provided(_folder: str) -> Provided:
+    return Provided(_engine())
+
+
+def provide(code: Code) -> bool:
+    """Have all in memory that machine code calls by symbols; False where some of it is missing."""
+    return not code.needs or _provided(str(cache_folder())).provide(code.needs)
 
 
 @functools.cache
@@ -69,9 +85,7 @@ class Native:
     """An entry's machine code for one set of types of arguments."""
 
     def __init__(self, name: str, code: Code, types: str) -> None:
-        # an engine owns its target machine: each has one
-        machine = target().create_target_machine(jit=True)
-        self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+        self._engine = _engine()
         for part in (code.body, code.glue):
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(part))
         self._engine.finalize_object()

@@ -138,15 +138,19 @@ class Entry(Kernel):
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
             return None
         from mdstopo.compiler import store, tried
-        from mdstopo.compiler.call import Native, arrays_are_known
+        from mdstopo.compiler.call import Native, arrays_are_known, provide
 
         if not arrays_are_known():
             return None
         path = store.path_of(self.py_func.__module__, self.py_func.__qualname__, types)
         code = store.read(path)
-        if code is None:
+        if code is None or not provide(code):
             with store.alone(path), tried.interruptible():
-                code = store.read(path) or self._built(path, types)
+                code = store.read(path)
+                if code is None or not provide(code):
+                    code = self._built(path, types)
+                    if code is not None and not provide(code):
+                        return None
         return None if code is None else Native(self.py_func.__qualname__, code, types)
 
     def _built(self, path: Path, types: str) -> Code | None:

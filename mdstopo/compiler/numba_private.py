@@ -9,15 +9,16 @@ of functions inside entries, kernels chosen by types, threads, what Numba is spa
 needs, and an entry's machine code itself (`build`).
 """
 
+import contextlib
 import ctypes
 import functools
 import hashlib
 import inspect
 import os
 import pickle
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from types import CodeType
+from types import CodeType, MappingProxyType
 from typing import Any
 
 import numba
@@ -50,7 +51,7 @@ from numba.experimental.structref import _Utils as _Structure
 from numba.extending import lower_builtin
 from numba.np.arrayobj import fix_integer_index, load_item, store_item
 
-from mdstopo.compiler import threads
+from mdstopo.compiler import threads, units
 from mdstopo.compiler.entry import EXCUSE, LENGTHS, NUMBERS
 from mdstopo.compiler.numba_plain import numba_type
 from mdstopo.compiler.store import CALL, PREPARED, Code, cache_folder, read_checked, write_checked
@@ -425,16 +426,61 @@ if not _LEAN:
     _LEANER = {}
 
 # Libraries
-# What is kept of a function while an entry is compiled: its intermediate code, nothing else.
+# What is kept of a function while an entry is compiled: its intermediate code without that of what it calls (`units`).
 #
 # Numba makes machine code of every function, and optimises each with all that it calls. Here only entries are called
-# from outside, and an entry holds a copy of all that it calls. So a function inside gets no machine code, and one at
-# body level (`jit.kernel`) is optimised in its entry only: a quarter of the compile time is saved. A loop over members
-# is optimised by itself too, so that its vectors do not depend on who calls it. Loops of entries are not unrolled.
+# from outside. What an entry reaches is linked into it once, and a function at body level (`jit.kernel`) is optimised
+# there only. In entries for scenes with joints and other laws, long functions have machine code of their own, which all
+# these entries share. A loop over members is optimised by itself, so that its vectors do not depend on who calls it.
+# Loops of entries are not unrolled.
 
 
 class Optimised(JITCodeLibrary):
-    """Intermediate code of a function with all that it calls, optimised."""
+    """Intermediate code of a function with all that it calls, optimised.
+
+    split: long functions that it calls are left out, and called by their symbols (`units`).
+    """
+
+    split = False
+    #: the functions left out, by their symbols
+    apart: Mapping[str, units.Unit] = MappingProxyType({})
+    _unit: units.Unit | None = None
+    _symbol = ""
+    #: instructions of the function as written for LLVM, and whether whoever calls it is to hold it
+    _size = 0
+    _inlined = False
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Note what the function is, which stands first, and go on."""
+        if not self._symbol:
+            own = next(each for each in ir_module.functions if each.blocks)
+            self._symbol = own.name
+            self._size = sum(len(block.instructions) for block in own.blocks)
+            self._inlined = "alwaysinline" in own.attributes
+        super().add_ir_module(ir_module)
+
+    def finalize(self) -> None:
+        """Link in what it calls, once, and optimise it."""
+        self._raise_if_finalized()
+        self.apart = units.link(self._final_module, self._needs(), self.split)
+        self._optimize_final_module()
+        self._final_module.verify()
+        self._finalize_final_module()
+
+    def _needs(self) -> list[units.Unit]:
+        """What it calls."""
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        return [_unit_of(library) for library in self._linking_libraries]
+
+    @property
+    def unit(self) -> units.Unit:
+        """What is linked into others that call it."""
+        self._ensure_finalized()
+        if self._unit is None:
+            units.share(self._final_module, self._symbol)
+            self._unit = units.Unit(self._symbol, self._final_module.as_bitcode(), self.apart.values())
+        return self._unit
 
     def _finalize_final_module(self) -> None:
         # read back as from the disk: there it is in another order in memory, on which LLVM's choices may depend
@@ -444,8 +490,20 @@ class Optimised(JITCodeLibrary):
         """Have this module, to which nothing is added any more."""
         self._final_module = module
         self._finalize_dynamic_globals()
-        self._verify_declare_only_symbols()
         self._finalized = True
+
+    def take_unit(self, unit: units.Unit) -> None:
+        """Be a function that was kept."""
+        self._unit = unit
+        self._take(unit.module)
+
+    def _get_module_for_linking(self) -> Any:
+        """All of it, for libraries that are not ours."""
+        if self._shared_module is None:
+            self._shared_module = self.unit.module.clone()
+            units.link(self._shared_module, self.unit.needs, split=False)
+            self._shared_module.get_function(self.unit.symbol).linkage = "linkonce_odr"
+        return self._shared_module
 
     @property
     def codegen(self) -> Any:
@@ -455,17 +513,38 @@ class Optimised(JITCodeLibrary):
     def set_env(self, name: str, held: Any) -> None:
         """Do nothing: there are no Python objects here to be told of."""
 
-    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
-        """What the disk keeps; of these libraries that is no machine code."""
-        kept: tuple[str, str, bytes] = self.serialize_using_bitcode()
-        return kept
+    def serialize_using_object_code(self) -> tuple[str, str, str]:
+        """What the disk keeps of it: where the unit is."""
+        units.keep(self.unit)
+        return self.name, "unit", self.unit.key
 
 
 class Left(Optimised):
-    """The same, left to be optimised where it is called."""
+    """A function without what it calls, left to be optimised where it is linked in."""
 
-    def _optimize_final_module(self) -> None:
-        pass
+    def finalize(self) -> None:
+        """Make a unit of it."""
+        self._raise_if_finalized()
+        units.share(self._final_module, self._symbol)
+        is_long = units.is_long(self._size, self._symbol, self._inlined)
+        self.take_unit(units.Unit(self._symbol, self._final_module.as_bitcode(), self._needs(), is_long))
+
+    @property
+    def has_dynamic_globals(self) -> bool:
+        """Whether it, or anything that it calls, holds the address of something in this process."""
+        return bool(self._dynamic_globals) or any(each.has_dynamic_globals for each in self._linking_libraries)
+
+
+def _unit_of(library: Any) -> units.Unit:
+    """What is linked into others of a library, ours or Numba's."""
+    if isinstance(library, Optimised):
+        return library.unit
+    if not hasattr(library, "_mdstopo_unit"):
+        module = library._get_module_for_linking()
+        names = [each.name for each in module.functions if not each.is_declaration]
+        library._mdstopo_unit = units.Unit(" ".join(names), module.as_bitcode(), is_whole=True)
+    found: units.Unit = library._mdstopo_unit
+    return found
 
 
 class Rolled(Optimised):
@@ -493,6 +572,12 @@ class Rolled(Optimised):
         full = builder.getModulePassManager()
         full.add_refprune_pass()
         full.run(self._final_module, builder)
+
+
+class Split(Rolled):
+    """The same without the long functions that it calls."""
+
+    split = True
 
 
 #: functions that nothing tells from others but their place in memory, by the numbers in their symbols
@@ -548,7 +633,7 @@ def _compiler(library: type[Optimised]) -> type[Compiler]:
     return Lean
 
 
-_OPTIMISED, _LEFT, _ROLLED = map(_compiler, (Optimised, Left, Rolled))
+_OPTIMISED, _LEFT, _ROLLED, _SPLIT = map(_compiler, (Optimised, Left, Rolled, Split))
 
 
 def inner(function: Callable[..., Any], fastmath: frozenset[str], part: bool) -> Any:
@@ -560,7 +645,8 @@ def inner(function: Callable[..., Any], fastmath: frozenset[str], part: bool) ->
 
 def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
     """Numba's object for an entry, for `build`; its machine code is kept by `store`."""
-    return _made(function, _OPTIMISED if fastmath else _ROLLED, fastmath, False)
+    way = _SPLIT if function.__module__.startswith(units.SPLIT) else _ROLLED
+    return _made(function, _OPTIMISED if fastmath else way, fastmath, False)
 
 
 def wrapped(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
@@ -595,9 +681,9 @@ class _Reader:
     def codegen(self) -> "_Reader":
         return self
 
-    def unserialize_library(self, kept: tuple[str, str, bytes]) -> Optimised:
+    def unserialize_library(self, kept: tuple[str, str, str]) -> Optimised:
         library = Optimised(self._target.codegen(), kept[0])
-        library._take(llvm.parse_bitcode(kept[2]))
+        library.take_unit(units.kept(kept[2]))
         return library
 
 
@@ -1066,11 +1152,31 @@ def build(dispatcher: Any, letters: str) -> Code | None:
     Nothing where the code would need more of Numba's run time than is provided.
     """
     arguments = tuple(map(numba_type, letters.split()))
+    with _untold():
+        return _built(dispatcher, arguments, letters)
+
+
+@contextlib.contextmanager
+def _untold() -> Iterator[None]:
+    """Have nobody told of every call into LLVM, which takes a tenth of the time."""
+    told: list[Any] = getattr(getattr(llvm.ffi.lib, "_lock", None), "_cblist", [])
+    before = told[:]
+    told.clear()
+    try:
+        yield
+    finally:
+        told.extend(before)
+
+
+def _built(dispatcher: Any, arguments: tuple[Any, ...], letters: str) -> Code | None:
     dispatcher.compile(arguments)
     compiled = dispatcher.overloads[arguments]
     result = _result(compiled.signature.return_type)
     library = compiled.library
-    if result is None or _missing(library._final_module):
+    if result is None or _missing(library._final_module, library.apart):
+        return None
+    needs = _made_apart(library)
+    if needs is None:
         return None
     context = dispatcher.targetctx
     form = context.call_conv.get_function_type(compiled.signature.return_type, arguments)
@@ -1084,7 +1190,43 @@ def build(dispatcher: Any, letters: str) -> Code | None:
     checked = llvm.parse_assembly(str(module))
     checked.verify()
     machine = library._codegen._tm
-    return Code(machine.emit_object(library._final_module), machine.emit_object(checked), result)
+    return Code(machine.emit_object(library._final_module), machine.emit_object(checked), result, needs)
+
+
+def _made_apart(library: Any) -> tuple[str, ...] | None:
+    """Names of the files with the long functions that a library calls, which are compiled where there are none.
+
+    Nothing where one of them would need more of Numba's run time than is provided.
+    """
+    if not library.apart:
+        return ()
+
+    def runtime() -> Code:
+        module = llvm_ir.Module("mdstopo")
+        module.triple, module.data_layout = library._final_module.triple, library._final_module.data_layout
+        add_runtime(module)
+        return Code(library._codegen._tm.emit_object(llvm.parse_assembly(str(module))), b"", "")
+
+    def compiled(unit: units.Unit) -> Code | None:
+        made = Split(library._codegen, "apart")
+        made._final_module.link_in(unit.module, preserve=True)
+        made.apart = units.link(made._final_module, unit.needs, split=True)
+        made._optimize_final_module()
+        made._final_module.verify()
+        if _missing(made._final_module, made.apart):
+            return None
+        needs = _made_apart(made)
+        body = library._codegen._tm.emit_object(made._final_module)
+        return None if needs is None else Code(body, b"", unit.symbol, (units.RUNTIME, *needs))
+
+    units.made(units.RUNTIME, runtime)
+    names = []
+    for unit in library.apart.values():
+        name = units.name_of(unit)
+        if units.made(name, functools.partial(compiled, unit)) is None:
+            return None
+        names.append(name)
+    return tuple(names)
 
 
 def _result(kind: Any) -> str | None:
@@ -1098,10 +1240,11 @@ def _result(kind: Any) -> str | None:
     return letters.get(kind)
 
 
-def _missing(module: Any) -> list[str]:
-    """Functions that the code calls and that neither the process nor `runtime` has."""
+def _missing(module: Any, apart: Mapping[str, units.Unit]) -> list[str]:
+    """Functions that the code calls and that neither the process nor `runtime` has; apart: those it has elsewhere."""
     process = ctypes.CDLL(None)
     names = [f.name for f in module.functions if f.is_declaration and not f.name.startswith("llvm.")]
+    names = [name for name in names if name not in apart]
     return [name for name in names if name not in PROVIDED and not hasattr(process, name)]
 
 

@@ -32,7 +32,7 @@ PROCESSORS = {
 _COMPILER = ("numba", "llvmlite", "numpy")
 #: what decides for which processor, and how, kernels are compiled
 SETTINGS = ("NUMBA_OPT", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_ENABLE_AVX", "NUMBA_LOOP_VECTORIZE")
-_MAGIC = b"mdstopo code 3\n"
+_MAGIC = b"mdstopo code 4\n"
 #: folders of other sources and versions: how many are kept, and how long after their last use, in seconds
 _KEPT, _LASTING = 12, 30 * 86400.0
 _DAY = 86400.0
@@ -51,12 +51,14 @@ class Code(NamedTuple):
     """Machine code of an entry.
 
     body, glue: object files, of the entry and of the function that calls it. result: a letter for each number that it
-    returns (i integer, f float, b truth), in parentheses for a tuple, which is empty where it returns nothing.
+    returns (i integer, f float, b truth), in parentheses for a tuple, which is empty where it returns nothing. needs:
+    names of files with what it calls by symbols; such a file has no glue, and its symbol for a result (`units`).
     """
 
     body: bytes
     glue: bytes
     result: str
+    needs: tuple[str, ...] = ()
 
 
 @functools.cache
@@ -246,15 +248,15 @@ def read(path: Path) -> Code | None:
         return None
     start, _, rest = data.partition(b"\n")
     try:
-        size, result = json.loads(start)
-        return Code(rest[:size], rest[size:], result)
+        size, result, needs = json.loads(start)
+        return Code(rest[:size], rest[size:], result, tuple(needs))
     except (ValueError, TypeError):
         return None
 
 
 def write(path: Path, code: Code) -> None:
     """Keep code on the disk, whole or not at all. A disk that cannot be written to is no reason to stop."""
-    write_checked(path, json.dumps([len(code.body), code.result]).encode() + b"\n" + code.body + code.glue)
+    write_checked(path, json.dumps([len(code.body), code.result, code.needs]).encode() + b"\n" + code.body + code.glue)
 
 
 def read_shipped(name: str) -> bytes | None:

@@ -323,8 +323,7 @@ class GeneralDriver:
     def _peaks_of_steps(self, j: int, both: bool, count: int, window: float) -> int:
         """The highest peaks of response j, and where `both` are wanted of -g, into its rows; how many they are."""
         found: int = self.ready(
-            f"peaks_of_steps {j}", self.entry.peaks_of_steps, self.entry.TAG, self.ints, self.floats,
-            self.method.tables, self.limits, count, self.room, self.room_ints, self.member_state, j, both,
+            f"peaks_of_steps {j}", self.entry.peaks_of_steps, *self._looked_at(count), j, both,
             self.steps_are_fine, window, self._rows_of[j], self.work,
         )  # fmt: skip
         return found
@@ -361,8 +360,7 @@ class GeneralDriver:
         plain = np.zeros(len(seen), dtype=np.int64) if plain is None else plain
         rows = np.empty(((LAST + 2) * len(t), COLUMNS))
         found = self.entry.peaks_of_pieces(
-            self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count, self.room, self.room_ints,
-            self.member_state, j, who, pieces, t, seen, plain, sign, window, rows, self.work,
+            *self._looked_at(count), j, who, pieces, t, seen, plain, sign, window, rows, self.work,
         )  # fmt: skip
         return rows[:found].copy()
 
@@ -414,8 +412,7 @@ class GeneralDriver:
         places, q, out, lam, seen = self._one
         places[0] = place
         self.ready(
-            "sample_response", self.entry.sample_response, self.entry.TAG, self.ints, self.floats, self.method.tables,
-            self.limits, count, self.room, self.room_ints, self.member_state, True, True, j, who, places, q, out,
+            "sample_response", self.entry.sample_response, *self._looked_at(count), True, True, j, who, places, q, out,
             lam, seen, self.work,
         )  # fmt: skip
         found: FloatArray = seen[0]
@@ -451,6 +448,24 @@ class GeneralDriver:
         """Take a design (`take`) and put the start at rest where the case asks for it; False where that cannot be."""
         self.take(design)
         return self.start is None or self.start.move()
+
+    def compile_responses(self) -> None:
+        """Have the machine code on the disk that looks back at steps, without any steps.
+
+        A process that does so beside one that compiles the steps takes half of the work from it.
+        """
+        entry, kinds = self.entry, set(self.scene.reductions)
+        if kinds - INTEGRALS.keys():
+            self._row_gradients.compile()
+        if kinds & PEAKS.keys():
+            entry.peaks_of_steps.compile(*self._looked_at(0), 0, True, True, 0.0, self._rows_of[0], self.work)
+
+    def _looked_at(self, count: int) -> tuple[Any, ...]:
+        """What every entry that looks at the steps of the last run begins with."""
+        return (
+            self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count, self.room, self.room_ints,
+            self.member_state,
+        )  # fmt: skip
 
     def run(
         self, alpha: FloatArray, tangent: bool, quadrature_breakpoints: Sequence[float] = ()

@@ -1,6 +1,6 @@
 """From Python to `row_sweep`: the gradients of all rows that a driver has found, in one call."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -57,11 +57,7 @@ class RowGradients:
             for m, (j, _, aside, _, row) in enumerate(part):
                 block.which[m] = j, aside
                 block.rows[m] = row
-            driver.ready(
-                f"pull_rows {len(part)}", driver.entry.rows_vjp, *driver.steps_arguments(count), block.which,
-                block.rows, driver.room, driver.room_ints, driver.member_state, block.padded, block.out, block.starts,
-                driver.work,
-            )  # fmt: skip
+            driver.ready(f"pull_rows {len(part)}", driver.entry.rows_vjp, *self._arguments(count, block))
             for (j, r, aside, share, _), own, start in zip(part, block.out, block.starts, strict=True):
                 if driver.start is not None:
                     driver.start.vjp(start, own)
@@ -70,6 +66,18 @@ class RowGradients:
                 else:
                     flip = driver.rows[j, r, SIGN] if driver.scene.reductions[j] == "max_abs" else 1.0
                     driver.gradients[j, r] += flip * share * own
+
+    def compile(self) -> None:
+        """Have the machine code for it on the disk."""
+        self._driver.entry.rows_vjp.compile(*self._arguments(0, self._block(1)))
+
+    def _arguments(self, count: int, block: _Block) -> tuple[Any, ...]:
+        """What the compiled sweep takes."""
+        driver = self._driver
+        return (
+            *driver.steps_arguments(count), block.which, block.rows, driver.room, driver.room_ints,
+            driver.member_state, block.padded, block.out, block.starts, driver.work,
+        )  # fmt: skip
 
     def _block(self, count: int) -> _Block:
         """Arrays for so many rows at once; those of few rows are kept."""

@@ -152,6 +152,9 @@ class SceneDriver(Protocol):
     @property
     def room(self) -> FloatArray: ...
 
+    def compile_responses(self) -> None:
+        """Have the machine code on the disk that looks at steps, without any steps."""
+
     def evaluate(self, alpha: FloatArray, gradient: bool, rows: Rows = USUAL) -> ResponseResult:
         """Simulate a design and evaluate all responses, and on demand their gradients by the discrete adjoint."""
 

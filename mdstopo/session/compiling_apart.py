@@ -1,6 +1,8 @@
-"""Where kernels are not known to be cached, another process compiles them first: `compile_apart`.
+"""Where kernels are not known to be cached, other processes compile them first: `compile_apart`.
 
-Why it is not this one, `starts.getting_ready` tells. The other process is this module run as a program.
+Why it is not this one, `starts.getting_ready` tells. Another process is this module run as a program: alone it compiles
+all that the case needs; with the word `back` what the optimiser needs and what looks back at steps that were made. For
+scenes with joints and other laws both run side by side, and what the one has compiled the other finds on the disk.
 """
 
 import contextlib
@@ -26,6 +28,8 @@ from mdstopo.starts.evaluator_interface import even, problem_of
 from mdstopo.starts.getting_ready import FEW, get_ready, meet
 from mdstopo.warm import compiling, tiny
 
+#: the word that has a process compile what looks back
+BACK = "back"
 #: candidates that are priced to have the kernels compiled
 FEW_CANDIDATES = 1000
 
@@ -44,29 +48,41 @@ def compile_apart(case: Case, notify: Callable[[str], None]) -> None:
     if not writable:
         notify(f"{marker.parent} cannot be written: kernels are compiled anew in every run, which is slow")
         return
-    # What it complains of, this process will find as well, and say better.
+    # What they complain of, this process will find as well, and say better.
     with contextlib.suppress(OSError):  # no process can be started, or it has ended
-        _compile_in_child(pickle.dumps(case))
+        _compile_in_children(pickle.dumps(case), [[], [BACK]] if beyond_springs(case) else [[]])
 
 
-def _compile_in_child(message: bytes) -> None:
-    """Have a process of its own compile; it ends with this one, however that ends, as its input is then closed."""
-    child = subprocess.Popen(
-        command("mdstopo.session.compiling_apart"),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    assert child.stdin is not None
+def _compile_in_children(message: bytes, each: list[list[str]]) -> None:
+    """Have processes compile, one with each of the words; they end with this one, however that ends, as their input is
+    then closed."""
+    children: list[subprocess.Popen[bytes]] = []
     try:
-        child.stdin.write(message)
-        child.stdin.flush()
-        child.wait()
+        for words in each:
+            child = subprocess.Popen(
+                command("mdstopo.session.compiling_apart", *words),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+            children.append(child)
+            assert child.stdin is not None
+            child.stdin.write(message)
+            child.stdin.flush()
+        for child in children:
+            child.wait()
     finally:
-        child.kill()
-        child.wait()
-        with contextlib.suppress(OSError):
-            child.stdin.close()
+        for child in children:
+            _end(child)
+
+
+def _end(child: subprocess.Popen[bytes]) -> None:
+    """End a process, and close our end of its input."""
+    assert child.stdin is not None
+    child.kill()
+    child.wait()
+    with contextlib.suppress(OSError):
+        child.stdin.close()
 
 
 def compile_share() -> None:
@@ -88,6 +104,22 @@ def _main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides, and ends this process with itself
     case: Case = pickle.load(sys.stdin.buffer)
     end_with_parent(sys.stdin.buffer)
+    if BACK in sys.argv[1:]:
+        _compile_back(case)
+    else:
+        _compile_all(case)
+    gc.freeze()  # it would be looked through at the end as well
+
+
+def _compile_back(case: Case) -> None:
+    """Compile the optimiser, and what looks back at steps."""
+    meet(case, FEW)
+    engine = evaluator_of(case, beside=False)
+    engine.driver(next(iter(engine.scenes))).compile_responses()
+
+
+def _compile_all(case: Case) -> None:
+    """Compile what the case needs, and note that it is there."""
     many = case.space.size >= MANY
     engine = evaluator_of(case, share=["mdstopo.session.compiling_apart"] if many else [])
     if many:
@@ -99,7 +131,6 @@ def _main() -> None:
         price(case, engine, begin, FEW_CANDIDATES)
     with contextlib.suppress(OSError):  # a full disk
         _marker(case).touch()
-    gc.freeze()  # it would be looked through at the end as well
 
 
 if __name__ == "__main__":

@@ -1,14 +1,17 @@
 """The quantities that `check` and `gradient` derive."""
 
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from mdstopo.case.reader import read_case
+from mdstopo.cli.check import _say_frequencies
 from mdstopo.cli.check_numbers import depths, frequencies, material, totals
 from mdstopo.cli.gradient_numbers import chosen_members, differences, disagreement
+from mdstopo.cli.output import Output
 
 Floats = NDArray[np.float64]
 
@@ -130,3 +133,32 @@ contacts:
     floor, ceiling = depths(case)
     assert floor == pytest.approx([0.1, -0.9, -np.inf])
     assert ceiling == pytest.approx([-0.3, 0.7, -np.inf])
+
+
+class Listener:
+    """Takes down what is said."""
+
+    def __init__(self) -> None:
+        self.said: list[str] = []
+        self.tables: list[list[list[str]]] = []
+
+    def say(self, text: str = "") -> None:
+        self.said.append(text)
+
+    def table(self, rows: list[list[str]]) -> None:
+        self.tables.append(rows)
+
+
+def test_load_cases_with_the_same_frequencies_and_duration_are_said_once() -> None:
+    def entry(name: str, duration: float, initial: float) -> dict[str, Any]:
+        return {"load_case": name, "duration": duration, "initial": [initial], "lower": [1.0], "criterion": None}
+
+    heard = Listener()
+    found = [entry("front", 1.0, 2.0), entry("side", 1.0, 2.0), entry("stiff", 1.0, 3.0), entry("long", 2.0, 2.0)]
+    _say_frequencies(cast(Output, heard), read_case(CASE), found)
+    assert [text.removeprefix("natural frequencies at the start, ") for text in heard.said] == [
+        "load cases front, side, times the duration 1 s",
+        "load case stiff, times the duration 1 s",
+        "load case long, times the duration 2 s",
+    ]
+    assert [table[1] for table in heard.tables] == [["initial", "2", "2"], ["initial", "3", "3"], ["initial", "2", "4"]]

@@ -1,0 +1,43 @@
+"""What a second process compiles beside the first is what an evaluation then calls."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mdstopo.case.reader import read_case
+from mdstopo.compiler.entry import Entry, types_of
+from mdstopo.engine import Evaluator
+
+CASE = """
+format: 1
+gravity: [0, -9.8]
+time: {end: 0.1}
+bodies: {rod: {mass: 1, inertia: 0.1, position: [0.5, 0]}}
+joints:
+  - {type: revolute, bodies: [ground, rod], at: [0, 0]}
+members:
+  spring: {from: {body: ground, at: [1, 1]}, to: {body: rod, at: [1, 0]}, law: {type: spring, stiffness: 50}}
+objectives:
+  tip: {response: {displacement: {body: rod, component: y}}, over_time: max_abs}
+"""
+
+
+def test_it_is_what_an_evaluation_calls(monkeypatch: pytest.MonkeyPatch) -> None:
+    engine = Evaluator(read_case(CASE))
+    driver = engine.driver("default")
+    looked_for = Entry._for
+    asked: list[tuple[str, str | None]] = []
+
+    def noted(entry: Entry, arguments: tuple[Any, ...]) -> Any:
+        asked.append((entry.py_func.__name__, types_of(arguments)))
+        return looked_for(entry, arguments) if evaluating else None
+
+    monkeypatch.setattr(Entry, "_for", noted)
+    evaluating = False
+    driver.compile_responses()
+    compiled, asked[:] = set(asked), []
+    assert {name for name, _ in compiled} == {"rows_vjp", "peaks_of_steps"}
+    evaluating = True
+    assert np.all(np.isfinite(engine.evaluate(engine.case.start, gradient=True).gradients["tip"]))
+    assert compiled <= set(asked)
