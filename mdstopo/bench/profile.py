@@ -3,7 +3,8 @@
 Force sums are counted by the engine (`integrators.steps`). Times are those of whole calls into compiled code; what is
 left of an evaluation is Python's. The motion is computed without tangents, too, and one balance (a force sum, with the
 solution for accelerations and multipliers) is timed at the ends of the steps: so the motion falls into balances,
-tangents, and the rest, which is choosing steps and finding and meeting switches.
+tangents, and the rest, which is choosing steps and finding and meeting switches. All times are processor time, so
+that other programs on the machine do not count.
 """
 
 import time
@@ -58,14 +59,14 @@ class Clock:
 
         @wraps(call)
         def timed(*arguments: Any) -> Any:
-            began = time.perf_counter()
+            began = time.process_time()
             self._depth += 1
             try:
                 return call(*arguments)
             finally:
                 self._depth -= 1
                 if self._depth == 0:
-                    self.seconds[name] += time.perf_counter() - began
+                    self.seconds[name] += time.process_time() - began
 
         return timed
 
@@ -128,9 +129,9 @@ def _timed(clock: Clock, call: Callable[[], object]) -> tuple[float, dict[str, f
     best, phases = np.inf, {}
     for _ in range(ROUNDS):
         clock.restart()
-        began = time.perf_counter()
+        began = time.process_time()
         call()
-        whole = 1e3 * (time.perf_counter() - began)
+        whole = 1e3 * (time.process_time() - began)
         own: dict[str, float] = defaultdict(float)
         for name, seconds in clock.seconds.items():
             own[PHASES.get(name, name)] += 1e3 * seconds
@@ -174,5 +175,7 @@ def _time_table(case: Case, whole: float, phases: dict[str, float], bare: float,
     parts["Python"] = max(whole - motion - sum(phases.values()), 0.0)
     parts["all"] = whole
     rows = [[text, significant(each), f"{each / whole:.0%}"] for text, each in parts.items()]
-    notes = (f"The fastest of {ROUNDS} evaluations with gradient; tangents are for the reverse sweeps.",)
+    notes = (
+        f"Processor time of the fastest of {ROUNDS} evaluations with gradient; tangents are for the reverse sweeps.",
+    )
     return Table(f"Time, {case.name}", ("part", "ms", "share"), rows, notes)
