@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mdstopo.case.model import JOINTS, DistanceJoint, FixedJoint, PrismaticJoint, RevoluteJoint
+from mdstopo.compiler.jit import kernel
 from mdstopo.mechanics.joints import table
 from mdstopo.mechanics.joints.revolute import PLACES, place_joint
 from mdstopo.mechanics.joints.table import CODES, WIDTH, describe, kernels_of, parameters
@@ -30,8 +31,7 @@ seeds = st.integers(0, 2**32 - 1)
 many = settings(max_examples=25, deadline=None, derandomize=True)
 
 
-# Kernels have no Python wrapper: these are their callers.
-@compiled
+@kernel
 def turned(w, par):
     """The places of two bodies that are at w (6,); behind the parameters par there is where they are at home."""
     home = par[WIDTH:].reshape((2, HOME))
@@ -43,6 +43,7 @@ def turned(w, par):
     return places
 
 
+# Kernels have no Python wrapper: these are their callers.
 @compiled
 def _rows(code, par, w, phi, jac):
     table.joint_rows(code, par, turned(w, par), phi, jac)
