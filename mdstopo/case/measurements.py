@@ -114,12 +114,12 @@ def _outside(case: Case, series: Series, t: FloatArray, lines: IndexArray) -> It
     if len(wrong):
         allowed = f"{number_text(first)} to {number_text(last)}"
         why = f"the motion of load case {series.load_case} is from {number_text(window.start)} to "
-        why += number_text(window.end)
+        why += f"{number_text(window.end)} s"
         if series.delay.upper != 0.0 or series.delay.lower != 0.0:
-            why += ", less the delay"
+            why += ", and what is recorded is later by the delay"
         more = f", and {len(wrong) - 1} more such times" if len(wrong) > 1 else ""
         at = f"{series.file}, line {lines[wrong[0]]}"
-        message = f"{at}: found the time {number_text(float(t[wrong[0]]))}{more}, allowed is {allowed} s: {why} s"
+        message = f"{at}: found the time {number_text(float(t[wrong[0]]))}{more}, allowed is {allowed} s: {why}"
         yield "time", f"{message}; `from` and `to` choose a part"
 
 
@@ -150,11 +150,11 @@ def _place(column: Column, table: _Table) -> int | str:
     if isinstance(column, int):
         if column < width:
             return column
-        return f"found the place {column}, the file has {width} columns, from 0"
+        return f"found the column number {column}, the file has {width} columns, numbered from 0"
     if column in table.names:
         return table.names.index(column)
     if not table.names:
-        return f"found the column {shown(column)}, the file has no header line: state the place of a column, from 0"
+        return f"found the column {shown(column)}, the file has no header line: state the number of the column, from 0"
     hint = did_you_mean(column, table.names)
     return f"found the column {shown(column)}{hint or ','} the file has {listed(table.names)}"
 

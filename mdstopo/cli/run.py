@@ -248,8 +248,9 @@ def _material(outcome: "Outcome") -> list[tuple[str, str]]:
         lines.append(("members", f"{full} present, {grey} grey, {gone} absent of {case.n_design}"))
     if outcome.pricing is not None:
         rounds = f"{outcome.pricing.rounds} round{'s' if outcome.pricing.rounds != 1 else ''}"
-        gain = f"one gains {number(outcome.pricing.best, 2)} at most, all {number(outcome.pricing.together, 2)}"
-        lines.append(("candidates", f"{count_text(outcome.pricing.candidates)}, {rounds}; to first order {gain}"))
+        best, together = number(outcome.pricing.best, 2), number(outcome.pricing.together, 2)
+        gain = f"gain to first order, relative: {best} by the best one, {together} by all at most"
+        lines.append(("candidates", f"{count_text(outcome.pricing.candidates)}, {rounds}; {gain}"))
     lines += [(each.name, f"{values_text(outcome.variables[each.name])} {each.unit}") for each in case.variables]
     return lines
 

@@ -25,6 +25,13 @@ TURNS, SETTLED = 40, 1e-6
 LEAST_DEVIATION = 1e-12
 #: how many standard deviations the median of magnitudes is, of normal residuals
 MEDIAN = 0.6744897501960817
+#: why SciPy's least_squares has ended, by its status
+REASONS = {
+    1: "the slope of the sum of squares is zero to rounding",
+    2: "the sum of squares changes no more",
+    3: "the estimates change no more",
+    4: "neither the sum of squares nor the estimates change any more",
+}
 
 
 class StoppedError(Exception):
@@ -172,7 +179,7 @@ def minimum(
         slopes = np.full((problem.count, len(start)), np.nan)
         return Minimum(start, nan, slopes, deviation, np.inf, np.inf, "failed", str(error), evaluations)
     status = "max_iterations" if found.status == 0 else "converged"
-    reason = f"{MOST} evaluations" if found.status == 0 else found.message.strip("`. ").replace("`", "")
+    reason = REASONS.get(found.status, found.message)
     return _at(problem, whole(found.x), deviation, status, reason, evaluations)
 
 

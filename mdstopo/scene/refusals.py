@@ -65,17 +65,24 @@ def _unpriced(case: Case, group: MemberGroup) -> Iterator[tuple[str, str]]:
         yield (
             "design.power",
             f"found {number_text(group.power)} for {name!r}, allowed is 1 where candidates are priced: "
-            "with another power the first order says nothing at alpha = 0",
+            "with another power the slope at alpha = 0 is zero or infinite",
         )
     if not len(group):
-        yield f"members.{name}", "the filters leave no member of a coarse subset of the points, with which a run begins"
+        yield (
+            f"members.{name}",
+            "no candidate of a coarse subset of the points, with which a run begins, is within the stated lengths",
+        )
     where = f"members.{name}.candidates"
     for key in ("shared", "mirrored", "variables"):
         if getattr(case, key):
             yield where, f"priced does not go with design.{key}"
     beyond = beyond_springs(case)
     if beyond and not case.variables:
-        yield where, f"priced is for springs between free bodies in the plane, looked at by energy, not for {beyond}"
+        yield (
+            where,
+            "priced is for springs between free bodies in the plane with an objective of stored energy, "
+            f"not for {beyond}",
+        )
     if case.uncertainty is not None:
         yield where, "priced does not go with uncertain values"
     if case.solver.sensitivity not in ("auto", "adjoint"):

@@ -105,7 +105,7 @@ def test_a_table_is_read_with_its_columns_scales_and_window(folder: Path) -> Non
         ("t,y\n0,0\n", {"value": "z"}, "height.value: found the column 'z', the file has t, y (height.csv)"),
         ("t,height\n0,0\n", {"value": "heigt"}, "did you mean 'height'?"),
         ("0,0\n0.1,1\n", {"value": "y"}, "the file has no header line"),
-        ("0,0\n0.1,1\n", {"value": 2}, "found the place 2, the file has 2 columns, from 0"),
+        ("0,0\n0.1,1\n", {"value": 2}, "found the column number 2, the file has 2 columns, numbered from 0"),
         ("t,y\n0,0\n0.1,nan\n", {}, "line 3: found 'nan', allowed is a finite number (column y)"),
         ("t,y\n0,0\n0.1,\n", {}, "line 3: found nothing, allowed is a finite number (column y)"),
         ("t,y\n0,0\n0.1,x\n", {}, "line 3: found 'x', allowed is a finite number (column y)"),

@@ -79,7 +79,7 @@ class Parameters(Value):
             good = good and not why and values[word] is not BAD
             reading.declare("law parameter", word)
         if len(values) > MOST_PARAMETERS:
-            reading.mistake(path, f"found {len(values)} parameters, allowed are {MOST_PARAMETERS}", node)
+            reading.mistake(path, f"found {len(values)} parameters, allowed are {MOST_PARAMETERS} at most", node)
             good = False
         return values if good else BAD
 
@@ -98,7 +98,7 @@ def _why_not(word: str) -> str:
     if word in MOTION or reserved(word):
         return f"the name {word!r} is taken: it means something in every formula of a law"
     if hasattr(OfFormulas, word) or word.startswith("__"):
-        return f"the name {word!r} is taken: a law has a key or a property of that name"
+        return f"the name {word!r} is used by the program, choose another"
     return ""
 
 
@@ -164,10 +164,13 @@ class OfFormulas(Law):
         try:
             operations = self.program.operations
         except TooManySwitchesError:
-            return f"found more kinks and jumps than allowed, which are {MOST_SWITCHES}"
+            which = "abs, min, max, clip, sign, step, if"
+            return f"found more kinks and jumps ({which}) than allowed, which are {MOST_SWITCHES}"
         if operations <= MOST_OPERATIONS:
             return ""
-        return f"found {operations} operations in the formulas with all derivatives, allowed are {MOST_OPERATIONS}"
+        return (
+            f"found {operations} operations in the formulas with all derivatives, allowed are {MOST_OPERATIONS} at most"
+        )
 
     @property
     def depends_on_rate(self) -> bool:
@@ -229,7 +232,7 @@ class ExpressionLaw(OfFormulas):
         parameters = values.pop("parameters") or {}
         good = True
         if values["force"] is None and values["energy"] is None:
-            reading.mistake(fields.path, "found neither, needed is at least one of force, energy")
+            reading.mistake(fields.path, "found neither 'force' nor 'energy', needed is one of them, or both")
             good = False
         if values["damping"] is not None and (values["force"] is not None or values["energy"] is None):
             why = "goes with `energy` alone; a force has its damping in it"
