@@ -7,6 +7,7 @@ the entries: `unit-*.kept` the intermediate code, `apart-*.code` the machine cod
 
 import functools
 import hashlib
+import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -184,9 +185,14 @@ class Provided:
     def __init__(self, engine: Any) -> None:
         self._engine = engine
         self._names: set[str] = set()
+        self._lock = threading.Lock()  # an engine takes all of what it then finalises from one thread
 
     def provide(self, names: Iterable[str]) -> bool:
         """Have what lies in files of these names in memory, with all that it needs; False where some is missing."""
+        with self._lock:
+            return self._provide(names)
+
+    def _provide(self, names: Iterable[str]) -> bool:
         codes: dict[str, Code] = {}
         waiting = list(names)
         while waiting:

@@ -92,7 +92,7 @@ def run_fit(
             keep()
         _look(run)
         keep()
-        for name in _unprofiled(run) if points else ():
+        for name in _unprofiled(run, points) if points else ():
             _profile(run, name, points, stop)
             keep()
         assert run.starts
@@ -123,12 +123,13 @@ def _profile(run: FitRun, name: str, points: int, stop: Callable[[], bool]) -> N
     run.profiles[name] = profile(problem, run.found, run.told, problem.names.index(name), points, stop)
 
 
-def _unprofiled(run: FitRun) -> list[str]:
-    """Estimates that have a profile and do not have it yet."""
+def _unprofiled(run: FitRun, points: int) -> list[str]:
+    """Estimates that have a profile and do not have one of so many points on each side yet."""
     if run.told is None:
         return []
     known = np.isfinite(run.told.deviation)
-    return [name for name, has in zip(run.problem.names, known, strict=True) if has and name not in run.profiles]
+    done = {name for name, each in run.profiles.items() if len(each.values) == 2 * points + 1}
+    return [name for name, has in zip(run.problem.names, known, strict=True) if has and name not in done]
 
 
 def restored(problem: FitProblem, content: Mapping[str, Any]) -> FitRun:

@@ -94,7 +94,9 @@ def fitted(
     for _ in range(TURNS):
         found = minimum(problem, x, deviation, stop=stop, precision=cost)
         evaluations += found.evaluations
-        if not unknown or found.status == "failed":
+        if found.status == "failed":
+            return replace(found, evaluations=evaluations)
+        if not unknown:
             break
         before = deviation.copy()
         for s in unknown:
@@ -167,9 +169,10 @@ def minimum(
         out: FloatArray = problem.slopes(whole(u))[:, free] * width / deviation[:, None]
         return out
 
-    if not len(free):
-        return _at(problem, start, deviation, "converged", "nothing is free", 0)
     try:
+        if not len(free):
+            residuals(np.zeros(0))
+            return _at(problem, start, deviation, "converged", "nothing is free", evaluations)
         found = least_squares(
             residuals, np.clip((start[free] - low) / width, 0.0, 1.0), jacobian, (0.0, 1.0), method="trf",
             ftol=precision, xtol=STEP, gtol=SLOPE, x_scale="jac", loss=problem.fit.loss, max_nfev=MOST,

@@ -38,8 +38,8 @@ class Direction:
 class Statistics:
     """deviation, low, high (p,): of the estimates; NaN where the data do not know, or an estimate is at a bound.
 
-    correlation (p, p); at_bound (p,): -1 lower, 1 upper, else 0. freedom: values less estimates. factor: how many
-    deviations the interval reaches to each side. chi_square: sum of the squares of all residuals.
+    correlation (p, p); at_bound (p,): -1 lower, 1 upper, else 0. freedom: values less directions that the data know.
+    factor: how many deviations the interval reaches to each side. chi_square: sum of the squares of all residuals.
     """
 
     deviation: FloatArray
@@ -71,8 +71,8 @@ def statistics(problem: FitProblem, found: Minimum) -> Statistics:
     covariance[np.ix_(free, free)] = middle * np.outer(width[free], width[free])
     covariance[free[lost], :] = covariance[:, free[lost]] = np.nan
     deviation = np.sqrt(np.diag(covariance))
-    freedom = problem.count - len(free)
-    factor = quantile(problem, freedom)
+    freedom = problem.count - known.shape[1]
+    factor = quantile(problem)
     return Statistics(
         deviation, found.x - factor * deviation, found.x + factor * deviation,
         covariance / np.outer(deviation, deviation), at_bound, directions, freedom, factor,
@@ -80,13 +80,17 @@ def statistics(problem: FitProblem, found: Minimum) -> Statistics:
     )  # fmt: skip
 
 
-def quantile(problem: FitProblem, freedom: int) -> float:
-    """Half the width of the interval in deviations: of Student's distribution where deviations are estimated."""
+def quantile(problem: FitProblem) -> float:
+    """Half the width of the interval in deviations: of Student's distribution where deviations are estimated.
+
+    With the degrees of freedom by which they are estimated (`solve.deviation_of`).
+    """
     from scipy.stats import norm, t
 
     level = 0.5 + 0.5 * problem.fit.confidence
     estimated = bool(np.any(np.isnan(stated_deviations(problem))))
-    return float(t.ppf(level, max(freedom, 1)) if estimated else norm.ppf(level))
+    freedom = max(problem.count - len(problem.names), 1)
+    return float(t.ppf(level, freedom) if estimated else norm.ppf(level))
 
 
 def _bounds(problem: FitProblem, found: Minimum) -> FloatArray:

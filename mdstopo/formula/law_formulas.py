@@ -21,7 +21,7 @@ from mdstopo.formula.calculus import (
 )
 from mdstopo.formula.modes import HALF, MOTION, Smooth, Switch, is_set, smooth, ways_to
 from mdstopo.formula.parser import parse
-from mdstopo.formula.tree import NUMBER, Expression, name, number, operation, parts
+from mdstopo.formula.tree import NUMBER, Expression, name, names_in, number, operation, parts
 
 #: groups that stand before those of parameters: the force, and the smallest margin
 FORCE, LOWEST, FIRST = 0, 1, 2
@@ -61,6 +61,12 @@ class Program(NamedTuple):
         """Whether the margin of a switch depends on time."""
         first = FIRST + 1 + self.parameters
         return any(not is_number(group.values[3], 0.0) for group in self.groups[first : first + self.switches])
+
+    @property
+    def has_curved_switches(self) -> bool:
+        """Whether the margin of a switch is not linear in time, and may change its sign while nothing moves."""
+        first = FIRST + 1 + self.parameters
+        return any("t" in names_in(group.values[3]) for group in self.groups[first : first + self.switches])
 
     @property
     def operations(self) -> int:

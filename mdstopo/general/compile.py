@@ -14,7 +14,7 @@ from mdstopo.general.dimension import Dimension, Frames, Pairs, dimension_of, in
 from mdstopo.general.drives import drives, drives_all, motion_times
 from mdstopo.general.layout import arrange
 from mdstopo.general.model import MEMBER_EXCESS, MEMBER_FREE_LENGTH, ROW, GeneralModel
-from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied
+from mdstopo.general.variables import adds_damping, each_member, lasting_times, varied, watched_times
 from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.kinematics.kinematics_interface import Kinematics
 from mdstopo.mechanics.laws import table as laws
@@ -85,7 +85,7 @@ def compile_general(case: Case, load_case: LoadCase) -> GeneralScene:
         v0[own] = dimension.velocities(body, home[i])
 
     fine = has_coarse_steps(case.solver)
-    more = lasting_times(case, fine) + motion_times(load_case, dimension)
+    more = lasting_times(case, fine) + motion_times(load_case, dimension) + watched_times(case, load_case)
     times = breakpoints(load_case, more)
     driven, drive, frames_of_turns, turns = drives(load_case, times, dimension, dimension.stated(home), v0, home)
     _refuse_impacts(case, load_case, bodies, driven, drive, times)

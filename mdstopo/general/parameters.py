@@ -49,6 +49,7 @@ from mdstopo.mechanics.laws.table import (
     ACTIVE_FROM,
     ACTIVE_UNTIL,
     FREE_LENGTH,
+    law_has_pieces,
     law_margin_by_time,
     law_margin_slope,
     law_margin_slopes,
@@ -169,7 +170,7 @@ def event_slope(model, history, member_state, event, e):
     state = history.event[event, STATE]
     who = history.event[event, MEMBER]
     given = state == 0 or history.event[event, GIVEN] != 0
-    if place > FREE_LENGTH or given or block_of(model, who) != k:
+    if place > FREE_LENGTH or given or block_of(model, who) != k or law_has_pieces(model.block[k, CODE]):
         return 0.0
     segment = history.index[state - 1, SEGMENT]
     q = history.q[state]

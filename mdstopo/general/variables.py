@@ -16,6 +16,9 @@ from mdstopo.integrators.choice import has_coarse_steps
 from mdstopo.mechanics.laws import table as laws
 from mdstopo.scene.model import FloatArray, IndexArray
 
+#: parts of the simulated time, each of one step at least, where a mode may come and go by time alone
+WATCHED = 256
+
 
 def of_law(case: Case, group: MemberGroup, place: int) -> list[Variable]:
     """The variables of one law of a group."""
@@ -35,6 +38,14 @@ def lasting_times(case: Case, fine: bool) -> list[float]:
         for place, law in enumerate(group.laws)
         for time in laws.breakpoints(law, fine, frozenset(each.parameter for each in of_law(case, group, place)))
     ]
+
+
+def watched_times(case: Case, load_case: LoadCase) -> list[float]:
+    """Times at which steps end so that modes which come and go by time alone are seen; none where no law has such."""
+    if not any(laws.is_watched(law) for group in case.members for law in group.laws):
+        return []
+    times: list[float] = np.linspace(load_case.start, load_case.end, WATCHED + 1)[1:-1].tolist()
+    return times
 
 
 def adds_damping(case: Case) -> bool:

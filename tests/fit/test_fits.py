@@ -35,6 +35,22 @@ def test_a_fit_through_impacts_finds_the_truth(drop: FitProblem) -> None:
     assert problem.simulations < 30
 
 
+def test_a_start_without_a_motion_is_never_the_best(drop: FitProblem, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = measured(drop, TRUTH, None)
+    predict = problem.predictions.predict
+
+    def fails(x: np.ndarray, delays: np.ndarray) -> object:
+        good = predict(x, delays)
+        return good._replace(trouble="no motion") if x[0] > 15000.0 else good
+
+    monkeypatch.setattr(problem.predictions, "predict", fails)
+    found = [fitted(problem, begin) for begin in (problem.initial, np.array([19000.0, 20.0, 0.05]))]
+    assert [each.status for each in found] == ["converged", "failed"]
+    assert found[1].level == np.inf
+    held = minimum(problem, np.array([19000.0, 20.0, 0.05]), found[0].deviation, held=np.arange(3))
+    assert held.status == "failed"
+
+
 def test_it_is_the_minimum_that_differences_find_with_many_more_motions(drop: FitProblem) -> None:
     problem = measured(drop, TRUTH, 5)
     found = fitted(problem, problem.initial)

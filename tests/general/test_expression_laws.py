@@ -254,3 +254,24 @@ def test_a_formula_without_a_value_stops_the_motion() -> None:
     assert not found.status.usable
     assert "at t = 0.1" in found.message or "at t = 0.2" in found.message
     assert mdstopo.evaluate(on_a_line("k*sqrt(x)", {"k": 1.0}, 0.9, -0.5)).status.ok
+
+
+def test_a_force_that_comes_by_time_alone_is_seen_while_everything_is_at_rest() -> None:
+    """m x'' = b max(0, sin(w t - p)): the force is off at the start, and nothing moves until it comes."""
+    text = """
+    format: 1
+    time: {end: 1}
+    bodies: {mass: {mass: 2, inertia: 1, position: [0, 0]}}
+    members:
+      push:
+        from: {body: ground, at: [-1, 0]}
+        to: {body: mass, at: [0, 0]}
+        law: {type: expression, force: "-b*max(0, sin(w*t - p))", parameters: {b: 50, w: 50, p: 1}}
+    design: {initial: 1, lower: 1, upper: 1}
+    objectives: {G: {response: {velocity: {body: mass, component: x}}, over_time: final}}
+    solver: {tolerance: 1.0e-10}
+    """
+    t = np.linspace(0.0, 1.0, 2_000_001)
+    expected = np.trapezoid(25.0 * np.maximum(0.0, np.sin(50.0 * t - 1.0)), t)
+    found = mdstopo.evaluate(read_case(text))
+    assert found.objectives["G"] == pytest.approx(expected, rel=1e-8)

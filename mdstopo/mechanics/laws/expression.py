@@ -31,6 +31,11 @@ def expression_data(record: OfFormulas, at: int) -> tuple[list[float], list[floa
     return row, [float(address_of(made.groups)), float(made.parameters), float(made.switches), timed]
 
 
+def expression_is_watched(record: OfFormulas) -> bool:
+    """Whether a switch depends on time other than linearly."""
+    return record.program.has_curved_switches
+
+
 @inline
 def expression_force(p, x, xd, mode, t, curves, l0):
     """f, f_x, f_xd, V, V_x.
@@ -361,6 +366,7 @@ def expression_grazes(p, x, mode, t, curves, l0):
 
 
 KERNELS = LawKernels(
+    is_watched=expression_is_watched,
     force=expression_force,
     slopes=expression_slopes,
     rest_slopes=expression_rest_slopes,

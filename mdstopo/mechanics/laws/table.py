@@ -425,6 +425,12 @@ def place_of(law: type[Law], parameter: str) -> int:
     return COMMON[parameter] if parameter in COMMON else numbers(law).index(parameter)
 
 
+def is_watched(record: Law) -> bool:
+    """Whether modes of a law may come and go by time alone, so that steps have to be short."""
+    own = kernels_of(type(record)).is_watched
+    return own is not None and own(record)
+
+
 def breakpoints(record: Law, fine: bool = False, varying: frozenset[str] = frozenset()) -> list[float]:
     """Times at which a law's force has a kink, a jump or a narrow peak; fine: see `pulse.breakpoints`.
 
