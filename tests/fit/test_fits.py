@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from mdstopo.fit.predictions import Predicted
 from mdstopo.fit.problem import FitProblem
 from mdstopo.fit.profile import profile
 from mdstopo.fit.run_fit import run_fit
@@ -40,8 +41,8 @@ def test_a_start_without_a_motion_is_never_the_best(drop: FitProblem, monkeypatc
     predict = problem.predictions.predict
 
     def fails(x: np.ndarray, delays: np.ndarray) -> object:
-        good = predict(x, delays)
-        return good._replace(trouble="no motion") if x[0] > 15000.0 else good
+        good: Predicted = predict(x, delays)
+        return replace(good, trouble="no motion") if x[0] > 15000.0 else good
 
     monkeypatch.setattr(problem.predictions, "predict", fails)
     found = [fitted(problem, begin) for begin in (problem.initial, np.array([19000.0, 20.0, 0.05]))]
