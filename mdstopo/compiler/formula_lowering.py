@@ -5,7 +5,6 @@ from typing import Any
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import signature
 from numba.extending import lower_builtin, type_callable
 
 from mdstopo.compiler.formulas import NAMES, WIDTH, call_formula
@@ -20,7 +19,7 @@ def _typed(_context: Any) -> Any:
         """What a call gives for arguments of these types: address, p, x, xd, t, l0, mode, group."""
         if not (isinstance(p, types.Array) and p.ndim == 1 and p.layout == "C" and p.dtype == types.float64):
             return None
-        return signature(_RESULT, types.float64, p, *_FLOATS[1:], types.int64, types.int64)
+        return _RESULT(types.float64, p, *_FLOATS[1:], types.int64, types.int64)
 
     return typed
 

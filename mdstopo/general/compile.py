@@ -332,8 +332,7 @@ def _damped(case: Case, responses: tuple[Response, ...], reductions: tuple[str, 
 
 def _switches(case: Case) -> bool:
     """Whether a member may switch: a step that ends at a switch ends on the polynomial of the method of order 8."""
-    own = (law for group in case.members for law in group.laws)
-    return bool(case.contacts) or any(laws.kernels_of(type(law)).modes is not None for law in own)
+    return bool(case.contacts) or any(laws.may_switch(law) for group in case.members for law in group.laws)
 
 
 def _skipped(case: Case, load_case: LoadCase, dimension: Dimension, damped: bool) -> tuple[str, ...]:

@@ -27,6 +27,11 @@ FIELDS = (
 )  # fmt: skip
 #: corrections of the moment after it has been found beside the joints
 CORRECTIONS = 12
+#: the same between bounds
+BOUNDED = 90
+#: how many switches in turn may hide before one that is found, as their margins are used up for a while only; at how
+#: many places that is looked for
+HIDDEN, PROBES = 8, 8
 
 
 class Landing:
@@ -161,6 +166,90 @@ def keep_used(step, t, rounding):
 
 
 @kernel
+def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
+    """Where the smallest margin of the members `step.few` is used up, beside the joints.
+
+    step: the step (`Landing`), with the poses at `low` in `before`.
+    segment: number of the stretch of time between two breakpoints.
+    t, h: time at the start of the step, and its length (s).
+    low, high: fractions of the step between which that happens.
+    at_high: the margin at the second.
+    rounding: what rounding leaves of a margin.
+    resolution: of fractions.
+
+    Returns the fraction, on the far side.
+    """
+    few = step.few
+    at_low, _ = smallest_margin(step.model, t + low * h, step.member_state, step.before, few)
+    at_low = max(at_low, rounding)
+    side = 0
+    last = low
+    at_last = at_low
+    before = high
+    at_before = at_high
+    for tries in range(TRIALS):
+        apart = last - before
+        slope = (at_last - at_before) / apart if apart != 0.0 else 0.0
+        foreseen = last - (at_last + AIM * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
+        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
+        if middle < 0.0:
+            break
+        value, _ = margin_inside(step, segment, t, h, middle, few, np.bool_(False), step.at_q, step.at_v)
+        before = last
+        at_before = at_last
+        last = middle
+        at_last = value
+        low, high, at_low, at_high, side = narrowed(low, high, at_low, at_high, middle, value, rounding, side)
+    return high
+
+
+@kernel
+def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolution):
+    """Correct the moment of an event that has been found beside the joints: Newton's method between bounds.
+
+    step: the step (`Landing`), whose members `few` are looked at.
+    segment: number of the stretch of time between two breakpoints.
+    t, h: time at the start of the step, and its length (s).
+    low: a fraction of the step at which no margin is used up.
+    c, value, who: where the event is beside the joints, the margin there on the joints, and whose it is.
+    rate: of the margin there (per s).
+    rounding: what rounding leaves of a margin.
+    resolution: of fractions.
+
+    Returns what `first_event` does.
+    """
+    few = step.few
+    high = 2.0
+    wider = 1.0
+    for tries in range(BOUNDED):
+        if value < -rounding:
+            high = c
+            if value >= -NEAR * rounding or not rate < 0.0 or high - low <= resolution:
+                return c, who, rate
+        else:
+            low = c
+            if c >= 1.0:
+                break
+        shift = -(value + AIM * rounding) / (rate * h) if rate < 0.0 else 0.0
+        if abs(shift) < resolution:
+            shift = resolution if value >= -rounding else -resolution
+        c += shift
+        if high > 1.0:  # not on the far side yet
+            c = min(max(c, low + wider * resolution), 1.0)
+            wider *= 4.0
+        elif not low < c < high or tries >= BOUNDED // 3:
+            c = 0.5 * (low + high)
+            if c <= low or c >= high:
+                c = high
+                low = high
+        value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
+    if high > 1.0:
+        return 2.0, -1, 0.0
+    _, who = margin_inside(step, segment, t, h, high, few, np.bool_(True), step.at_q, step.at_v)
+    return high, who, rate
+
+
+@kernel
 def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, where):
     """Where on the polynomial of a step, whose 16 stages have been made, the first member leaves its mode.
 
@@ -179,52 +268,33 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     if low > 1.0:
         return 2.0, -1, 0.0
     begin = low
-    keep_used(step, t + high * h, rounding)
     few = step.few
-    at_low, _ = smallest_margin(step.model, t + low * h, step.member_state, step.before, few)
-    at_low = max(at_low, rounding)
     resolution = 4e-16 * (abs(t) + h) / h
     jointed = step.model.size[0] > 0
     no = np.bool_(False)
-    side = 0
-    last = low
-    at_last = at_low
-    before = high
-    at_before = at_high
-    for tries in range(TRIALS):
-        apart = last - before
-        slope = (at_last - at_before) / apart if apart != 0.0 else 0.0
-        foreseen = last - (at_last + AIM * rounding) / slope if slope < 0.0 and tries > 0 else -1.0
-        middle = next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
-        if middle < 0.0:
-            break
-        value, _ = margin_inside(step, segment, t, h, middle, few, no, step.at_q, step.at_v)
-        before = last
-        at_before = at_last
-        last = middle
-        at_last = value
-        low, high, at_low, at_high, side = narrowed(low, high, at_low, at_high, middle, value, rounding, side)
     c = high
+    who = -1
+    for _ in range(HIDDEN):
+        keep_used(step, t + c * h, rounding)
+        c = root_inside(step, segment, t, h, begin, c, at_high, rounding, resolution)
+        at_high, who = margin_inside(step, segment, t, h, c, few, no, step.at_q, step.at_v)
+        value = 0.0
+        for probe in range(1, PROBES + 1):  # is a margin used up before, as one with a rate in it may be for a while?
+            earlier = begin + (c - begin) * probe / PROBES
+            value, other = margin_inside(step, segment, t, h, earlier, step.watched, no, step.at_q, step.at_v)
+            if value < -rounding and (probe < PROBES or (other != who and value < at_high)):
+                break
+            value = 0.0
+        if value == 0.0:
+            break
+        c = earlier
+        at_high = value
     beside = c - BESIDE * (c - begin)
-    at_high, _ = margin_inside(step, segment, t, h, c, few, no, step.at_q, step.at_v)
-    value, _ = margin_inside(step, segment, t, h, beside, few, no, step.at_q, step.at_v)
+    step.one[0] = 1  # its margin alone has a slope there: that of another may be the smallest before
+    step.one[1] = who
+    value, _ = margin_inside(step, segment, t, h, beside, step.one, no, step.at_q, step.at_v)
     rate = (at_high - value) / ((c - beside) * h) if c > beside else 0.0
     value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
     if not jointed:
         return c, who, rate
-    shift = 0.0
-    for _ in range(CORRECTIONS):
-        if value < -rounding and (value >= -NEAR * rounding or not rate < 0.0):
-            return c, who, rate
-        shift = -(value + AIM * rounding) / (rate * h) if rate < 0.0 else resolution
-        shift = shift if abs(shift) > resolution else (resolution if value >= -rounding else -resolution)
-        c = min(max(c + shift, begin), 1.0)
-        value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
-    for tries in range(CORRECTIONS):  # flat, or noisy: any moment on the far side
-        if value < -rounding or c >= 1.0:
-            break
-        c = min(c + max(abs(shift), resolution) * 4.0**tries, 1.0)
-        value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
-    if value < -rounding:
-        return c, who, rate
-    return 2.0, -1, 0.0
+    return on_joints(step, segment, t, h, begin, c, value, who, rate, rounding, resolution)

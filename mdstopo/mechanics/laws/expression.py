@@ -31,6 +31,11 @@ def expression_data(record: OfFormulas, at: int) -> tuple[list[float], list[floa
     return row, [float(address_of(made.groups)), float(made.parameters), float(made.switches), timed]
 
 
+def expression_is_smooth(record: OfFormulas) -> bool:
+    """Whether the formulas have no switches."""
+    return record.program.switches == 0
+
+
 def expression_is_watched(record: OfFormulas) -> bool:
     """Whether a switch depends on time other than linearly."""
     return record.program.has_curved_switches
@@ -366,6 +371,7 @@ def expression_grazes(p, x, mode, t, curves, l0):
 
 
 KERNELS = LawKernels(
+    is_smooth=expression_is_smooth,
     is_watched=expression_is_watched,
     force=expression_force,
     slopes=expression_slopes,

@@ -92,6 +92,7 @@ class LawKernels:
     signal (record): of a force that is given over time, the table.
     breakpoints (record, fine): times at which steps have to end: kinks, jumps, narrow peaks; fine: see
     `pulse.breakpoints`.
+    is_smooth (record): of a law with modes, whether it has one mode only as it is stated.
     is_watched (record): whether modes may come and go by time alone, so that steps have to be short.
     data (record, at): parameters and numbers for `curves`, of which the first will stand at place `at`; a law that has
     it does not use `Law.row`; parameters that vary stand first in its row.
@@ -107,5 +108,6 @@ class LawKernels:
     inertial: bool = False
     signal: Callable[[Any], Table] | None = None
     breakpoints: Callable[[Any, bool], list[float]] | None = None
+    is_smooth: Callable[[Any], bool] | None = None
     is_watched: Callable[[Any], bool] | None = None
     data: Callable[[Any, int], tuple[list[float], list[float]]] | None = None

@@ -425,6 +425,12 @@ def place_of(law: type[Law], parameter: str) -> int:
     return COMMON[parameter] if parameter in COMMON else numbers(law).index(parameter)
 
 
+def may_switch(record: Law) -> bool:
+    """Whether a law has modes of which it may leave one for another."""
+    own = kernels_of(type(record))
+    return own.modes is not None and (own.is_smooth is None or not own.is_smooth(record))
+
+
 def is_watched(record: Law) -> bool:
     """Whether modes of a law may come and go by time alone, so that steps have to be short."""
     own = kernels_of(type(record)).is_watched
