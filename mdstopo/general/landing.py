@@ -27,8 +27,8 @@ FIELDS = (
 )  # fmt: skip
 #: corrections of the moment after it has been found beside the joints
 CORRECTIONS = 12
-#: the same between bounds
-BOUNDED = 90
+#: the same between bounds, and after how many the interval is halved
+BOUNDED, HALVED = 90, 30
 #: how many switches in turn may hide before one that is found, as their margins are used up for a while only; at how
 #: many places that is looked for
 HIDDEN, PROBES = 8, 8
@@ -237,7 +237,7 @@ def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolutio
         if high > 1.0:  # not on the far side yet
             c = min(max(c, low + wider * resolution), 1.0)
             wider *= 4.0
-        elif not low < c < high or tries >= BOUNDED // 3:
+        elif not low < c < high or tries >= HALVED:
             c = 0.5 * (low + high)
             if c <= low or c >= high:
                 c = high
