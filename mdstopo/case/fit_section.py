@@ -6,29 +6,12 @@ import math
 
 from mdstopo.case.fitting import Estimate, Fit, FitNumber, Series
 from mdstopo.case.goals import build_response, load_case_of
-from mdstopo.case.key_paths import led_to, number_at, varied_by
+from mdstopo.case.key_paths import SECTIONS, led_to, number_at, why_fixed
 from mdstopo.case.nodes import Node
 from mdstopo.case.overrides import WrongPathError, steps_of
 from mdstopo.case.reading import BAD, Fields, Reading, found, is_good
 from mdstopo.case.start_geometry import Frames
 from mdstopo.case.words import inside, number_text
-
-#: sections whose numbers are no part of the scene
-_MEANS = {
-    "format": "is the format's version",
-    "dimension": "says which case it is",
-    "title": "is a name",
-    "time": "says when the motion is computed",
-    "design": "says what is designed",
-    "objectives": "says what is to be improved",
-    "constraints": "says what is bounded",
-    "combine": "says how objectives are weighted",
-    "optimizer": "says how the design is improved",
-    "solver": "says how motions are computed",
-    "uncertainty": "says what is uncertain",
-    "fit": "says what is fitted",
-}
-_CHOOSES = {"min_length": "which members there are", "max_length": "which members there are", "cost": "volumes"}
 
 
 def build_fit(top: Fields, root: Node, frames: Frames, reading: Reading) -> Fit | None:
@@ -54,7 +37,9 @@ def _numbers(fields: Fields, root: Node, reading: Reading) -> list[FitNumber]:
         here = inside(path, written)
         try:
             key, node = led_to(written, root)
-            _refuse(key, [str(step) for step in steps_of(written)], root)
+            why = why_fixed([str(step) for step in steps_of(written)], root, SECTIONS)
+            if why:
+                raise WrongPathError(key, f"{key} cannot be estimated: {why}")
         except WrongPathError as error:
             reading.mistake(here, error.message)
             continue
@@ -68,20 +53,6 @@ def _numbers(fields: Fields, root: Node, reading: Reading) -> list[FitNumber]:
             if bounds is not None:
                 built[key] = FitNumber(key, bounds)
     return list(built.values())
-
-
-def _refuse(path: str, steps: list[str], root: Node) -> None:
-    """Numbers that say what the problem is, not what the scene is like. Raises WrongPathError."""
-    section = steps[0]
-    why = f"`{section}` {_MEANS[section]}" if section in _MEANS else ""
-    if section == "members" and len(steps) > 2 and steps[2] in _CHOOSES:
-        why = f"`{steps[2]}` decides {_CHOOSES[steps[2]]}"
-    elif section == "members" and len(steps) > 3 and steps[2] == "law":
-        why = varied_by(steps, root)
-    elif section == "points" and "count" in steps:
-        why = "`count` decides which members there are"
-    if why:
-        raise WrongPathError(path, f"{path} cannot be estimated: {why}")
 
 
 def _estimate(keys: Fields, stated: float | None, reading: Reading) -> Estimate | None:

@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 
 from mdstopo.case.nodes import MAPPING, SCALAR, SEQUENCE, Node
 from mdstopo.case.overrides import WrongPathError, steps_of
 from mdstopo.case.scalars import to_float
 from mdstopo.case.words import did_you_mean, inside, listed, shown
+
+#: sections whose numbers say what the problem is
+SECTIONS = {
+    "format": "is the format's version",
+    "dimension": "says which case it is",
+    "title": "is a name",
+    "time": "says when the motion is computed",
+    "design": "says what is designed",
+    "objectives": "says what is to be improved",
+    "constraints": "says what is bounded",
+    "combine": "says how objectives are weighted",
+    "optimizer": "says how the design is improved",
+    "solver": "says how motions are computed",
+    "uncertainty": "says what is uncertain",
+    "fit": "says what is fitted",
+}
+#: numbers of a group of members that say which problem it is
+_OF_GROUPS = {"min_length": "which members there are", "max_length": "which members there are", "cost": "volumes"}
 
 
 def led_to(stated: str, root: Node) -> tuple[str, Node]:
@@ -71,3 +89,18 @@ def varied_by(steps: list[str], root: Node) -> str:
         if steps[1] in groups and (len(steps) == 4 or place in ("", steps[3])):
             return f"it is the design variable {name}"
     return ""
+
+
+def why_fixed(steps: list[str], root: Node, sections: Container[str]) -> str:
+    """Why the number that a key path leads to is none of the scene, but says what the problem is; nothing where it is.
+
+    sections: those of `SECTIONS` in which all numbers are such.
+    """
+    section = steps[0]
+    if section == "members" and len(steps) > 2 and steps[2] in _OF_GROUPS:
+        return f"`{steps[2]}` decides {_OF_GROUPS[steps[2]]}"
+    if section == "members" and len(steps) > 3 and steps[2] == "law":
+        return varied_by(steps, root)
+    if section == "points" and "count" in steps:
+        return "`count` decides which members there are"
+    return f"`{section}` {SECTIONS[section]}" if section in sections else ""

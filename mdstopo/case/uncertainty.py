@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from mdstopo.case.arrays import FrozenDict
-from mdstopo.case.key_paths import led_to, number_at, stands, varied_by
+from mdstopo.case.key_paths import led_to, number_at, stands, why_fixed
 from mdstopo.case.model import ResponseRow, VolumeRow
 from mdstopo.case.nodes import Node
 from mdstopo.case.overrides import WrongPathError, as_yaml, steps_of
@@ -30,16 +30,8 @@ ROUNDED = 0.01
 #: points that an interval of confidence needs at least
 LEAST_VALIDATION = 30
 
-_MEANS = {
-    "format": "is the format's version",
-    "title": "is a name",
-    "design": "says what is designed",
-    "combine": "says how objectives are weighted",
-    "optimizer": "says how the design is improved",
-    "solver": "says how motions are computed",
-    "uncertainty": "says what is uncertain",
-}
-_FILTERS = {"min_length": "which members there are", "max_length": "which members there are", "cost": "volumes"}
+#: sections of which no number may be uncertain
+_CERTAIN = frozenset({"format", "title", "design", "combine", "optimizer", "solver", "uncertainty"})
 
 
 def build_uncertainty(
@@ -116,14 +108,8 @@ def _led_to(stated: str, root: Node) -> tuple[str, Node]:
 def _refuse_fixed(path: str, steps: list[str], root: Node) -> None:
     """Numbers that say what the problem is, not what the scene is like."""
     section = steps[0]
-    why = f"`{section}` {_MEANS[section]}" if section in _MEANS else ""
-    if section == "members" and len(steps) > 2 and steps[2] in _FILTERS:
-        why = f"`{steps[2]}` decides {_FILTERS[steps[2]]}"
-    elif section == "members" and len(steps) > 3 and steps[2] == "law":
-        why = varied_by(steps, root)
-    elif section == "points" and "count" in steps:
-        why = "`count` decides which members there are"
-    elif section == "constraints" and len(steps) > 1 and stands([*steps[:2], "volume"], root):
+    why = why_fixed(steps, root, _CERTAIN)
+    if section == "constraints" and len(steps) > 1 and stands([*steps[:2], "volume"], root):
         why = "a volume is as certain as the design"
     elif section in ("constraints", "objectives") and len(steps) < 3:
         why = f"only single numbers in `{section}` can be, not what they ask for"
