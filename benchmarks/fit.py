@@ -152,24 +152,15 @@ def _problem(scene: Scene) -> tuple[FitProblem, Floats]:
     ]  # fmt: skip
     problem = FitProblem(case, zero)
     truth = np.array([scene.truth[name] for name in problem.names])
-    exact = [each._replace(y=y) for each, y in zip(zero, problem.predicted(truth), strict=True)]
-    return FitProblem(case, exact), truth
+    return problem.with_values(problem.predicted(truth)), truth
 
 
 def _noisy(scene: Scene, problem: FitProblem, seed: int) -> FitProblem:
     random = np.random.default_rng(seed)
     size = [np.full(len(each.y), scene.deviation) if each.deviation is None else each.deviation
             for each in problem.measured]  # fmt: skip
-    noisy = [
-        each._replace(y=each.y + random.normal(size=len(each.y)) * own)
-        for each, own in zip(problem.measured, size, strict=True)
-    ]
-    # the scene is the same: what is compiled and known of its numbers is kept
-    again = FitProblem.__new__(FitProblem)
-    again.__dict__.update({key: value for key, value in vars(problem).items() if key != "parts"})
-    again.measured = noisy
-    again.predictions._measured = noisy
-    return again
+    values = [each.y + random.normal(size=len(each.y)) * own for each, own in zip(problem.measured, size, strict=True)]
+    return problem.with_values(values)
 
 
 def _repeats(

@@ -153,14 +153,14 @@ def _before(problem: "FitProblem", before: dict[str, Any] | None, path: Path) ->
 def _say(output: Output, run: "FitRun", path: Path, written: Path | None) -> None:
     problem = run.problem
     output.say(f"{problem.case.title or problem.case.name}: {run.status.replace('_', ' ')} - {run.reason}")
-    if run.found is not None and run.told is not None:
+    if run.found is not None and run.statistics is not None:
         share = f"{100.0 * problem.fit.confidence:g} %"
         profiled = bool(run.profiles)
         rows = [["estimate", "value", "deviation", f"{share} from", "to", *(["by profile from", "to"] * profiled),
                  "derivative"]]  # fmt: skip
         for i, name in enumerate(problem.names):
-            bound = int(run.told.at_bound[i])
-            ends = (run.told.deviation[i], run.told.low[i], run.told.high[i])
+            bound = int(run.statistics.at_bound[i])
+            ends = (run.statistics.deviation[i], run.statistics.low[i], run.statistics.high[i])
             cells = ["-" if math.isnan(each) else number(each) for each in ends]
             if bound:
                 cells[0] = f"at {'upper' if bound > 0 else 'lower'}"
@@ -183,15 +183,15 @@ def _say(output: Output, run: "FitRun", path: Path, written: Path | None) -> Non
 
 def _say_apart(output: Output, run: "FitRun") -> None:
     """What the data cannot tell apart, and what varies together."""
-    assert run.told is not None
-    for each in run.told.directions:
+    assert run.statistics is not None
+    for each in run.statistics.directions:
         parts = " ".join(f"{share:+.2g} {name}" for name, share in each.shares.items())
         how = "not at all" if each.is_unknown else f"hardly: {number(each.change, 2)} deviations from bound to bound"
         output.say(f"the data tell {how}: {parts} (shares of the way between bounds)")
     names = run.problem.names
     for i in range(len(names)):
         for j in range(i):
-            both = float(run.told.correlation[i, j])
+            both = float(run.statistics.correlation[i, j])
             if abs(both) > 0.95:
                 output.say(f"{names[j]} and {names[i]} vary together: correlation {number(both, 4)}")
 
@@ -216,16 +216,16 @@ def _say_series(output: Output, run: "FitRun") -> None:
 
 def _remarks(run: "FitRun") -> list[str]:
     """What the user should know of a fit."""
-    if run.told is None:
+    if run.statistics is None:
         return []
     told = []
     from mdstopo.fit.solve import stated_deviations
 
     known = not math.isnan(float(stated_deviations(run.problem).max()))
-    if known and run.problem.fit.loss == "linear" and run.told.freedom > 0:
+    if known and run.problem.fit.loss == "linear" and run.statistics.freedom > 0:
         from scipy.stats import chi2
 
-        squares, freedom = run.told.chi_square, run.told.freedom
+        squares, freedom = run.statistics.chi_square, run.statistics.freedom
         if chi2.sf(squares, freedom) < _RARE:
             told.append(
                 f"squares sum up to {number(squares, 4)}, {freedom} are expected: the model misses something, or the "
@@ -235,7 +235,7 @@ def _remarks(run: "FitRun") -> list[str]:
             told.append(
                 f"squares sum up to {number(squares, 4)}, {freedom} are expected: the stated deviations are too large"
             )
-    bounds = [name for name, bound in zip(run.problem.names, run.told.at_bound, strict=True) if bound]
+    bounds = [name for name, bound in zip(run.problem.names, run.statistics.at_bound, strict=True) if bound]
     if bounds:
         told.append(f"at a bound: {', '.join(bounds)}; intervals of the others hold with these where they are")
     differenced = [n for n, how in zip(run.problem.names, run.problem.derivatives, strict=True) if how != "exact"]

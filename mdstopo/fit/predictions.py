@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import cast
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -42,6 +42,15 @@ class Predicted:
     rates: list[FloatArray]
 
 
+class _Last(NamedTuple):
+    """The last prediction: where it was, with which evaluator, and what was observed."""
+
+    x: FloatArray
+    delays: FloatArray
+    evaluator: Evaluator
+    seen: dict[str, Observed]
+
+
 class Predictions:
     """The scene of a case at any values of its fitted numbers.
 
@@ -62,8 +71,7 @@ class Predictions:
         self._delayed = any(each.series.delay.is_free for each in measured)
         #: the evaluator that serves all x where numbers change parameters of laws alone, else that of the last x
         self._kept: tuple[bytes, Evaluator] | None = None
-        #: of the last prediction: where, the evaluator and its observations
-        self._last: tuple[FloatArray, FloatArray, Evaluator, dict[str, Observed]] | None = None
+        self._last: _Last | None = None
 
     def predict(self, x: FloatArray, delays: FloatArray) -> Predicted:
         """All series at numbers x (n,) and delays (S,)."""
@@ -72,16 +80,16 @@ class Predictions:
             predicted, seen = self._observed(evaluator, x, delays, self._delayed)
         except CaseError as error:  # joints that do not fit at the start, for instance
             return Predicted(str(error), [], [])
-        self._last = (x.copy(), delays.copy(), evaluator, seen) if not predicted.trouble else None
+        self._last = _Last(x.copy(), delays.copy(), evaluator, seen) if not predicted.trouble else None
         return predicted
 
     def slopes(self, x: FloatArray, delays: FloatArray) -> list[FloatArray]:
         """Of each series its derivatives (n, numbers) at x (n,) and delays (S,)."""
-        if self._last is None or not (np.array_equal(self._last[0], x) and np.array_equal(self._last[1], delays)):
+        if not self._is_last(x, delays):
             predicted = self.predict(x, delays)
             assert not predicted.trouble, predicted.trouble
         assert self._last is not None
-        _, _, evaluator, seen = self._last
+        evaluator, seen = self._last.evaluator, self._last.seen
         count = len(self.numbers.keys)
         out = [np.zeros((len(each.t), count)) for each in self._measured]
         exact = [i for i in range(count) if self.numbers.derivatives[i] != DIFFERENCES]
@@ -94,6 +102,10 @@ class Predictions:
         return out
 
     # -- how
+
+    def _is_last(self, x: FloatArray, delays: FloatArray) -> bool:
+        last = self._last
+        return last is not None and np.array_equal(last.x, x) and np.array_equal(last.delays, delays)
 
     def _evaluator(self, x: FloatArray) -> Evaluator:
         key = b"" if self.numbers.laws_alone else x.tobytes()
@@ -230,7 +242,7 @@ def _trouble(driver: GeneralDriver, found: Observed) -> str:
     meeting = driver.met(found.count)
     if meeting >= 0:
         return f"{Status.ZERO_LENGTH.value}: {driver.member(meeting)}"
-    jump = driver._rotation_jump(found.count)
+    jump = driver.rotation_jump(found.count)
     return f"{Status.ROTATION_JUMP.value}: {jump}" if jump else ""
 
 

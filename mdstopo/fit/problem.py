@@ -3,6 +3,7 @@
 r_k = (g(t_k - delay; numbers) + offset - y_k) / deviation_k
 """
 
+import copy
 import itertools
 from collections.abc import Sequence
 from functools import cached_property
@@ -47,6 +48,12 @@ class FitProblem:
         #: where the last misfit was, and the rates of what was predicted there
         self._at: FloatArray | None = None
         self._rates: list[FloatArray] = []
+
+    def with_values(self, values: Sequence[FloatArray]) -> "FitProblem":
+        """The same fit of other values (n,) of each series; what is compiled and known of the scene is shared."""
+        other = copy.copy(self)
+        other.measured = [each._replace(y=y) for each, y in zip(self.measured, values, strict=True)]
+        return other
 
     @cached_property
     def parts(self) -> list[slice]:

@@ -32,17 +32,17 @@ class Profile:
 
 
 def profile(
-    problem: FitProblem, found: Minimum, told: Statistics, i: int, points: int, stop: Callable[[], bool]
+    problem: FitProblem, found: Minimum, at_best: Statistics, i: int, points: int, stop: Callable[[], bool]
 ) -> Profile:
     """The profile of one estimate, on both sides of a minimum.
 
     problem: what is fitted.
-    found, told: its minimum, and the statistics there.
+    found, at_best: its minimum, and the statistics there.
     i: which estimate; one that is neither at a bound nor unknown.
     points: how many on each side.
     stop: is asked before each motion; where it says yes, `solve.StoppedError` is raised.
     """
-    half = told.factor * told.deviation[i]
+    half = at_best.factor * at_best.deviation[i]
     held = np.array([i])
     sides = []
     for way, bound in ((-1.0, problem.lower[i]), (1.0, problem.upper[i])):
@@ -58,7 +58,7 @@ def profile(
             x = there.x.copy()
         sides.append(side)
     rows = np.array([*sides[0][::-1], (found.x[i], 0.0), *sides[1]])
-    low, high = (_end(np.array([(found.x[i], 0.0), *side]), told.factor) for side in sides)
+    low, high = (_end(np.array([(found.x[i], 0.0), *side]), at_best.factor) for side in sides)
     return Profile(rows[:, 0], rows[:, 1], low, high)
 
 

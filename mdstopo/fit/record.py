@@ -26,7 +26,7 @@ VERSION = 1
 def content(run: FitRun) -> dict[str, Any]:
     """All of a run."""
     problem, case = run.problem, run.problem.case
-    told: dict[str, Any] = plain(
+    whole: dict[str, Any] = plain(
         {
             "kind": KIND,
             "version": VERSION,
@@ -40,13 +40,13 @@ def content(run: FitRun) -> dict[str, Any]:
             "loss": problem.fit.loss,
             "confidence": problem.fit.confidence,
             "estimates": [_estimate(run, i) for i in range(len(problem.names))],
-            "correlation": None if run.told is None else run.told.correlation,
-            "directions": None if run.told is None else [
+            "correlation": None if run.statistics is None else run.statistics.correlation,
+            "directions": None if run.statistics is None else [
                 {"shares": each.shares, "change": each.change, "unknown": each.is_unknown}
-                for each in run.told.directions
+                for each in run.statistics.directions
             ],
-            "freedom": None if run.told is None else run.told.freedom,
-            "chi_square": None if run.told is None else run.told.chi_square,
+            "freedom": None if run.statistics is None else run.statistics.freedom,
+            "chi_square": None if run.statistics is None else run.statistics.chi_square,
             "series": _series(run),
             "starts": [
                 {
@@ -64,7 +64,7 @@ def content(run: FitRun) -> dict[str, Any]:
             "agreeing": run.agreeing if run.starts else 0,
         }
     )  # fmt: skip
-    return told
+    return whole
 
 
 def asked(problem: FitProblem) -> str:
@@ -112,29 +112,29 @@ def plain(value: Any) -> Any:
 
 def _estimate(run: FitRun, i: int) -> dict[str, Any]:
     problem = run.problem
-    told: dict[str, Any] = {
+    estimate: dict[str, Any] = {
         "name": problem.names[i],
         "lower": problem.lower[i],
         "upper": problem.upper[i],
         "initial": problem.initial[i],
         "derivative": problem.derivatives[i],
     }
-    if run.found is not None and run.told is not None:
-        told |= {
+    if run.found is not None and run.statistics is not None:
+        estimate |= {
             "value": run.found.x[i],
-            "deviation": run.told.deviation[i],
-            "low": run.told.low[i],
-            "high": run.told.high[i],
-            "at_bound": {-1: "lower", 1: "upper"}.get(int(run.told.at_bound[i])),
+            "deviation": run.statistics.deviation[i],
+            "low": run.statistics.low[i],
+            "high": run.statistics.high[i],
+            "at_bound": {-1: "lower", 1: "upper"}.get(int(run.statistics.at_bound[i])),
         }
     own = run.profiles.get(problem.names[i])
     if own is not None:
-        told["profile"] = {"values": own.values, "t": own.t, "low": own.low, "high": own.high}
-    return told
+        estimate["profile"] = {"values": own.values, "t": own.t, "low": own.low, "high": own.high}
+    return estimate
 
 
 def _series(run: FitRun) -> list[dict[str, Any]]:
-    problem, told = run.problem, []
+    problem, found = run.problem, []
     for each, part in zip(problem.measured, problem.parts, strict=True):
         own: dict[str, Any] = {
             "name": each.series.name,
@@ -154,8 +154,8 @@ def _series(run: FitRun) -> list[dict[str, Any]]:
                 "root_mean_square": float(np.sqrt(np.mean(misfit**2))),
                 "chi_square": float(np.sum(run.found.residuals[part] ** 2)),
             }
-        told.append(own)
-    return told
+        found.append(own)
+    return found
 
 
 def _deviations(problem: FitProblem, deviation: FloatArray) -> list[float | None]:

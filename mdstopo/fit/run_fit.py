@@ -1,6 +1,6 @@
-"""A fit from start to end: starts, the best of them, its statistics, profiles; what is done is told as it comes.
+"""A fit from start to end: starts, the best of them, its statistics, profiles; each is saved as soon as it is done.
 
-Whoever saves what is told can go on from there: starts and profiles that are done are not done again.
+A run goes on from what was saved: starts and profiles that are done are not done again.
 """
 
 from collections.abc import Callable, Mapping
@@ -36,15 +36,15 @@ class Start:
 class FitRun:
     """What is known of a fit so far.
 
-    starts: those that are done. found, told: the best, and its statistics; None where none has a motion. profiles: by
-    the name of the estimate. status: running | converged | max_iterations | failed | interrupted; reason: in words.
-    simulations: motions that were computed.
+    starts: those that are done. found, statistics: the best, and its statistics; None where none has a motion.
+    profiles: by the name of the estimate. status: running | converged | max_iterations | failed | interrupted;
+    reason: in words. simulations: motions that were computed.
     """
 
     problem: FitProblem
     starts: list[Start] = field(default_factory=list)
     found: Minimum | None = None
-    told: Statistics | None = None
+    statistics: Statistics | None = None
     profiles: dict[str, Profile] = field(default_factory=dict)
     status: str = "running"
     reason: str = ""
@@ -79,7 +79,7 @@ def run_fit(
     """
     run = FitRun(problem) if before is None else before
     earlier = run.simulations
-    run.status, run.found, run.told = "running", None, None
+    run.status, run.found, run.statistics = "running", None, None
 
     def keep() -> None:
         run.simulations = earlier + problem.simulations
@@ -90,7 +90,7 @@ def run_fit(
             end = fitted(problem, begin, stop)
             run.starts.append(Start(begin, end.x, end.deviation, end.level, end.status, end.reason, end.evaluations))
             keep()
-        _look(run)
+        _conclude(run)
         keep()
         for name in _unprofiled(run, points) if points else ():
             _profile(run, name, points, stop)
@@ -99,13 +99,13 @@ def run_fit(
         run.status, run.reason = run.starts[run.best].status, run.starts[run.best].reason
     except StoppedError:
         if run.starts and run.found is None:
-            _look(run)
+            _conclude(run)
         run.status, run.reason = "interrupted", "stopped on request; what is done is kept"
     keep()
     return run
 
 
-def _look(run: FitRun) -> None:
+def _conclude(run: FitRun) -> None:
     """The best minimum so far, with everything that is known there."""
     best = run.starts[run.best]
     if best.status == "failed":
@@ -113,21 +113,21 @@ def _look(run: FitRun) -> None:
     problem = run.problem
     at = minimum(problem, best.x, best.deviation, held=np.arange(len(best.x)))
     run.found = at
-    run.told = statistics(problem, at)
+    run.statistics = statistics(problem, at)
 
 
 def _profile(run: FitRun, name: str, points: int, stop: Callable[[], bool]) -> None:
     assert run.found is not None
-    assert run.told is not None
+    assert run.statistics is not None
     problem = run.problem
-    run.profiles[name] = profile(problem, run.found, run.told, problem.names.index(name), points, stop)
+    run.profiles[name] = profile(problem, run.found, run.statistics, problem.names.index(name), points, stop)
 
 
 def _unprofiled(run: FitRun, points: int) -> list[str]:
     """Estimates that have a profile and do not have one of so many points on each side yet."""
-    if run.told is None:
+    if run.statistics is None:
         return []
-    known = np.isfinite(run.told.deviation)
+    known = np.isfinite(run.statistics.deviation)
     done = {name for name, each in run.profiles.items() if len(each.values) == 2 * points + 1}
     return [name for name, has in zip(run.problem.names, known, strict=True) if has and name not in done]
 

@@ -171,8 +171,8 @@ def minimum(
 
     try:
         if not len(free):
-            residuals(np.zeros(0))
-            return _at(problem, start, deviation, "converged", "nothing is free", evaluations)
+            misfit = residuals(np.zeros(0)) * deviation
+            return _at(problem, start, misfit, deviation, "converged", "nothing is free", evaluations)
         found = least_squares(
             residuals, np.clip((start[free] - low) / width, 0.0, 1.0), jacobian, (0.0, 1.0), method="trf",
             ftol=precision, xtol=STEP, gtol=SLOPE, x_scale="jac", loss=problem.fit.loss, max_nfev=MOST,
@@ -183,18 +183,24 @@ def minimum(
         return Minimum(start, nan, slopes, deviation, np.inf, np.inf, "failed", str(error), evaluations)
     status = "max_iterations" if found.status == 0 else "converged"
     reason = REASONS.get(found.status, found.message)
-    return _at(problem, whole(found.x), deviation, status, reason, evaluations)
+    x = whole(found.x)
+    return _at(problem, x, problem.misfit(x)[1], deviation, status, reason, evaluations)
 
 
 def _at(
-    problem: FitProblem, x: FloatArray, deviation: FloatArray, status: str, reason: str, evaluations: int
+    problem: FitProblem,
+    x: FloatArray,
+    misfit: FloatArray,
+    deviation: FloatArray,
+    status: str,
+    reason: str,
+    evaluations: int,
 ) -> Minimum:
     """What is known of a minimum at x.
 
-    problem: what is fitted. x (p,): where the fit has ended. deviation (n,): of each value.
+    problem: what is fitted. x (p,): where the fit has ended, and misfit (n,) there. deviation (n,): of each value.
     status, reason: how it has ended. evaluations: how many of the misfit it took.
     """
-    _, misfit = problem.misfit(x)
     cost = _cost(problem, misfit / deviation)
     return Minimum(x, misfit, problem.slopes(x), deviation, cost, cost, status, reason, evaluations)
 

@@ -110,7 +110,7 @@ def _directions(problem: FitProblem, scaled: FloatArray, free: IndexArray) -> tu
         return [], np.zeros((0, 0))
     _, values, vectors = np.linalg.svd(scaled, full_matrices=False)
     unknown = values <= NOTHING * values[0] if values[0] > 0.0 else np.ones(len(values), dtype=bool)
-    told = []
+    poorly_known = []
     for value, vector, nothing in zip(values[::-1], vectors[::-1], unknown[::-1], strict=True):
         if nothing or value < 1.0:
             vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
@@ -119,8 +119,8 @@ def _directions(problem: FitProblem, scaled: FloatArray, free: IndexArray) -> tu
                 for i, share in zip(free, vector, strict=True)
                 if abs(share) >= TAKES_PART
             }
-            told.append(Direction(shares, float(value), bool(nothing)))
-    return told, vectors[~unknown].T
+            poorly_known.append(Direction(shares, float(value), bool(nothing)))
+    return poorly_known, vectors[~unknown].T
 
 
 def _inverse(matrix: FloatArray, known: FloatArray) -> FloatArray:
