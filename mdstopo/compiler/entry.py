@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,18 +64,18 @@ class NotCompiledError(Exception):
     """An entry was called in `without_compiling` that has not been compiled on this machine."""
 
 
-#: one item for each `without_compiling` that has begun
-_nothing_is_compiled: list[None] = []
+#: whether entries may be compiled here
+_may_compile: ContextVar[bool] = ContextVar("may_compile", default=True)
 
 
 @contextmanager
 def without_compiling() -> Iterator[None]:
     """Entries that have not been compiled raise NotCompiledError instead of taking a minute."""
-    _nothing_is_compiled.append(None)
+    token = _may_compile.set(False)
     try:
         yield
     finally:
-        _nothing_is_compiled.pop()
+        _may_compile.reset(token)
 
 
 class Entry(Kernel):
@@ -156,7 +157,7 @@ class Entry(Kernel):
     def _built(self, path: Path, types: str) -> Code | None:
         from mdstopo.compiler import store, told, tried
 
-        if _nothing_is_compiled:
+        if not _may_compile.get():
             raise NotCompiledError
         told.compiling(f"{self.py_func.__module__.removeprefix('mdstopo.')}.{self.py_func.__name__}")
         way()

@@ -34,7 +34,7 @@ def outer(function: Callable[..., Any], fastmath: frozenset[str]) -> Any:
         config.CACHE_DIR = stated
 
 
-#: one that Python calls through Numba's own wrapper: any
+#: Numba's object for a function that Python calls through Numba's own wrapper: here that is how all are called
 wrapped = outer
 
 

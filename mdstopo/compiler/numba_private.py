@@ -591,9 +591,9 @@ def number_of(function: Callable[..., Any]) -> int:
     one function only where its symbol is the same. Numba makes some of its functions anew for each use, equal but for
     the types that they are compiled for, which are in the symbol as well.
     """
-    told = told_of(function)
-    number = int.from_bytes(hashlib.sha256(told.encode()).digest()[:6], "little")
-    if _ADDRESS in told:
+    description = described(function)
+    number = int.from_bytes(hashlib.sha256(description.encode()).digest()[:6], "little")
+    if _ADDRESS in description:
         while _NUMBERED.setdefault(number, function) is not function:
             number += 1
     return number
@@ -603,7 +603,7 @@ def number_of(function: Callable[..., Any]) -> int:
 _ADDRESS = " at 0x"
 
 
-def told_of(given: Any) -> str:
+def described(given: Any) -> str:
     """What an object is, in words that are the same in every process where that is possible."""
     written = getattr(given, "py_func", given)  # of a compiled function
     code = getattr(written, "__code__", None)
@@ -612,7 +612,7 @@ def told_of(given: Any) -> str:
     constants = [each for each in code.co_consts if not isinstance(each, CodeType)]
     names = f"{written.__module__} {written.__qualname__} {code.co_firstlineno} {code.co_names} {constants!r}"
     held = [cell.cell_contents for cell in written.__closure__ or ()]
-    around = [told_of(each) for each in (*held, *(written.__defaults__ or ()))]
+    around = [described(each) for each in (*held, *(written.__defaults__ or ()))]
     return f"{names} {code.co_code.hex()} {around}"
 
 
@@ -904,7 +904,7 @@ _TARGET = "mdstopo"
 
 
 class _Context(CPUContext):
-    """What is compiled for our target; functions of Numba's own inside ours like those that `_left` makes."""
+    """What is compiled for our target; functions of Numba's own inside ours as `_jit_without_code` has them."""
 
     def _compile_subroutine_no_cache(
         self, builder: Any, impl: Any, sig: Any, locals: Any = None, flags: Any = None
@@ -922,8 +922,8 @@ class _Context(CPUContext):
         return made
 
 
-class _Ours(CPUTarget):
-    """Our target as a whole."""
+class _OwnTarget(CPUTarget):
+    """The target of our kernels, with its own context."""
 
     @functools.cached_property
     def _toplevel_target_context(self) -> CPUContext:
@@ -933,7 +933,7 @@ class _Ours(CPUTarget):
 class _Dispatcher(CPUDispatcher):
     """Numba's object for a function that is compiled for our target."""
 
-    targetdescr = _Ours(_TARGET)
+    targetdescr = _OwnTarget(_TARGET)
 
     def compile(self, sig: Any) -> Any:
         """Compile for these types. What calls in it are of is found out for our target, too, where Numba asks late."""
@@ -941,7 +941,7 @@ class _Dispatcher(CPUDispatcher):
             return super().compile(sig)
 
 
-def _left(*given: Any, **options: Any) -> Any:
+def _jit_without_code(*given: Any, **options: Any) -> Any:
     """How a function of Numba's own is compiled where our kernels call it: without machine code."""
     return numba.jit(*given, **{"no_cfunc_wrapper": True, "pipeline_class": _LEFT, "_target": _TARGET, **options})
 
@@ -949,7 +949,7 @@ def _left(*given: Any, **options: Any) -> Any:
 def _enter_target() -> None:
     target_registry[_TARGET] = _Target
     dispatcher_registry[_Target] = _Dispatcher
-    jit_registry[_Target] = _left if _LEAN else functools.partial(numba.jit, _target=_TARGET)
+    jit_registry[_Target] = _jit_without_code if _LEAN else functools.partial(numba.jit, _target=_TARGET)
 
 
 _LASTING = (types.Number, types.Boolean, types.Literal, types.Array, types.BaseTuple)
