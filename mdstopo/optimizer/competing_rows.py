@@ -262,13 +262,18 @@ def residual(own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepe
     of: what a step along the Lagrangian's negative gradient over `steepest` moves within the bounds;
     the gaps of objective rows, the values of constraint rows and the slack of linear rows that carry a multiplier.
     """
-    return 0.0 if steepest == 0.0 else multipliers(own, x, space, penalty, steepest)[0]
+    return multipliers(own, x, space, penalty, steepest)[0]
 
 
 def multipliers(
     own: Bundle, x: Floats, space: FeasibleSet, penalty: Floats, steepest: float
 ) -> tuple[float, Floats, Floats]:
-    """The residual as `residual` has it, with its multipliers: of the iterate's rows (K,), of the linear rows (m,)."""
+    """The residual as `residual` has it, with its multipliers: of the iterate's rows (K,), of the linear rows (m,).
+
+    Where no variable changes anything (`steepest` is 0) the first row has all of them.
+    """
+    if steepest == 0.0:
+        return 0.0, np.eye(1, len(own))[0], np.zeros(len(space.linear.A))
     lines = Bundle(
         np.stack([own.values(), np.zeros(len(own))], axis=1), own.slopes_at(np.zeros(len(x))), np.zeros((len(own), 0)),
         np.full(len(own), np.nan), own.group, own.own, own.age, own.distance,

@@ -78,12 +78,10 @@ def _multipliers(problem: "DesignProblem", sample: Sample, x: Floats) -> tuple[f
     own = Bundle.of(sample, np.arange(len(sample.rows)))
     steepest = float(np.abs(sample.gradients).max())
     count = len(sample.constraint_levels)
-    if not steepest > 0.0:  # no member changes anything
-        return 0.0, np.eye(1, len(sample.rows) + count)[0], np.zeros(len(problem.linear.A))
     penalty = PENALTY * steepest
     while True:
         residual, rows, linear = multipliers(own, x, space, np.full(count, penalty), steepest)
-        if rows[len(sample.rows) :].sum() < 0.5 * penalty or penalty > HIGHEST * steepest:
+        if rows[len(sample.rows) :].sum() <= 0.5 * penalty or penalty > HIGHEST * steepest:
             return residual, rows, linear
         penalty *= PENALTY
 
