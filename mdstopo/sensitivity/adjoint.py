@@ -9,13 +9,14 @@ inside. The peak's time is held fixed (envelope theorem).
 import numpy as np
 
 from mdstopo.compiler.jit import part
-from mdstopo.integrators.steps import ENERGY, FIRST, Q, V
-from mdstopo.integrators.steps_interface import carried, parent_of, reach, reverse_step, stage_weights
+from mdstopo.integrators.steps import ENERGY, FIRST
+from mdstopo.integrators.steps_interface import carried, parent_of, reverse_step, stage_weights
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, design_gradient, springs_of
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.responses.peaks import find_peaks
 from mdstopo.sensitivity.reductions import FINAL, INTEGRAL, MAX, MEAN
+from mdstopo.sensitivity.state_in_step import state_in_step
 
 #: where energies are evaluated: at both ends `find_peaks` has done it already
 AT_START, AT_END, ELSEWHERE = range(3)
@@ -66,36 +67,6 @@ def reverse_sweep(pair, inv_mass, tables, steps, w, c, mu_q, stage_q_bar, z, use
         point[:] = 0.0
         c = -1.0
         w = parent_of(steps, w)
-
-
-@part
-def looked_at(motion, tables, strength, steps, count, k, c, damped, q, v, work):
-    """The state at a fraction of a step, and where a reverse sweep begins for it: step and fraction, -1 its end.
-
-    Constant:
-      motion: the compiled scene with the members that the motion was computed with.
-      tables: constant arrays of the integrator.
-      strength (3, M_padded): of these members, times alpha^mu (N/m, N s/m, N).
-    In:
-      steps: what the integrator kept.
-      count: steps that were taken.
-      k: number of the step.
-      c: fraction of it, 0 to 1.
-      damped: whether any force depends on velocity.
-    Out:
-      q, v (n,): coordinates and velocities (m, rad; m/s, rad/s).
-      work (WORK,): counts of work, added to.
-    """
-    w = k
-    c_w = -1.0
-    if c >= 1.0 or (k == 0 and c == 0.0):
-        state = steps.state[k + 1 if c >= 1.0 else 0]
-        for d in range(q.shape[0]):
-            q[d] = state[Q, d]
-            v[d] = state[V, d]
-    else:
-        w, c_w = reach(motion, tables, strength, steps, count, k, c, damped, q, v, work)
-    return w, c_w
 
 
 @part
@@ -187,7 +158,7 @@ def energy_rows(
         mu_q[:] = 0.0
         if not integral:
             weight[0] = 1.0
-            w, c_w = looked_at(motion, tables, strength, steps, count, k, c, damped, q, v, work)
+            w, c_w = state_in_step(motion, tables, strength, steps, count, k, c, damped, q, v, work)
             at = ELSEWHERE
             if watched and k == 0 and c == 0.0:
                 at = AT_START

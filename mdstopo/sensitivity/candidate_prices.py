@@ -35,8 +35,9 @@ from mdstopo.scene.model import (
     STIFFNESS,
 )
 from mdstopo.scene.packing import unpack
-from mdstopo.sensitivity.adjoint import looked_at, reverse_sweep
+from mdstopo.sensitivity.adjoint import reverse_sweep
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
+from mdstopo.sensitivity.state_in_step import state_in_step
 
 #: rows and columns of a tile
 TALL, BROAD = 16, 128
@@ -153,7 +154,9 @@ def row_poses(
                 used_points += stages
             else:
                 k = int(rows[j, r, 2])
-                w, c = looked_at(motion, tables, own, steps, count, k, rows[j, r, 3], damped, state[0], state[1], work)
+                w, c = state_in_step(
+                    motion, tables, own, steps, count, k, rows[j, r, 3], damped, state[0], state[1], work
+                )
                 energy_at(model.pair, model.home, springs_of(motion), own, state[0], state[1], rel, sums)
                 for p in range(n_pair):
                     for axis in range(3):

@@ -8,14 +8,15 @@ time. O(N) memory; with the histories of the response, dg/dalpha at every step's
 import numpy as np
 
 from mdstopo.compiler.jit import entry, kernel
-from mdstopo.integrators.steps import FIRST, Q, V, carve
-from mdstopo.integrators.steps_interface import carried, parent_of, reach, stage_weights, steps_of
+from mdstopo.integrators.steps import FIRST, carve
+from mdstopo.integrators.steps_interface import carried, parent_of, stage_weights, steps_of
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from mdstopo.mechanics.passes import SUMS, energy_gradient, springs_of, unscale_gradient
 from mdstopo.responses.energy import energy_at, energy_slope
 from mdstopo.scene.packing import unpack
 from mdstopo.sensitivity.propagation import apply_matrix, step_matrix
 from mdstopo.sensitivity.reductions import INTEGRAL, MEAN
+from mdstopo.sensitivity.state_in_step import state_in_step
 
 #: in place of the step before, for what is at the start of the motion
 NOWHERE = -2
@@ -68,15 +69,7 @@ def look_at_row(model, tables, strength, steps, count, damped, row, q, v, rel, s
     """
     k = int(row[2])
     c = row[3]
-    w = k
-    c_w = -1.0
-    if c >= 1.0 or (k == 0 and c == 0.0):
-        state = steps.state[k + 1 if c >= 1.0 else 0]
-        for d in range(q.shape[0]):
-            q[d] = state[Q, d]
-            v[d] = state[V, d]
-    else:
-        w, c_w = reach(model, tables, strength, steps, count, k, c, damped, q, v, work)
+    w, c_w = state_in_step(model, tables, strength, steps, count, k, c, damped, q, v, work)
     slope_at(model, strength, q, v, rel, sums, mu_q)
     work[0] += 1
     if k == 0 and c == 0.0:
