@@ -231,7 +231,7 @@ class GeneralDriver:
                 break
             self.quadrature_breakpoints = self.quadrature_breakpoints + more
             code, count, time = self.run(alpha, gradient, self.quadrature_breakpoints)
-        status, message = status_of(code), self._rotation_jump(count) if code == OK else ""
+        status, message = status_of(code), self.rotation_jump(count) if code == OK else ""
         if message:
             status = Status.ROTATION_JUMP
         elif code == OK:
@@ -254,7 +254,7 @@ class GeneralDriver:
                 found[pair] = np.array([bodies.index(name) for name in pair])
         return found
 
-    def _rotation_jump(self, count: int) -> str:
+    def rotation_jump(self, count: int) -> str:
         """Which of these has turned by half a turn, where its vector jumps, in a run of so many steps, and when."""
         if not self._rotations:
             return ""
@@ -323,7 +323,7 @@ class GeneralDriver:
     def _peaks_of_steps(self, j: int, both: bool, count: int, window: float) -> int:
         """The highest peaks of response j, and where `both` are wanted of -g, into its rows; how many they are."""
         found: int = self.ready(
-            f"peaks_of_steps {j}", self.entry.peaks_of_steps, *self._looked_at(count), j, both,
+            f"peaks_of_steps {j}", self.entry.peaks_of_steps, *self._history_arguments(count), j, both,
             self.steps_are_fine, window, self._rows_of[j], self.work,
         )  # fmt: skip
         return found
@@ -360,7 +360,7 @@ class GeneralDriver:
         plain = np.zeros(len(seen), dtype=np.int64) if plain is None else plain
         rows = np.empty(((LAST + 2) * len(t), COLUMNS))
         found = self.entry.peaks_of_pieces(
-            *self._looked_at(count), j, who, pieces, t, seen, plain, sign, window, rows, self.work,
+            *self._history_arguments(count), j, who, pieces, t, seen, plain, sign, window, rows, self.work,
         )  # fmt: skip
         return rows[:found].copy()
 
@@ -412,8 +412,8 @@ class GeneralDriver:
         places, q, out, lam, seen = self._one
         places[0] = place
         self.ready(
-            "sample_response", self.entry.sample_response, *self._looked_at(count), True, True, j, who, places, q, out,
-            lam, seen, self.work,
+            "sample_response", self.entry.sample_response, *self._history_arguments(count), True, True, j, who, places,
+            q, out, lam, seen, self.work,
         )  # fmt: skip
         found: FloatArray = seen[0]
         return found
@@ -458,10 +458,10 @@ class GeneralDriver:
         if kinds - INTEGRALS.keys():
             self._row_gradients.compile()
         if kinds & PEAKS.keys():
-            entry.peaks_of_steps.compile(*self._looked_at(0), 0, True, True, 0.0, self._rows_of[0], self.work)
+            entry.peaks_of_steps.compile(*self._history_arguments(0), 0, True, True, 0.0, self._rows_of[0], self.work)
 
-    def _looked_at(self, count: int) -> tuple[Any, ...]:
-        """What every entry that looks at the steps of the last run begins with."""
+    def _history_arguments(self, count: int) -> tuple[Any, ...]:
+        """The arguments with which every entry begins that reads the history of steps."""
         return (
             self.entry.TAG, self.ints, self.floats, self.method.tables, self.limits, count, self.room, self.room_ints,
             self.member_state,

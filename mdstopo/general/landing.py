@@ -23,7 +23,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, end_s
 #: room: a table, multipliers of a projection, a state, states at cuts with their fractions, poses
 FIELDS = (
     "model", "table", "size", "member_state", "q0", "v0", "q", "v", "a", "workspace", "watched", "scaled", "push",
-    "at_q", "at_v", "cut", "cut_q", "cut_v", "left_q", "left_v", "rel", "before", "few", "one",
+    "at_q", "at_v", "cut", "cut_q", "cut_v", "left_q", "left_v", "rel", "before", "crossed", "single",
 )  # fmt: skip
 #: corrections of the moment after it has been found beside the joints
 CORRECTIONS = 12
@@ -154,20 +154,20 @@ def first_piece(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
 @kernel
 def keep_used(step, t, rounding):
     """Leave on the list of the members that are watched those alone whose margin is used up at time t, `step.rel`."""
-    step.one[0] = 1
+    step.single[0] = 1
     found = 0
     for m in range(1, step.watched[0] + 1):
-        step.one[1] = step.watched[m]
-        margin, _ = smallest_margin(step.model, t, step.member_state, step.rel, step.one)
+        step.single[1] = step.watched[m]
+        margin, _ = smallest_margin(step.model, t, step.member_state, step.rel, step.single)
         if margin < -rounding:
             found += 1
-            step.few[found] = step.watched[m]
-    step.few[0] = found
+            step.crossed[found] = step.watched[m]
+    step.crossed[0] = found
 
 
 @kernel
 def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
-    """Where the smallest margin of the members `step.few` is used up, beside the joints.
+    """Where the smallest margin of the members `step.crossed` is used up, beside the joints.
 
     step: the step (`Landing`), with the poses at `low` in `before`.
     segment: number of the stretch of time between two breakpoints.
@@ -179,8 +179,8 @@ def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
 
     Returns the fraction, on the far side.
     """
-    few = step.few
-    at_low, _ = smallest_margin(step.model, t + low * h, step.member_state, step.before, few)
+    crossed = step.crossed
+    at_low, _ = smallest_margin(step.model, t + low * h, step.member_state, step.before, crossed)
     at_low = max(at_low, rounding)
     side = 0
     last = low
@@ -194,7 +194,7 @@ def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
         middle = next_trial(low, high, at_low, at_high, foreseen, rounding, resolution, tries)
         if middle < 0.0:
             break
-        value, _ = margin_inside(step, segment, t, h, middle, few, np.bool_(False), step.at_q, step.at_v)
+        value, _ = margin_inside(step, segment, t, h, middle, crossed, np.bool_(False), step.at_q, step.at_v)
         before = last
         at_before = at_last
         last = middle
@@ -204,10 +204,31 @@ def root_inside(step, segment, t, h, low, high, at_high, rounding, resolution):
 
 
 @kernel
+def used_before(step, segment, t, h, low, c, at_c, who, rounding):
+    """Whether a margin is used up before a root, as one with a rate in it may be for a while only.
+
+    step: the step (`Landing`), all of whose watched members are looked at.
+    segment: number of the stretch of time between two breakpoints.
+    t, h: time at the start of the step, and its length (s).
+    low: a fraction of the step at which no margin is used up.
+    c, at_c, who: the root, the margin there, and the member that it belongs to.
+    rounding: what rounding leaves of a margin.
+
+    Returns a fraction, 2 where there is none, and the margin there; `step.rel` has the poses.
+    """
+    for probe in range(1, PROBES + 1):
+        earlier = low + (c - low) * probe / PROBES
+        value, other = margin_inside(step, segment, t, h, earlier, step.watched, np.bool_(False), step.at_q, step.at_v)
+        if value < -rounding and (probe < PROBES or (other != who and value < at_c)):
+            return earlier, value
+    return 2.0, 0.0
+
+
+@kernel
 def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolution):
     """Correct the moment of an event that has been found beside the joints: Newton's method between bounds.
 
-    step: the step (`Landing`), whose members `few` are looked at.
+    step: the step (`Landing`), whose members `crossed` are looked at.
     segment: number of the stretch of time between two breakpoints.
     t, h: time at the start of the step, and its length (s).
     low: a fraction of the step at which no margin is used up.
@@ -218,7 +239,7 @@ def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolutio
 
     Returns what `first_event` does.
     """
-    few = step.few
+    crossed = step.crossed
     high = 2.0
     wider = 1.0
     for tries in range(BOUNDED):
@@ -242,10 +263,10 @@ def on_joints(step, segment, t, h, low, c, value, who, rate, rounding, resolutio
             if c <= low or c >= high:
                 c = high
                 low = high
-        value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
+        value, who = margin_inside(step, segment, t, h, c, crossed, np.bool_(True), step.at_q, step.at_v)
     if high > 1.0:
         return 2.0, -1, 0.0
-    _, who = margin_inside(step, segment, t, h, high, few, np.bool_(True), step.at_q, step.at_v)
+    _, who = margin_inside(step, segment, t, h, high, crossed, np.bool_(True), step.at_q, step.at_v)
     return high, who, rate
 
 
@@ -268,7 +289,7 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     if low > 1.0:
         return 2.0, -1, 0.0
     begin = low
-    few = step.few
+    crossed = step.crossed
     resolution = 4e-16 * (abs(t) + h) / h
     jointed = step.model.size[0] > 0
     no = np.bool_(False)
@@ -277,24 +298,18 @@ def first_event(step, segment, t, h, graze, rounding, end_q, end_v, margin, wher
     for _ in range(HIDDEN):
         keep_used(step, t + c * h, rounding)
         c = root_inside(step, segment, t, h, begin, c, at_high, rounding, resolution)
-        at_high, who = margin_inside(step, segment, t, h, c, few, no, step.at_q, step.at_v)
-        value = 0.0
-        for probe in range(1, PROBES + 1):  # is a margin used up before, as one with a rate in it may be for a while?
-            earlier = begin + (c - begin) * probe / PROBES
-            value, other = margin_inside(step, segment, t, h, earlier, step.watched, no, step.at_q, step.at_v)
-            if value < -rounding and (probe < PROBES or (other != who and value < at_high)):
-                break
-            value = 0.0
-        if value == 0.0:
+        at_high, who = margin_inside(step, segment, t, h, c, crossed, no, step.at_q, step.at_v)
+        earlier, lower = used_before(step, segment, t, h, begin, c, at_high, who, rounding)
+        if earlier > 1.0:
             break
         c = earlier
-        at_high = value
+        at_high = lower
     beside = c - BESIDE * (c - begin)
-    step.one[0] = 1  # its margin alone has a slope there: that of another may be the smallest before
-    step.one[1] = who
-    value, _ = margin_inside(step, segment, t, h, beside, step.one, no, step.at_q, step.at_v)
+    step.single[0] = 1  # its margin alone has a slope there: that of another may be the smallest before
+    step.single[1] = who
+    value, _ = margin_inside(step, segment, t, h, beside, step.single, no, step.at_q, step.at_v)
     rate = (at_high - value) / ((c - beside) * h) if c > beside else 0.0
-    value, who = margin_inside(step, segment, t, h, c, few, np.bool_(True), step.at_q, step.at_v)
+    value, who = margin_inside(step, segment, t, h, c, crossed, np.bool_(True), step.at_q, step.at_v)
     if not jointed:
         return c, who, rate
     return on_joints(step, segment, t, h, begin, c, value, who, rate, rounding, resolution)
