@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 #: how long the steps beside a norm's zero are, relative to the step that it was found in: the last stage of a step is
 #: off by its length to the sixth power or so
 BESIDE = 0.1
+#: fractions of a step at which values beside a kink are compared, one after the other
+DISTANCES = (3e-3, 1e-4, 3e-6, 1e-7)
 
 
 def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
@@ -41,6 +43,8 @@ def kinks(driver: "GeneralDriver", j: int, t: FloatArray) -> list[float]:
         if low > LOW * highest or not t[0] < row[0] < t[-1]:
             continue
         w, c = int(row[STEP]), _sharpened(int(row[STEP]), float(row[FRACTION]), pieces.evaluate_at)
+        if min(w + c, len(pieces.t) - 1 - w - c) <= DISTANCES[-1]:  # zero from the start, or to the end: no kink
+            continue
         time = float(pieces.t[w] + c * (pieces.t[w + 1] - pieces.t[w]))
         found.append(time)
         around = _around(time, low, rate, float(t[0]), float(t[-1]))
@@ -56,7 +60,7 @@ def _sharpened(w: int, c: float, evaluate_at: EvaluateAt) -> float:
 
     On both sides the value is a line through zero, so that two values tell where.
     """
-    for d in (3e-3, 1e-4, 3e-6, 1e-7):
+    for d in DISTANCES:
         if c <= d or c >= 1.0 - d:
             break
         left, right = evaluate_at(np.array([[w, c - d], [w, c + d]]), True)[:, 0].tolist()
