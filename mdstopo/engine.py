@@ -8,16 +8,16 @@ simulation.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from mdstopo.case.errors import CaseError
-from mdstopo.case.integrators import AUTO
+from mdstopo.case.integrators import ADAPTIVE, AUTO, INTEGRATORS, STIFF
 from mdstopo.case.model import Case, MemberGroup, Objective, ResponseRow
 from mdstopo.evaluation import USUAL, Evaluation, FloatArray, Peak, Rows, Shape
 from mdstopo.integrators.choice import choose, method_of
-from mdstopo.integrators.scene_driver import DriverOptions, ResponseResult, Scene, SceneDriver, SceneFamily
+from mdstopo.integrators.scene_driver import DriverOptions, Method, ResponseResult, Scene, SceneDriver, SceneFamily
 from mdstopo.integrators.steps import WORK, work_named
 from mdstopo.integrators.trajectory import Trajectory
 from mdstopo.scene.border import border_of
@@ -32,6 +32,7 @@ from mdstopo.warm import Beside
 
 if TYPE_CHECKING:
     from mdstopo.error_estimate import Estimator
+    from mdstopo.general.general_driver import GeneralDriver
     from mdstopo.general.settle import Settled
     from mdstopo.optimizer.problem import Problem
     from mdstopo.optimizer.scalarisation import Scalarisation
@@ -59,14 +60,14 @@ class Evaluator:
             raise CaseError(refused, str(case.path or case.name))
         self.case = case
         self.beyond = beyond_springs(case)
-        self.integrator, self.integrator_reason = choose(case.solver, self.beyond, collocates(case))
+        self._usual = choose(case.solver, self.beyond, collocates(case))
         self.sensitivity = "adjoint" if case.solver.sensitivity == "auto" else case.solver.sensitivity
-        self._method = method_of(self.integrator, case.solver)
+        kind = INTEGRATORS[self._usual[0]]
         # whether `auto` has to give way to the steps that the iterative method is defined on
-        self._gives_way = case.solver.integrator == AUTO and not self._method.kind.iterative
-        self._may_be_coarse = case.solver.step is not None and self._method.kind.finds_step
+        self._gives_way = case.solver.integrator == AUTO and not kind.iterative
+        self._may_be_coarse = case.solver.step is not None and kind.finds_step
         self._compiles_beside = beside
-        self._beside = Beside(self.integrator, share) if beside and not self.beyond else None
+        self._beside = Beside(kind.name, share) if beside and not self.beyond else None
         #: what the scenes' coordinates are measured from, and the case in these
         self._origin = origin_of(case)
         self._near = seen_from(case, self._origin)
@@ -104,6 +105,16 @@ class Evaluator:
         self._others: dict[tuple[Any, ...], Evaluator] = {}
 
     # -- what a run asks
+
+    @property
+    def integrator(self) -> str:
+        """The integrator's name; `auto` may have to simulate the case's start to choose."""
+        return self._choice[0]
+
+    @property
+    def integrator_reason(self) -> str:
+        """Why it is this one, as a sentence without a full stop."""
+        return self._choice[1]
 
     @property
     def skipped(self) -> list[str]:
@@ -313,19 +324,45 @@ class Evaluator:
                 return f"alpha = 0 in group {name}, whose power {power:g} is below 1"
         return ""
 
+    @cached_property
+    def _choice(self) -> tuple[str, str]:
+        """The integrator, and why; where `auto` would take explicit steps, their motions from the case's start tell."""
+        name, reason = self._usual
+        chooses = self.case.solver.integrator == AUTO and self.case.solver.step is None
+        if not chooses or name != ADAPTIVE or self.case.dimension > 2:
+            return name, reason
+        from mdstopo.general.stiffness import held_short, may_be_stiff
+
+        if not may_be_stiff(self.case):
+            return name, reason
+        explicit = method_of(ADAPTIVE, self.case.solver)
+        drivers = {scene: self._made(scene, explicit) for scene, looked in self._by_load_case.items() if looked}
+        for driver in drivers.values():
+            held = held_short(cast("GeneralDriver", driver), self._design.take(self.case.start))
+            if held:
+                return STIFF, held
+        self._drivers.update(drivers)
+        return name, reason
+
     def driver(self, name: str) -> SceneDriver:
         """The buffers and compiled entries of one load case, made at their first use."""
         if name not in self._drivers:
-            solver, looked = self.case.solver, tuple(self._by_load_case[name].values())
-            tolerance, step = _of_motion(solver.tolerance), solver.step or 0.0
-            options = DriverOptions(self._method, tolerance, step, looked, self._design.values, self._beside)
-            driver = self._family.driver(self._near, self.scenes[name], options)
-            if self._method.kind.finds_step and solver.step is None:
-                from mdstopo.integrators.default_step import default_step
-
-                driver.settings[2] = default_step(driver, self.case.start)
-            self._drivers[name] = driver
+            method = method_of(self.integrator, self.case.solver)
+            if name not in self._drivers:  # the choice of the integrator may have made it
+                self._drivers[name] = self._made(name, method)
         return self._drivers[name]
+
+    def _made(self, name: str, method: Method) -> SceneDriver:
+        """A driver of one load case by a method."""
+        solver, looked = self.case.solver, tuple(self._by_load_case[name].values())
+        tolerance, step = _of_motion(solver.tolerance), solver.step or 0.0
+        options = DriverOptions(method, tolerance, step, looked, self._design.values, self._beside)
+        driver = self._family.driver(self._near, self.scenes[name], options)
+        if method.kind.finds_step and solver.step is None:
+            from mdstopo.integrators.default_step import default_step
+
+            driver.settings[2] = default_step(driver, self.case.start)
+        return driver
 
     def _coarse_step(self, name: str, design: FloatArray) -> str:
         """Why the fixed step of generalized_alpha is far too large for a load case, or nothing; asked once."""

@@ -19,7 +19,8 @@ class IntegratorKind(NamedTuple):
     by itself. order: of the error of fixed steps in their length.
     explicit: whether stages follow from those before them. has_radius: whether it takes a spectral radius; iterative:
     whether the iterative sensitivity method is defined on its steps. free_only: whether its steps carry free bodies and
-    smooth forces alone (`scene.family.beyond_collocation`), and of general scenes those in space.
+    smooth forces alone (`scene.family.beyond_collocation`), and of general scenes those in space. planar: whether its
+    steps carry bodies in a plane alone.
     """
 
     name: str
@@ -34,6 +35,7 @@ class IntegratorKind(NamedTuple):
     has_radius: bool = False
     iterative: bool = False
     free_only: bool = False
+    planar: bool = False
 
 
 #: the integrators by their name
@@ -69,17 +71,27 @@ INTEGRATORS: dict[str, IntegratorKind] = {
             has_radius=True,
             iterative=True,
         ),
+        IntegratorKind(
+            "esdirk",
+            "implicit, adaptive and L-stable, of order 4; for stiff contacts and dampers in a plane",
+            "mdstopo.integrators.choice:esdirk",
+            general="mdstopo.general.esdirk_entry",
+            adaptive=True,
+            order=4,
+            planar=True,
+        ),
     )
 }
 #: the word for the integrator that suits the case, and the ones that it is in the end
 AUTO = "auto"
-SMOOTH, ADAPTIVE, FIXED = "gauss", "runge_kutta", "generalized_alpha"
+SMOOTH, ADAPTIVE, FIXED, STIFF = "gauss", "runge_kutta", "generalized_alpha", "esdirk"
 
 
 def names(_: bool = False) -> dict[str, str]:
     """The words of `solver.integrator` with what they mean."""
     auto = (
-        "gauss where it goes: free bodies, in a plane springs and their energy; else runge_kutta; the reason is printed"
+        "gauss where it goes: free bodies, in a plane springs and their energy; else runge_kutta, or esdirk where "
+        "stability holds most steps short; the reason is printed"
     )
     return {AUTO: auto, **{kind.name: kind.doc for kind in INTEGRATORS.values()}}
 

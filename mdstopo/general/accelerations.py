@@ -342,6 +342,42 @@ def solve_unknowns(model, workspace, a, lam):
 
 
 @kernel
+def newton_correction(model, workspace, w_q, w_v, off, change, row):
+    """What Newton's iteration adds to accelerations whose stage is implicit: W x = M off, Phi_q x = Phi_q off.
+
+    Constant:
+      model: the compiled scene.
+    In:
+      w_q, w_v: by how much the stage's coordinates (s^2) and velocities (s) change with its accelerations.
+      off (n,): accelerations of the balance, less those that the stage has.
+    In place:
+      workspace: the workspace, with the balance and its tangents, and those of the shift (`shift_tangents`); the
+        factors of W come onto it.
+    Out:
+      change (n,), row (n_row,): what is added to accelerations and multipliers; driven parts are 0.
+    """
+    for d in range(off.shape[0]):
+        change[d] = model.mass[d] * off[d]
+    row[:] = 0.0
+    for p in range(model.pair.shape[0]):
+        for i in range(pair_freedoms(model)):
+            total = 0.0
+            for j in range(pair_freedoms(model)):
+                total += workspace.mass[p, i, j] * off[place_in_pair(model, p, j)]
+            change[place_in_pair(model, p, i)] += total
+    for j in range(model.joint.shape[0]):
+        for r in range(most_rows(model)):
+            if model.row[j, r] >= 0:
+                for i in range(pair_freedoms(model)):
+                    row[model.row[j, r]] += workspace.jac[j, r, i] * off[place_in_joint(model, j, i)]
+    factor_matrix(
+        model, workspace, workspace.k, workspace.c, workspace.turn, workspace.mass, w_q, w_v,
+        workspace.tangents[OF_STEP], np.bool_(False),
+    )  # fmt: skip
+    solve_unknowns(model, workspace, change, row)
+
+
+@kernel
 def solve_accelerations(model, member_state, segment, t, q, v, tangent, workspace, a, lam):
     """Accelerations and multipliers at one state.
 

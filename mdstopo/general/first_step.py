@@ -3,7 +3,7 @@
 A step that is far too long gives no estimate of how far. What the parabola through the start's accelerations neglects
 does: theta(h), the change of the accelerations over it times h^2/2, relative to the motion as the error of a step is.
 It grows as (h/tau)^2 (where the accelerations have a slope, as h/tau), which gives tau, the time in which the motion
-bends; the error of a step is about FIRST (h/tau)^order.
+bends; the error of a step is about first_error (h/tau)^order.
 """
 
 import numpy as np
@@ -31,9 +31,6 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
 )
 from mdstopo.mechanics.laws.table import law_is_given, law_unstretched
 
-#: error of a step of the length tau, relative to the motion: of both methods (`runge_kutta_tables`); measured on rings,
-#: linkages and contacts, from 2e-7 to 2e-5 for the second
-FIRST = 1e-8, 4e-6
 #: balances at most; the theta that is small enough to tell tau, the one that is aimed at, and the one from which on it
 #: tells nothing: it cannot be larger than 3, as the motion's size has the change of the accelerations in it
 PROBES, ENOUGH, AIM, HOPELESS = 6, 0.5, 0.1, 2.0
@@ -121,8 +118,9 @@ def motion_scale(model, q, rel, rel0, motion, noise, tolerance, scale):
 
 @kernel
 def first_step(
-    model, member_state, end, q0, v0, a0, rel0, motion, noise, tolerance, order, workspace, lam, q, v, a, work
-):
+    model, member_state, end, q0, v0, a0, rel0, motion, noise, tolerance, order, first_error, workspace, lam, q, v, a,
+    work,
+):  # fmt: skip
     """Length of the first step (s).
 
     Constant:
@@ -133,6 +131,7 @@ def first_step(
       rel0 (n_pair, POSE): relative poses at the start.
       motion, noise (n_pair,): how far each pair is strained at the start, and what rounding leaves of that (m).
       tolerance, order: error that a step may have, relative; order of the method.
+      first_error: error of a step of the length tau, relative to the motion.
     Out:
       lam (n_row,), q (n_q,), v, a (n,): scratch.
       workspace: workspace of a balance, overwritten.
@@ -172,7 +171,7 @@ def first_step(
         if theta <= ENOUGH:
             tau = h / np.sqrt(max(theta, 1e-30))
             turned = largest_turn(model, q0, q) / h
-            allowed = tau * (tolerance / FIRST[1 if model.size[2] != 0 else 0]) ** (1.0 / order)
+            allowed = tau * (tolerance / first_error) ** (1.0 / order)
             return min(allowed, TURN / max(turned, 1e-300))
         h *= max(np.sqrt(AIM / theta), 0.1) if theta < HOPELESS else 0.1
     return end - t  # no length was short enough to tell tau

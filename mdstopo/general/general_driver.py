@@ -117,6 +117,7 @@ class GeneralDriver:
         self._inertial = bool(np.any(model.block[:, 3] == INERTER))
         self._entry: Any = None
         self._message = ""
+        self._allowed = MAX_STEPS
         self._make_room(method.steps, method.stages, 64)
         self._fit()
         #: at rest, where the case asks for it
@@ -148,12 +149,16 @@ class GeneralDriver:
         """Whether vectors have one direction across them, which rows of norms can tell (`evaluation.Peak.across`)."""
         return self.scene.kinematics.rotations == 1
 
+    def allow(self, steps: int) -> None:
+        """A run may take so many steps; else it ends with STEP_LIMIT."""
+        self._allowed = self.limits[0] = steps
+
     def _make_room(self, steps: int, stages: int, events: int) -> None:
         # the reverse sweep uses a stage's factors again where it is explicit and the mass is diagonal
         kept = FACTORS if self.method.kind.explicit and not self._inertial else 0
         if self.method.collocates:
             kept = WINDOWS
-        self.limits = np.array([MAX_STEPS, steps, stages, events, self._inertial, kept], dtype=np.int64)
+        self.limits = np.array([self._allowed, steps, stages, events, self._inertial, kept], dtype=np.int64)
         floats, ints = history_room(self.scene.model, self.limits)
         self.room = np.zeros(floats)
         self.room_ints = np.zeros(ints, dtype=np.int64)

@@ -15,6 +15,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import entry
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
+from mdstopo.general.adaptive_steps import CHATTER, ROUNDING, log_switches, scene_size, start_modes
 from mdstopo.general.events import first_sign, has_switches, room_for_watched, smallest_margin, watch_all
 from mdstopo.general.first_step import rounding_at_start
 from mdstopo.general.generalized_alpha_step import AUXILIARY, VELOCITY, advance, rate_of
@@ -32,7 +33,6 @@ from mdstopo.general.locate import (
 from mdstopo.general.members import MODE, SET, meeting, scale_general
 from mdstopo.general.model import unpack_general
 from mdstopo.general.permanent_sets import begins_divided
-from mdstopo.general.runge_kutta import CHATTER, ROUNDING, log_switches, scene_size, start_modes
 from mdstopo.general.step_history import (
     EVENTS,
     FIRST,

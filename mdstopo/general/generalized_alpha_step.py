@@ -3,10 +3,9 @@
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.accelerations import OF_STEP, factor_matrix, solve_accelerations, solve_unknowns, subtract_matrices
+from mdstopo.general.accelerations import OF_STEP, newton_correction, solve_accelerations, subtract_matrices
 from mdstopo.general.projection import project
 from mdstopo.general.step_history import copy_vector, keep_stage
-from mdstopo.general.strides import pair_freedoms, place_in_joint, place_in_pair
 from mdstopo.integrators.gauss_equations import CLOSELY
 from mdstopo.integrators.generalized_alpha import MOST, RESOLVED, RESTART, weights_of
 from mdstopo.integrators.steps import FORCES, NEWTON, NEWTON_FAILED, NON_FINITE, OK, SINGULAR, TANGENTS
@@ -14,7 +13,6 @@ from mdstopo.mechanics.kinematics.kinematics_interface import (
     advance_coordinates,
     deflection,
     drive_state,
-    most_rows,
     motion_weights,
     noise_of,
     retract,
@@ -181,34 +179,8 @@ def advance(
             if model.free[d] == 0:
                 now[d] = balanced[d]
             balanced[d] -= now[d]
-            delta[d] = model.mass[d] * balanced[d]
-        row[:] = 0.0
-        for p in range(model.pair.shape[0]):
-            for i in range(pair_freedoms(model)):
-                total = 0.0
-                for j in range(pair_freedoms(model)):
-                    total += workspace.mass[p, i, j] * balanced[place_in_pair(model, p, j)]
-                delta[place_in_pair(model, p, i)] += total
-        for j in range(model.joint.shape[0]):
-            for r in range(most_rows(model)):
-                if model.row[j, r] >= 0:
-                    for i in range(pair_freedoms(model)):
-                        column = place_in_joint(model, j, i)
-                        row[model.row[j, r]] += workspace.jac[j, r, i] * balanced[column]
         shift_tangents(model, q0, q, workspace.tangents[OF_STEP])
-        factor_matrix(
-            model,
-            workspace,
-            workspace.k,
-            workspace.c,
-            workspace.turn,
-            workspace.mass,
-            h * h * beta * e1,
-            h * gamma * e1,
-            workspace.tangents[OF_STEP],
-            np.bool_(False),
-        )
-        solve_unknowns(model, workspace, delta, row)
+        newton_correction(model, workspace, h * h * beta * e1, h * gamma * e1, balanced, delta, row)
         rounding = 1e-8
         for p in range(model.pair.shape[0]):
             turned_pose(model, p, workspace.turned, q, v, workspace.rel)

@@ -8,6 +8,11 @@ The tag is a tuple of zeros whose length says which method is meant. A method ha
 4. `beside`: the motion a little later; `derivatives`: how many of its derivatives are those of the balance;
    `is_continuous`: whether states inside a step are at hand;
 5. `weights_of`: weights of a step's stages in an integral.
+
+A Runge-Kutta method that takes the steps of `adaptive_steps` has four more:
+
+6. `make_stages`: the balances of its stages; `step_error`: what they tell of the step's error;
+7. `scheme`: how many stages it has, and its order; `is_explicit`: whether stages follow from those before them.
 """
 
 from collections.abc import Callable
@@ -24,7 +29,13 @@ IMPLEMENTED: dict[str, dict[int, Any]] = {
     "derivatives": {},
     "is_continuous": {},
     "weights_of": {},
+    "make_stages": {},
+    "step_error": {},
+    "scheme": {},
+    "is_explicit": {},
 }
+#: what `make_stages` returns of an implicit stage that is not found: no place of an unknown
+UNSOLVED = 2**40
 
 
 def point_of(tag, model, tables, member_state, history, count, k, c, keep, workspace, q, v, work):
@@ -131,6 +142,65 @@ def weights_of(tag, model, tables, history, w, out):
     raise NotImplementedError
 
 
+def make_stages(
+    tag, model, table, first, stop, member_state, segment, t, h, q0, v0, tangent, o, workspace, lam, q, v, a, history,
+    work,
+):  # fmt: skip
+    """Make the balances of some stages of a step.
+
+    Constant:
+      tag: the integrator.
+      model: the compiled scene.
+      table (3, 17, 17): coefficients of the method.
+      first, stop: numbers of the first stage to be made, and of the one behind the last.
+    In:
+      member_state (3, columns): state of the members.
+      segment: number of the stretch of time between two breakpoints.
+      t, h: time at the start, and length of the step (s).
+      q0 (n_q,), v0 (n,): coordinates and velocities at the start.
+      tangent: whether the tangents of the stages are wanted.
+      o: number in `history` of the step's stage 0; -1: stages are not kept.
+    Out:
+      workspace: workspace of a balance, overwritten.
+      lam (n_row,): multipliers of the joints at the last stage.
+      q (17, n_q), v, a (17, n): coordinates, velocities, accelerations of the stages; of implicit methods a has behind
+        them what `step_error` reads.
+      history: the history of steps, where stages are kept.
+      work (WORK,): counts of work, added to.
+
+    Returns -1, the place of an unknown at which the joints are singular, or UNSOLVED.
+    """
+    raise NotImplementedError
+
+
+def step_error(tag, vectors, s, h, longest, a, weight):
+    """Estimate the error of a step relative to the motion; NaN where one appears.
+
+    Constant:
+      tag: the integrator.
+      vectors (17, 17): plane VECTORS of the method's table.
+      s: number of stages.
+    In:
+      h, longest: lengths of the step, and of the longest so far (s).
+      a (17, n): as `make_stages` leaves them.
+      weight (n,): of `motion_weights`.
+    """
+    raise NotImplementedError
+
+
+def scheme(tag, method):
+    """Number of stages, order, and the error of a first step (`first_step`).
+
+    tag: the integrator. method: 0 where nothing depends on velocity and nothing switches, else 1.
+    """
+    raise NotImplementedError
+
+
+def is_explicit(tag):
+    """Whether stages follow from those before them."""
+    raise NotImplementedError
+
+
 def implement(tag: tuple[int, ...], **functions: Callable[..., Any]) -> None:
     """Enter a method's compiled functions."""
     for name, function in functions.items():
@@ -141,5 +211,8 @@ def _of(name: str, tag: Any) -> Any:
     return IMPLEMENTED[name][len(tag)]
 
 
-for _stub in (point_of, step_back, step_forward, beside, derivatives, is_continuous, weights_of):
+for _stub in (
+    point_of, step_back, step_forward, beside, derivatives, is_continuous, weights_of, make_stages, step_error, scheme,
+    is_explicit,
+):  # fmt: skip
     by_type(_stub, "tag", partial(_of, _stub.__name__))

@@ -1,15 +1,17 @@
-"""The interface functions of the explicit methods: partial steps, reverse and tangent steps, weights."""
+"""The interface functions of Runge-Kutta methods: partial steps, reverse and tangent steps, weights."""
+
+from typing import Any
 
 import numpy as np
 
 from mdstopo.compiler.jit import kernel
-from mdstopo.general.method_interface import implement
-from mdstopo.general.runge_kutta import TAG, advance, scene_size
+from mdstopo.general.adaptive_steps import advance, scene_size
+from mdstopo.general.method_interface import implement, scheme
+from mdstopo.general.runge_kutta import TAG
 from mdstopo.general.step_history import EVENTS, FIRST, PARENT, SEGMENT, keep_state, restore_modes
 from mdstopo.general.step_inside import table_of_step
-from mdstopo.general.step_linear import explicit_back, explicit_forward
+from mdstopo.general.step_linear import changes_forward, steps_back
 from mdstopo.integrators.runge_kutta import MOST
-from mdstopo.integrators.runge_kutta_tables import STAGES
 from mdstopo.integrators.steps import OF_POINTS
 from mdstopo.mechanics.kinematics.kinematics_interface import advance_coordinates
 
@@ -40,13 +42,13 @@ def point_of(tag, model, tables, member_state, history, count, k, c, keep, works
     n = v.shape[0]
     n_q = q.shape[0]
     method = 1 if model.size[2] != 0 else 0
-    s = STAGES[method]
+    s = scheme(tag, method)[0]
     h = c * (history.t[k + 1] - history.t[k])
     o = history.index[count, FIRST]
     push = np.empty((2, model.size[0]))
     restore_modes(history, history.index[k, EVENTS], member_state)
     advance(
-        model, tables[method], s, member_state, history.index[k, SEGMENT], history.t[k], h, history.q[k],
+        tag, model, tables[method], s, member_state, history.index[k, SEGMENT], history.t[k], h, history.q[k],
         history.v[k], keep, o if keep else np.int64(-1), workspace, np.empty(model.size[0]), np.empty((MOST, n_q)),
         np.empty((MOST, n)), np.empty((MOST, n)), history, q, v, push, scene_size(model), work,
     )  # fmt: skip
@@ -86,7 +88,7 @@ def step_back(tag, model, tables, history, w, c, lam_q, lam_v, lam_x, bars, rows
       workspace: workspace of a balance (`accelerations.Workspace`).
       work (WORK,): counts of work, added to.
     """
-    explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work)
+    steps_back(tag, model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work)
 
 
 @kernel
@@ -110,7 +112,7 @@ def step_forward(tag, model, tables, history, w, c, sweeps, dq, dv, dx, force, c
 
     Returns True: there are no sweeps that might not settle.
     """
-    explicit_forward(model, tables, history, w, dq, dv, force, changes, rows, workspace)
+    changes_forward(tag, model, tables, history, w, dq, dv, force, changes, rows, workspace)
     return True
 
 
@@ -152,18 +154,19 @@ def weights_of(tag, model, tables, history, w, out):
     w: number of the step.
     out (s or more,): the weights (s).
     """
-    table, stages = table_of_step(model, tables, history, w)
+    table, stages = table_of_step(tag, model, tables, history, w)
     for j in range(stages):
         out[j] = (history.t[w + 1] - history.t[w]) * table[2, 2, j]
 
 
-implement(
-    TAG,
-    point_of=point_of,
-    step_back=step_back,
-    step_forward=step_forward,
-    beside=beside,
-    derivatives=derivatives,
-    is_continuous=is_continuous,
-    weights_of=weights_of,
-)
+#: what all Runge-Kutta methods have in common
+COMMON: dict[str, Any] = {
+    "point_of": point_of,
+    "step_back": step_back,
+    "step_forward": step_forward,
+    "beside": beside,
+    "derivatives": derivatives,
+    "is_continuous": is_continuous,
+    "weights_of": weights_of,
+}
+implement(TAG, **COMMON)

@@ -13,6 +13,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import solve_accelerations
+from mdstopo.general.method_interface import is_explicit, scheme
 from mdstopo.general.projection import project
 from mdstopo.general.step_history import FIRST, has_factors, keep_stage
 from mdstopo.general.switches import APART, THOROUGH
@@ -23,6 +24,7 @@ from mdstopo.mechanics.kinematics.kinematics_interface import drive_state, end_s
 
 @kernel
 def make_stages(
+    tag,
     model,
     table,
     first,
@@ -43,9 +45,10 @@ def make_stages(
     history,
     work,
 ):
-    """Make the balances of some stages of a step.
+    """Make the balances of some explicit stages of a step.
 
     Constant:
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       table (3, 17, 17): coefficients of the method (`integrators.runge_kutta_tables`).
       first, stop: numbers of the first stage to be made, and of the one behind the last.
@@ -88,9 +91,13 @@ def make_stages(
 def weigh_inside(table, c, out):
     """The rows BB and B of a step that ends at fraction c of the one with this table, of its 16 stages.
 
-    table (3, 17, 17): of the second method (`integrators.runge_kutta_tables`).
+    table (3, 17, 17): of the second method (`integrators.runge_kutta_tables`), or of one without rows D: then the
+      polynomial is the quintic through both ends (`weigh_quintic`).
     out (3, 17, 17): whose rows BB and B are set, for the length c h.
     """
+    if table[VECTORS, D, 0] == 0.0:
+        weigh_quintic(table, c, out)
+        return
     d = 1.0 - c
     rows = table[VECTORS]
     for j in range(INSIDE):
@@ -104,6 +111,41 @@ def weigh_inside(table, c, out):
         for i in range(j + 1, INSIDE):
             total += out[VECTORS, B, i] * table[A, i, j]
         out[VECTORS, BB, j] = total / c
+
+
+@kernel
+def weigh_quintic(table, c, out):
+    """`weigh_inside` of a method whose last stage is the end of the step.
+
+    Position, velocity and acceleration at both ends are sums over the stages, so is the quintic through them:
+    q(c h) = q_0 + c h v_0 + h^2 sum_j w_j a_j, with w_j of Hermite's polynomials, and v(c h) is its derivative.
+
+    table (3, 17, 17): coefficients of the method.
+    out (3, 17, 17): whose rows BB and B are set, for the length c h.
+    """
+    rows = table[VECTORS]
+    last = 0
+    for j in range(INSIDE):
+        if rows[B, j] != 0.0:
+            last = j
+    square = c * c
+    d = 1.0 - c
+    for j in range(INSIDE):
+        begin = 1.0 if j == 0 else 0.0
+        end = 1.0 if j == last else 0.0
+        place = square * c * (10.0 + c * (6.0 * c - 15.0))
+        speed = square * c * (c * (7.0 - 3.0 * c) - 4.0)
+        out[VECTORS, BB, j] = (
+            place * rows[BB, j] + speed * rows[B, j] + 0.5 * square * d * d * (d * begin + c * end)
+        ) / square
+        place = 30.0 * square * d * d
+        speed = square * (c * (28.0 - 15.0 * c) - 12.0)
+        out[VECTORS, B, j] = (
+            place * rows[BB, j]
+            + speed * rows[B, j]
+            + c * d * d * (1.0 - 2.5 * c) * begin
+            + 0.5 * square * d * (3.0 - 5.0 * c) * end
+        ) / c
 
 
 @kernel
@@ -121,9 +163,10 @@ def table_inside(table, c, out):
 
 
 @kernel
-def table_of_step(model, tables, history, w):
+def table_of_step(tag, model, tables, history, w):
     """The table (3, 17, 17) of step w, and the number of its stages; it may be one that ends inside (`table_inside`).
 
+    tag: the method of integration (`method_interface`).
     model: the compiled scene.
     tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
     history, w: the history of steps (`StepHistory`), and the step.
@@ -131,7 +174,7 @@ def table_of_step(model, tables, history, w):
     method = 1 if model.size[2] != 0 else 0
     s = history.index[w + 1, FIRST] - history.index[w, FIRST]
     table = tables[method]
-    if s != STAGES[method]:
+    if is_explicit(tag) and s != scheme(tag, method)[0]:
         table = np.zeros(tables.shape[1:])
         table_inside(tables[method], history.share[w], table)
     return table, s

@@ -1,4 +1,4 @@
-"""Stages and explicit steps of a general scene, linearised: what reverse and tangent steps are made of."""
+"""Stages and Runge-Kutta steps of a general scene, linearised: what reverse and tangent steps are made of."""
 
 import numpy as np
 
@@ -16,10 +16,12 @@ from mdstopo.general.accelerations import (
     solve_unknowns,
 )
 from mdstopo.general.joint_matrix import solve_joints
+from mdstopo.general.method_interface import is_explicit
 from mdstopo.general.projection import project_back, project_forward
 from mdstopo.general.step_history import FIRST, has_factors, mass_of
 from mdstopo.general.step_inside import table_of_step
 from mdstopo.general.switches import DAMPED
+from mdstopo.integrators.runge_kutta_tables import AA, A
 from mdstopo.integrators.steps import REVERSE
 from mdstopo.mechanics.kinematics.kinematics_interface import (
     add_shift,
@@ -136,10 +138,24 @@ def stage_back(model, history, o, workspace, z, y, bar_q, bar_v):
 
 
 @kernel
-def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work):
-    """Pull R cotangents of the end of an explicit step back to its start.
+def own_weights(tag, table, j, h):
+    """By how much coordinates (s^2) and velocities (s) of stage j change with its own accelerations: 0 if explicit.
+
+    tag: the method of integration (`method_interface`).
+    table (3, 17, 17): coefficients of the method.
+    j, h: the stage, and the length of the step (s).
+    """
+    if is_explicit(tag):
+        return 0.0, 0.0
+    return h * h * table[AA, j, j], h * table[A, j, j]
+
+
+@kernel
+def steps_back(tag, model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y, workspace, work):
+    """Pull R cotangents of the end of a Runge-Kutta step back to its start.
 
     Constant:
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
       history: the history of steps (`StepHistory`).
@@ -156,7 +172,7 @@ def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y,
       work (WORK,): counts of work, added to.
     """
     count, n = lam_q.shape
-    table, s = table_of_step(model, tables, history, w)
+    table, s = table_of_step(tag, model, tables, history, w)
     o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
     work[REVERSE] += count
@@ -168,11 +184,13 @@ def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y,
     g = np.zeros((count, s, n))
     for back in range(s):
         j = s - 1 - back
-        prepare_stage_back(model, history, o + j, 0.0, 0.0, workspace)
+        w_q, w_v = own_weights(tag, table, j, h)
+        prepare_stage_back(model, history, o + j, w_q, w_v, workspace)
         for m in range(count):
-            _explicit_stage_back(
-                model, table, history, o, j, h, q, v, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m], workspace
-            )
+            _runge_kutta_stage_back(
+                tag, model, table, history, o, j, h, q, v, bars, rows_bar, lam_q[m], lam_v[m], z[m], y, u[m], g[m],
+                workspace,
+            )  # fmt: skip
     for m in range(count):
         start_vjp(model, table, s, h, q, v, u[m], g[m], lam_q[m], lam_v[m])
         for i in range(model.driven.shape[0]):
@@ -181,10 +199,13 @@ def explicit_back(model, tables, history, w, bars, rows_bar, lam_q, lam_v, z, y,
 
 
 @part
-def _explicit_stage_back(model, table, history, o, j, h, q, v, bars, rows_bar, lam_q, lam_v, z, y, u, g, workspace):
-    """One stage of `explicit_back`, for one row of cotangents.
+def _runge_kutta_stage_back(
+    tag, model, table, history, o, j, h, q, v, bars, rows_bar, lam_q, lam_v, z, y, u, g, workspace
+):  # fmt: skip
+    """One stage of `steps_back`, for one row of cotangents.
 
     Constant:
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       table (3, 17, 17): coefficients of the method.
       history: the history of steps (`StepHistory`).
@@ -208,6 +229,10 @@ def _explicit_stage_back(model, table, history, o, j, h, q, v, bars, rows_bar, l
             z[j, d] += bars[j, 2, d]
             u[j, d] = bars[j, 0, d]
             g[j, d] = bars[j, 1, d]
+        if not is_explicit(tag):
+            w_q, w_v = own_weights(tag, table, j, h)
+            for d in range(n):
+                z[j, d] += w_q * u[j, d] + w_v * g[j, d]
         for r in range(y.shape[0]):
             y[r] = rows_bar[j, r]
     stage_back(model, history, o + j, workspace, z[j], y, u[j], g[j])
@@ -217,10 +242,11 @@ def _explicit_stage_back(model, table, history, o, j, h, q, v, bars, rows_bar, l
 
 
 @kernel
-def explicit_forward(model, tables, history, w, dq, dv, force, stage_changes, row_changes, workspace):
-    """Push changes of the start of an explicit step, and of the forces at its stages, to its end.
+def changes_forward(tag, model, tables, history, w, dq, dv, force, stage_changes, row_changes, workspace):
+    """Push changes of the start of a Runge-Kutta step, and of the forces at its stages, to its end.
 
     Constant:
+      tag: the method of integration (`method_interface`).
       model: the compiled scene.
       tables (2, 3, 17, 17): coefficients of both methods (`integrators.runge_kutta_tables`).
       history: the history of steps (`StepHistory`).
@@ -235,7 +261,7 @@ def explicit_forward(model, tables, history, w, dq, dv, force, stage_changes, ro
       workspace: workspace of a balance (`accelerations.Workspace`).
     """
     n = dq.shape[0]
-    table, s = table_of_step(model, tables, history, w)
+    table, s = table_of_step(tag, model, tables, history, w)
     o = history.index[w, FIRST]
     h = history.t[w + 1] - history.t[w]
     q = history.stage_q[o : o + s]
@@ -249,7 +275,12 @@ def explicit_forward(model, tables, history, w, dq, dv, force, stage_changes, ro
                 x[1, d] = 0.0
             x[2, d] = force[i, d]
         row_changes[i] = 0.0
-        stage_forward(model, history, o + i, 0.0, 0.0, 0, workspace, x[0], x[1], x[2], row_changes[i])
+        w_q, w_v = own_weights(tag, table, i, h)
+        stage_forward(model, history, o + i, w_q, w_v, 0, workspace, x[0], x[1], x[2], row_changes[i])
+        if not is_explicit(tag):
+            for d in range(n):
+                x[0, d] += w_q * x[2, d]
+                x[1, d] += w_v * x[2, d]
     end_jvp(model, table, s, h, q, v, stage_changes, dq, dv)
     for d in range(n):
         if model.free[d] == 0:

@@ -69,3 +69,10 @@ def runge_kutta(_: SolverSettings) -> Method:
         return runge_kutta_entry
 
     return Method(INTEGRATORS["runge_kutta"], load, runge_kutta_tables(), steps=64, stages=1200)
+
+
+def esdirk(_: SolverSettings) -> Method:
+    from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
+
+    kind = INTEGRATORS["esdirk"]
+    return Method(kind, lambda: importlib.import_module(kind.general), esdirk_tables(), steps=64, stages=64 * STAGES)

@@ -14,9 +14,12 @@ from mdstopo.compiler.jit import entry, kernel
 from mdstopo.integrators.runge_kutta_tables import BB, E2_Q, E2_V, E_Q, E_V, ORDERS, STAGES, B, C
 from mdstopo.integrators.steps import (
     ACCEPTED,
+    DAMPED,
+    FAST,
     FIELDS,
     FIRST,
     FORCES,
+    HELD_SHORT,
     NEEDS_ROOM,
     NON_FINITE,
     OK,
@@ -29,6 +32,7 @@ from mdstopo.integrators.steps import (
     TURN,
     add_preloads,
     carve,
+    decay_rate,
     keep_stage,
     keep_state,
     lasting,
@@ -148,7 +152,7 @@ def advance(
 
 
 @kernel
-def _error(vectors, s, h, longest, a, weight):
+def step_error(vectors, s, h, longest, a, weight):
     """Estimate the error of a step relative to the motion; NaN where one appears.
 
     vectors (7 or more, s_max): weights of the stages, plane VECTORS of the method's table.
@@ -262,12 +266,22 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
     span = last_time - t
     wanted = fixed_step if fixed_step > 0.0 else span
     keep_state(steps.t, steps.state, np.int64(0), t, q0, v0)
+    moving = np.zeros(n)
+    for d in range(n):
+        if model.inv_mass[d] > 0.0:
+            moving[d] = 1.0 / model.inv_mass[d]
+    last_v = np.zeros(n)
+    last_a = np.zeros(n)
+    decay = 0.0  # the rate at which dampers damp, as the last step tells
+    fast = 0  # steps in a row that were as long as stability allows by it
+    ended = 0.0  # length of the last step, if its last stage and the next step's first tell a rate (`decay_rate`)
     steps.index[0, FIRST] = 0
     count = 0
     stages = 0
     longest = 0.0
     for segment in range(times.shape[0] - 1):
         end = times[segment + 1]
+        ended = 0.0
         while t < end:
             if count >= limits[0]:
                 return STEP_LIMIT, count, t
@@ -282,6 +296,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 model, table, s, strength, segment, t, h, q0, v0, tangent, damped, stages, rel, sums, f, k, c, turn,
                 q, v, a, steps, ends, work,
             )  # fmt: skip
+            if ended > 0.0:
+                decay = decay_rate(moving, a[0], last_a, v[0], last_v)
+                fast = fast + 1 if ended * decay > FAST else 0
+                work[HELD_SHORT] += 1 if fast > 0 else 0
+                ended = 0.0
             widest = 0.0
             for p in range(n_pair):
                 reached = motion[p]
@@ -293,7 +312,7 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 lost = noise_of(pair, noise, rel[0], reach, ends[0], p)
                 scale[p] = max(scale[p], 0.01 * widest, lost / tolerance, 1e3 * lost)
             motion_weights(pair, rel[0], reach, scale, weight)
-            error = _error(table[2], s, h, longest, a, weight)
+            error = step_error(table[2], s, h, longest, a, weight)
             finite = True
             for d in range(n):
                 finite = finite and np.isfinite(ends[0, d]) and np.isfinite(ends[1, d])
@@ -308,6 +327,8 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
                 turned = largest_turn(pair, q0, ends[0])
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
+                if fast > 1:
+                    wanted = min(wanted, DAMPED / decay)
                 if error > tolerance or turned > 1.1 * TURN:
                     work[REJECTED] += 1
                     continue
@@ -315,6 +336,11 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 motion[p] = max(motion[p], deflection(rel[0], rel0, reach, p))
             t = end if lands else t + h
             longest = max(longest, h)
+            if damped and not fixed_step > 0.0:
+                ended = h
+                for d in range(n):
+                    last_v[d] = v[s - 1, d]
+                    last_a[d] = a[s - 1, d]
             for d in range(n):
                 q0[d] = ends[0, d]
                 v0[d] = ends[1, d]

@@ -10,6 +10,8 @@ whose type its functions are found (`steps_interface`).
 from collections.abc import Sequence
 from typing import Annotated
 
+import numpy as np
+
 from mdstopo.compiler.fields import Field, Fields, FloatArray, IndexArray, views_of
 from mdstopo.compiler.jit import kernel, part
 from mdstopo.mechanics.kinematics.planar_scales import add_gross_force
@@ -42,13 +44,15 @@ FORCES, TANGENTS, ACCEPTED, REJECTED, NEWTON, SWEEPS, REVERSE, DESIGN, SPRINGS =
 #: steps that were rejected; where within a step a member switches; samples of responses; states inside steps and
 #: responses there, as at peaks
 OF_STARTS, OF_REJECTED, OF_SWITCHES, OF_SAMPLES, OF_POINTS = range(9, 14)
-WORK = 14
+#: of explicit methods, the accepted steps that were held short by stability (`decay_rate`)
+HELD_SHORT = 14
+WORK = 15
 
 
 def work_named(counts: Sequence[int]) -> dict[str, int]:
     """Work counts (WORK,) by their names."""
     forces, tangents, accepted, rejected, newton, sweeps, reverse, design, springs = counts[:OF_STARTS]
-    starts, lost, switches, samples, points = counts[OF_STARTS:]
+    starts, lost, switches, samples, points, held = counts[OF_STARTS:]
     return {
         "force_sums": forces,
         "tangents": tangents,
@@ -64,9 +68,16 @@ def work_named(counts: Sequence[int]) -> dict[str, int]:
         "sums_of_switches": switches,
         "sums_of_samples": samples,
         "sums_of_points": points,
+        "steps_held_short": held,
     }
 
 
+#: a step that is longer than so many times what dampers take to damp is held short by stability, not by accuracy; the
+#: explicit method of order 8 does not damp at 6.4 any more. What a motion at rest never shows, its derivatives do,
+#: which then grow from step to step beyond all bounds. At DAMPED, the most that is allowed, all is damped to 0.06
+FAST, DAMPED = 4.0, 5.0
+#: velocities at the end of a step closer than this to those of its last stage, relative, tell no rate
+TELLING = 1e-13
 WORK_NAMES = tuple(work_named(range(WORK)))
 
 
@@ -247,3 +258,26 @@ def add_preloads(model, strength, rel, out):
 def lasting(h, longest):
     """How many times as far as in a step of length h an error of its velocity leads; longest: step so far."""
     return max(1.0, LASTING * longest / h)
+
+
+@kernel
+def decay_rate(mass, a, last_a, v, last_v):
+    """The rate at which dampers damp (1/s), as the two states tell that an explicit step has at its end; 0: none.
+
+    The step's last stage and the state itself differ by its error, in which the fastest decay is largest:
+    |a - a'| / |v - v'| is its rate (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.2).
+
+    mass (n,): masses and moments of inertia (kg, kg m^2); 0 of what is driven.
+    a, last_a (n,): accelerations of the state, and of the last stage.
+    v, last_v (n,): their velocities.
+    """
+    forces = 0.0
+    speeds = 0.0
+    whole = 0.0
+    for d in range(mass.shape[0]):
+        change = a[d] - last_a[d]
+        forces += mass[d] * change * change
+        change = v[d] - last_v[d]
+        speeds += mass[d] * change * change
+        whole += mass[d] * v[d] * v[d]
+    return np.sqrt(forces / speeds) if speeds > TELLING * TELLING * whole else 0.0

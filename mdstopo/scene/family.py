@@ -1,5 +1,6 @@
 """Which family of kernels a case needs: that of springs between free bodies, or the general one."""
 
+from mdstopo.case.integrators import INTEGRATORS
 from mdstopo.case.model import Case, MemberGroup, ResponseRow, SpringLaw
 from mdstopo.case.responses import kind_of
 
@@ -15,6 +16,9 @@ def beyond_springs(case: Case) -> str:
         return "joints"
     if case.solver.settle:
         return "static settling"
+    kind = INTEGRATORS.get(case.solver.integrator)
+    if kind is not None and kind.general and not kind.springs:
+        return f"the integrator {kind.name}"
     if case.contacts:
         return "contacts"
     if case.bushings:

@@ -79,3 +79,9 @@ def test_joints_cost_runge_kutta_no_order(reference):
     found = orders([0.0625, 0.05, 0.04, 0.03125], reference, integrator="runge_kutta")
     for name, order in found.items():
         assert order >= 7.5, name
+
+
+def test_the_diagonally_implicit_method_is_of_fourth_order(reference):
+    found = orders([0.02, 0.0125, 0.01, 0.00625], reference, integrator="esdirk")
+    for name, order in found.items():
+        assert order == pytest.approx(4.0, abs=0.3), name

@@ -1,0 +1,38 @@
+"""Whether explicit steps are held short by stability: what a motion in them tells, from which `auto` chooses.
+
+A damper or a contact with friction that acts much faster than anything moves lets explicit steps be only so long,
+however little accuracy asks for; the method measures that (`integrators.steps.decay_rate`). Where it holds for most
+steps and for many, implicit ones are fewer by more than each costs.
+"""
+
+from typing import TYPE_CHECKING
+
+from mdstopo.case.model import Case
+from mdstopo.integrators.driver import MAX_STEPS
+from mdstopo.integrators.steps import ACCEPTED, HELD_SHORT
+from mdstopo.scene.model import FloatArray
+
+if TYPE_CHECKING:
+    from mdstopo.general.general_driver import GeneralDriver
+
+#: steps of a motion that have to be held short, and their share, before implicit ones pay; steps that tell enough
+MANY, MOST, ENOUGH = 4000, 0.5, 8000
+
+
+def may_be_stiff(case: Case) -> bool:
+    """Whether forces depend on rates by themselves: else nothing damps, and nothing is looked at."""
+    forces = any(law.depends_on_rate for group in case.members for law in group.laws)
+    return forces or bool(case.contacts) or any(any(bushing.damping) for bushing in case.bushings)
+
+
+def held_short(driver: "GeneralDriver", alpha: FloatArray) -> str:
+    """In words that explicit steps of a design alpha (N,) are held short by stability; or nothing."""
+    driver.allow(ENOUGH)
+    try:
+        driver.run(alpha, False)
+    finally:
+        driver.allow(MAX_STEPS)
+    held, steps = int(driver.work[HELD_SHORT]), int(driver.work[ACCEPTED])
+    if held < MANY or held < MOST * steps:
+        return ""
+    return f"stability holds {held} of {steps} explicit steps short, not accuracy"

@@ -1,0 +1,173 @@
+"""The diagonally implicit method: its coefficients, stiff scenes, switches, contacts, and gradients by other ways."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mdstopo
+from mdstopo.case.errors import CaseError
+from mdstopo.case.reader import read_case
+from mdstopo.engine import Evaluator
+from mdstopo.integrators.esdirk_tables import STAGES, esdirk_tables
+from mdstopo.integrators.runge_kutta_tables import BB, E_Q, E_V, VECTORS, A, B, C
+
+OWN = slice(STAGES)
+#: a double pendulum whose end is held by a damped spring
+PENDULUM = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 1}
+bodies:
+  a: {mass: 2, inertia: 0.3, position: [0.5, 0]}
+  b: {mass: 1, inertia: 0.1, position: [1.5, 0]}
+joints:
+  - {name: p, type: revolute, bodies: [ground, a], at: [0, 0]}
+  - {name: r, type: revolute, bodies: [a, b], at: [1, 0]}
+points:
+  tip: {body: b, grid: {list: [[0.5, 0.02], [0.3, -0.01]]}}
+  hook: {body: ground, grid: {list: [[2.2, 1.1]]}}
+members:
+  s: {from: tip, to: hook, law: {type: spring, stiffness: 80, damping: DAMPING}}
+design: {initial: 0.5}
+objectives:
+  G: {response: {displacement: {body: b, component: y}}, over_time: max_abs}
+  H: {response: {acceleration: {body: a}}, over_time: mean}
+combine: {weights: {G: 1, H: 1}, normalize: false}
+"""
+#: a block that slides over ground with friction, between a spring and a damped stop
+BLOCK = """
+format: 1
+gravity: [0, -9.81]
+time: {end: 0.6}
+bodies:
+  a: {mass: 1, inertia: 0.05, position: [0, 0.1], velocity: [1.5, 0]}
+points:
+  feet: {body: a, grid: {list: [[-0.2, 0], [0.2, 0]]}}
+contacts:
+  - points: feet
+    on: {body: ground, from: [-2, 0], to: [2, 0]}
+    stiffness: 1e5
+    damping: 300
+    friction: 0.3
+    slip: 0.01
+members:
+  s: {from: {body: ground, at: [-1, 0.1]}, to: {body: a, at: [0, 0.1]}, law: {type: spring, stiffness: 40}}
+  g:
+    from: {body: ground, at: [-1, 0.1]}
+    to: {body: a, at: [0, 0.1]}
+    law: {type: gap, stiffness: 900, damping: 20, gap: 0.1}
+design: {initial: 0.8}
+objectives:
+  D: {response: {displacement: {body: a, component: x}}, over_time: max}
+  V: {response: {velocity: {body: a, component: x}}, over_time: final}
+combine: {weights: {D: 1, V: 1}, normalize: false}
+"""
+
+
+def pendulum(damping: float, **solver: object) -> mdstopo.Case:
+    return read_case(
+        PENDULUM.replace("DAMPING", str(damping)), overrides={f"solver.{key}": value for key, value in solver.items()}
+    )
+
+
+def differences(case: mdstopo.Case, alpha: np.ndarray, size: float = 1e-3) -> dict[str, np.ndarray]:
+    """Gradients of all objectives by central differences of sixth order."""
+    found: dict[str, np.ndarray] = {}
+    for i in range(len(alpha)):
+        for k, weight in ((1, 0.75), (2, -0.15), (3, 1.0 / 60.0)):
+            for sign in (1.0, -1.0):
+                x = alpha.copy()
+                x[i] += sign * k * size
+                for name, value in mdstopo.evaluate(case, x, gradient=False).objectives.items():
+                    found.setdefault(name, np.zeros(len(alpha)))[i] += sign * weight * value / size
+    return found
+
+
+def test_coefficients_are_of_fourth_order_and_the_embedded_ones_of_third() -> None:
+    table = esdirk_tables()[1]
+    a, b, c = table[A, OWN, OWN], table[VECTORS, B, OWN], table[VECTORS, C, OWN]
+    embedded = b - table[VECTORS, E_V, OWN]
+    for weights in (b, embedded):
+        for value, exact in ((1, 1), (c, 1 / 2), (c * c, 1 / 3), (a @ c, 1 / 6)):
+            assert weights @ (value * np.ones(STAGES)) == pytest.approx(exact, abs=1e-14)
+    for value, exact in ((c**3, 1 / 4), (c * (a @ c), 1 / 8), (a @ (c * c), 1 / 12), (a @ (a @ c), 1 / 24)):
+        assert b @ value == pytest.approx(exact, abs=1e-14)
+    assert np.array_equal(b, a[-1])
+    assert table[VECTORS, BB, OWN] == pytest.approx(b @ a, abs=1e-15)
+    assert table[VECTORS, E_Q, OWN] == pytest.approx((b - embedded) @ a, abs=1e-15)
+
+
+def test_what_is_infinitely_stiff_is_damped_in_one_step() -> None:
+    a, b = esdirk_tables()[1][A, OWN, OWN], esdirk_tables()[1][VECTORS, B, OWN]
+
+    def growth(z: complex) -> float:
+        return abs(1.0 + z * b @ np.linalg.solve(np.eye(STAGES) - z * a, np.ones(STAGES)))
+
+    assert growth(-1e9) < 1e-8
+    assert max(growth(complex(0.0, y)) for y in np.logspace(-2, 4, 200)) <= 1.0 + 1e-12
+
+
+def test_stiff_dampers_cost_no_steps_and_no_digits() -> None:
+    steps = []
+    for damping in (500.0, 5e3, 5e6):
+        case = pendulum(damping, integrator="esdirk", tolerance=1e-5)
+        found = mdstopo.evaluate(case)
+        assert found.status.ok
+        assert found.work["steps"] <= 2000
+        steps.append(found.work["steps"])
+        exact = mdstopo.evaluate(pendulum(damping, integrator="esdirk", tolerance=1e-8))
+        other = mdstopo.evaluate(case, method="direct")
+        for name in found.objectives:
+            assert found.objectives[name] == pytest.approx(exact.objectives[name], rel=1e-4)
+            assert found.gradients[name] == pytest.approx(exact.gradients[name], rel=1e-3)
+            assert other.gradients[name] == pytest.approx(found.gradients[name], rel=1e-9)
+
+
+@pytest.mark.parametrize("integrator", ["esdirk", "runge_kutta"])
+def test_gradients_are_right_where_a_damper_is_stiff(integrator: str) -> None:
+    """Explicit steps as long as stability allows had gradients that were wrong by a factor of a thousand."""
+    case = pendulum(5000.0, integrator=integrator, tolerance=1e-6)
+    found, exact = (
+        mdstopo.evaluate(case),
+        differences(pendulum(5000.0, integrator="esdirk", tolerance=1e-9), np.full(2, 0.5)),
+    )
+    for name, gradient in found.gradients.items():
+        assert gradient == pytest.approx(exact[name], rel=1e-5)
+
+
+def test_a_stop_and_friction_agree_with_the_explicit_method() -> None:
+    case = read_case(BLOCK, overrides={"solver.integrator": "esdirk", "solver.tolerance": 1e-8})
+    explicit = read_case(BLOCK, overrides={"solver.integrator": "runge_kutta", "solver.tolerance": 1e-10})
+    found, exact = mdstopo.evaluate(case), mdstopo.evaluate(explicit)
+    other = mdstopo.evaluate(case, method="direct")
+    for name in found.objectives:
+        assert found.objectives[name] == pytest.approx(exact.objectives[name], rel=1e-6)
+        assert found.gradients[name] == pytest.approx(exact.gradients[name], rel=1e-5)
+        assert other.gradients[name] == pytest.approx(found.gradients[name], rel=1e-8)
+
+
+def test_auto_takes_it_where_stability_holds_most_explicit_steps_short() -> None:
+    chosen = {damping: Evaluator(pendulum(damping, tolerance=1e-5), beside=False) for damping in (500.0, 5e4)}
+    assert chosen[500.0].integrator == "runge_kutta"
+    assert chosen[5e4].integrator == "esdirk"
+    assert "stability holds" in chosen[5e4].integrator_reason
+    start = np.full(2, 0.5)
+    assert chosen[5e4].evaluate(start).work["steps"] <= 1000
+    assert chosen[500.0].evaluate(start).work["steps_held_short"] > 100
+
+
+def test_bodies_in_space_are_refused() -> None:
+    case = read_case(
+        """
+format: 1
+dimension: 3
+time: {end: 1}
+bodies: {a: {mass: 1, inertia: [1, 1, 1], position: [0, 0, 0]}}
+members: {s: {from: {body: ground, at: [0, 0, 1]}, to: {body: a, at: [0, 0, 0]}, law: {type: spring, stiffness: 9}}}
+objectives: {G: {response: energy}}
+solver: {integrator: esdirk}
+"""
+    )
+    with pytest.raises(CaseError, match="esdirk does not compute bodies in space"):
+        mdstopo.evaluate(case)
