@@ -58,7 +58,7 @@ def make_stages(
     tag, model, table, first, stop, member_state, segment, t, h, q0, v0, tangent, o, workspace, lam, q, v, a, history,
     work,
 ):  # fmt: skip
-    """The stages; see `method_interface.make_stages`. Rows `stop` and `stop` + 1 of a become x / h^2 and y / h of the error."""
+    """The stages, and behind them in a the error, x / h^2 and y / h; see `method_interface.make_stages`."""
     singular = -1
     for i in range(first, stop):
         stage_state(model, table, h, i, q0, v0, q, v, a, workspace.slopes)
