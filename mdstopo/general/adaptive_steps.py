@@ -9,7 +9,7 @@ import numpy as np
 
 from mdstopo.compiler.jit import kernel
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
-from mdstopo.general.braking import BRAKED, HELD, HOPELESS, brake_rate, friction_error
+from mdstopo.general.braking import HELD, HOPELESS, brake_rate, friction_error
 from mdstopo.general.events import (
     has_switches,
     is_doubtful,
@@ -404,7 +404,7 @@ def run_adaptive(
     rubbing = explicit and model.contact_pair.shape[0] > 0  # implicit stages bear what brakes
     brake = 0.0  # the rate at which contacts brake
     braking = -1  # the contact that brakes most
-    held = 0  # steps in a row that were kept short by that rate
+    held = 0  # steps in a row that were kept short by the rate of contacts or dampers
     decay = 0.0  # the rate at which dampers damp, as the last step tells
     fast = 0  # steps in a row that were as long as stability allows by it
     ended = 0.0  # length of the last step, if its last stage and the next step's first tell that rate
@@ -468,7 +468,7 @@ def run_adaptive(
             lam, q[0], v[0], a[0], work,
         )  # fmt: skip
     if rubbing and not fixed_step > 0.0:
-        brake, braking = brake_rate(model, member_state, q0, v0, BRAKED / wanted, workspace)
+        brake, braking = brake_rate(model, member_state, q0, v0, DAMPED / wanted, workspace)
     keep_state(history, 0, t, q0, v0, push[0], push[1])
     history.index[0, FIRST] = 0
     count = np.int64(0)
@@ -501,9 +501,10 @@ def run_adaptive(
                     history.event[e, GIVEN] = 1
         while t < end:
             where[0] = -1
-            held = held + 1 if wanted * brake > BRAKED else 0
+            damped = max(decay, brake) if fast > 1 else brake
+            held = held + 1 if wanted * damped > DAMPED else 0
             if held > 0:
-                wanted = BRAKED / brake
+                wanted = DAMPED / damped
                 where[0] = braking
                 work[HELD_SHORT] += 1
                 if held > HELD and (last_time - t) > HOPELESS * wanted * limits[0]:
@@ -542,7 +543,6 @@ def run_adaptive(
                     history.stage_v[stages - 1],
                 )  # fmt: skip
                 fast = fast + 1 if ended * decay > FAST else 0
-                work[HELD_SHORT] += 1 if fast > 0 else 0
                 ended = 0.0
             sigma_end = least_singular_value(model, workspace)
             relative_pose(model, end_q, end_v, rel)
@@ -580,8 +580,6 @@ def run_adaptive(
                     change **= GROWTH
                 turned = largest_turn(model, q0, end_q)
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
-                if fast > 1:
-                    wanted = min(wanted, DAMPED / decay)
                 if error > tolerance or turned > 1.1 * TURN:
                     must = False
                     work[REJECTED] += 1
@@ -676,6 +674,6 @@ def run_adaptive(
                     where[0] = who
                     return CHATTERING, count, events, t
             if rubbing and not fixed_step > 0.0:
-                brake, braking = brake_rate(model, member_state, q0, v0, BRAKED / wanted, workspace)
+                brake, braking = brake_rate(model, member_state, q0, v0, DAMPED / wanted, workspace)
             history.index[count, EVENTS] = events
     return OK, count, events, t

@@ -19,12 +19,8 @@ from mdstopo.mechanics.kinematics.vectors import cross, dot, minus, norm
 SETTLED = 0.1
 #: what rounding leaves of a velocity, relative to its parts
 ROUNDING = 1e-15
-#: a step times the rate at which contacts brake, at most: a method of order 8 is stable up to 6.4, and at 5 it leaves a
-#: twentieth of what is braked. An error may stay below every tolerance where it grows, as long as rounding holds it at
-#: nothing; derivatives grow all the same
-BRAKED = 5.0
-#: after HELD steps in a row that are held short by that, a motion is given up if at this length it needs more than
-#: HOPELESS times the steps that it may take
+#: after HELD steps in a row that are held short by stability (`integrators.steps.DAMPED`), a motion is given up if at
+#: this length it needs more than HOPELESS times the steps that it may take
 HELD, HOPELESS = 1000, 10.0
 
 

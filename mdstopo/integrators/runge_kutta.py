@@ -299,7 +299,6 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
             if ended > 0.0:
                 decay = decay_rate(moving, a[0], last_a, v[0], last_v)
                 fast = fast + 1 if ended * decay > FAST else 0
-                work[HELD_SHORT] += 1 if fast > 0 else 0
                 ended = 0.0
             widest = 0.0
             for p in range(n_pair):
@@ -327,8 +326,9 @@ def simulate(ints, floats, tables, alpha, damped, tangent, settings, limits, roo
                 change = 0.9 * (tolerance / max(error, 1e-30)) ** (1.0 / order)
                 turned = largest_turn(pair, q0, ends[0])
                 wanted = h * min(max(change, 0.1), 4.0, TURN / max(turned, 1e-300))
-                if fast > 1:
-                    wanted = min(wanted, DAMPED / decay)
+                if fast > 1 and wanted * decay > DAMPED:
+                    wanted = DAMPED / decay
+                    work[HELD_SHORT] += 1
                 if error > tolerance or turned > 1.1 * TURN:
                     work[REJECTED] += 1
                     continue

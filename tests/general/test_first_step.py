@@ -7,8 +7,9 @@ import mdstopo
 from mdstopo.case.reader import read_case
 from mdstopo.general.accelerations import make_workspace, solve_accelerations
 from mdstopo.general.compile import compile_general
-from mdstopo.general.first_step import FIRST, PROBES, first_step
+from mdstopo.general.first_step import PROBES, first_step
 from mdstopo.general.model import pack_general, unpack_general
+from mdstopo.general.runge_kutta import FIRST_ERRORS
 from mdstopo.integrators.steps import FORCES, TURN, WORK
 from mdstopo.mechanics.kinematics.planar_poses import POSE, relative_pose
 from tests.compiled import compiled
@@ -49,9 +50,10 @@ def _first(ints, floats, member_state, tolerance, order, noise, work):
     rel = np.empty((n_pair, POSE))
     relative_pose(model.pair, model.home, q0, v0, rel)
     scratch = np.empty((3, n))
+    first_error = FIRST_ERRORS[1 if model.size[2] != 0 else 0]
     return first_step(
         model, member_state, model.times[1], q0, v0, a0, rel, np.zeros(n_pair), np.full(n_pair, noise), tolerance,
-        order, workspace, lam, scratch[0], scratch[1], scratch[2], work,
+        order, first_error, workspace, lam, scratch[0], scratch[1], scratch[2], work,
     )  # fmt: skip
 
 
@@ -72,7 +74,7 @@ def test_it_follows_from_the_period_of_a_swing(tolerance, start, law, order, met
     """With a0 of a push, theta is (omega h)^2/2; with v0 of a kick it is the same."""
     step, balances = first(SWING.format(law=law, **start), tolerance, order)
     omega = np.sqrt(800 / 2)
-    expected = np.sqrt(2) / omega * (tolerance / FIRST[method]) ** (1 / order)
+    expected = np.sqrt(2) / omega * (tolerance / FIRST_ERRORS[method]) ** (1 / order)
     assert step == pytest.approx(expected, rel=0.2)
     assert balances <= PROBES
 
