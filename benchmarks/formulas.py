@@ -35,17 +35,21 @@ LAWS = {
         '{type: expression, force: "clip(p*(x - a) + d*xd, -f, f)", parameters: {p: 225, d: 2, a: 0.01, f: 12}}',
     ),
 }
-_LAW = "{type: spring, stiffness: 225}"
+#: laws that switch, of which fewer members are taken: each switch of each member ends a step
+SWITCHING = ("gap", "actuator")
+_LAW, _COUNT = "{type: spring, stiffness: 225}", "count: 20"
 _SETTINGS = {"solver.integrator": "runge_kutta", "solver.tolerance": "1e-6"}
-_SETTINGS |= {"objectives.G.response": "{acceleration: {body: torso}}", "objectives.G.over_time": "mean"}
+_SETTINGS |= {"objectives.G.response": "{velocity: {body: torso, component: x}}", "objectives.G.over_time": "final"}
 
 
 def formulas() -> Iterator[Table]:
-    """One table: 1,020 members of each law and of its formula."""
-    text = (CASES / "fig6.yaml").read_text(encoding="utf-8")
-    assert _LAW in text
+    """One table: many members of each law and of its formula."""
+    whole = (CASES / "fig6.yaml").read_text(encoding="utf-8")
+    assert _LAW in whole
+    assert _COUNT in whole
     rows = []
     for name, pair in LAWS.items():
+        text = whole.replace(_COUNT, "count: 4") if name in SWITCHING else whole
         engines = [Evaluator(read_case(text.replace(_LAW, law), overrides=_SETTINGS)) for law in pair]
         found = [engine.evaluate(engine.case.start) for engine in engines]
         calls = {
@@ -61,16 +65,17 @@ def formulas() -> Iterator[Table]:
         apart = max(_apart(*found))
         cells = [spread([1e3 * each for each in times[i, True]]) for i in range(2)]
         rows.append(
-            [name, *cells, *(f"{each:.2f}" for each in ratios), f"{apart:.0e}",
+            [name, f"{engines[0].case.n_members:,}", *cells, *(f"{each:.2f}" for each in ratios), f"{apart:.0e}",
              verdict(max(ratios) <= AT_MOST and apart <= APART)]
         )  # fmt: skip
     yield Table(
-        "1,020 members by a built-in law and by its formula: objective and exact gradient, ms",
-        ("law", "built in", "formula", "formula to built in", "objective alone", "apart, relative", "holds"),
+        "Members by a built-in law and by its formula: objective and exact gradient, ms",
+        ("law", "members", "built in", "formula", "formula to built in", "objective alone", "apart, relative", "holds"),
         rows,
         (
-            "The scene of fig6 by `runge_kutta` with a tolerance of 1e-6, the mean acceleration of the torso, calls "
-            f"in turns. It holds where ratios are at most {AT_MOST:g}, and values and gradients within {APART:.0e}.",
+            "The scene of fig6 by `runge_kutta` with a tolerance of 1e-6, the last velocity of the torso, calls "
+            f"in turns. It holds where ratios are at most {AT_MOST:g}, and values and gradients within {APART:.0e}. "
+            "A built-in gap that is open is left out of all sums; its formula is computed, and gives 0.",
         ),
     )
 
