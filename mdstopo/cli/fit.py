@@ -5,7 +5,7 @@ import shlex
 import sys
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
@@ -101,7 +101,7 @@ def command(
         place = prepare_place(path)
         with Lock(place):
             remove_leftovers(place)
-            run = _fitted(case, place, (points, resume, overwrite), (output, line, interrupts.stop_requested))
+            run = _fitted(case, place, _Asked(points, resume, overwrite, line), output, interrupts.stop_requested)
     found = content(read_result(path))
     written = path.with_name(f"{case.name}.fitted.yaml") if run.found is not None else None
     if written is not None and picture_path is not None:
@@ -128,18 +128,29 @@ def _check(picture_path: Path | None, resume: bool, overwrite: bool) -> None:
         raise StoreError(f"{picture_path}: a picture ends in {', '.join(FORMATS)}")
 
 
+class _Asked(NamedTuple):
+    """points: of profiles; resume, overwrite: what becomes of a result that is there; line: the command line."""
+
+    points: int
+    resume: bool
+    overwrite: bool
+    line: str
+
+
 def _fitted(
     case: "Case",
     place: Path,
-    asked: tuple[int, bool, bool],
-    said: tuple[Output, str, "Callable[[], bool]"],
+    asked: _Asked,
+    output: Output,
+    stop: "Callable[[], bool]",
 ) -> "FitRun":
     """The fit, which is kept at a place that is locked, and the fitted case beside it.
 
     case: with its section `fit`.
     place: of the result file.
-    asked: points of profiles, whether a fit is gone on with, whether what is there is replaced.
-    said: where to say what happens; the command line; asks whether to stop.
+    asked: how it is to be done.
+    output: where it is said what happens.
+    stop: whether to end.
     """
     from mdstopo.fit.fitted_case import fitted_text
     from mdstopo.fit.prepared import prepared
@@ -149,21 +160,20 @@ def _fitted(
     from mdstopo.store.atomic import replace_file
     from mdstopo.store.checkpoint import Checkpointer
 
-    (points, resume, overwrite), (output, line, stop) = asked, said
-    before = _before(case, place, resume, overwrite, output.notice)
+    before = _before(case, place, asked.resume, asked.overwrite, output.notice)
     fitted_place = place.with_name(f"{case.name}.fitted.yaml")
-    _check_fitted(fitted_place, place, case, overwrite)
+    _check_fitted(fitted_place, place, case, asked.overwrite)
     announce_compilation(output, prepared(case))
     problem = FitProblem(case)
     known = None if before is None else _restored(problem, before)
-    file = FitFile(place, problem, line)
+    file = FitFile(place, problem, asked.line)
     run = FitRun(problem) if known is None else known
     saver = Checkpointer(lambda: file.checkpoint(run, output.notice))
 
     def save(_run: FitRun, urgent: bool = True) -> None:
         saver.offer(urgent=urgent)
 
-    run_fit(problem, points, run, save, stop, partial(save, urgent=False))
+    run_fit(problem, asked.points, run, save, stop, partial(save, urgent=False))
     text = None
     if run.found is not None:
         count = len(problem.numbers.keys)
